@@ -1,0 +1,1 @@
+"""Identify the unknown parameters of a driven arm from its measured motion."""

@@ -1,0 +1,182 @@
+"""Binding by argument name: the equations of a plant and its effects as one acyclic graph."""
+
+import inspect
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from armid.model.effect import Effect, Equation
+from armid.model.errors import ArmidError, nearest
+from armid.model.plant import Plant
+
+LEAVES = ("parameter", "constant", "state", "input", "latch", "time")
+STATIC_LEAVES = ("parameter", "constant")
+
+
+@dataclass(frozen=True)
+class Node:
+    """One name of the composed equations.
+
+    key: flat, unique identifier (`omega`, `coulomb__level`); kind: a leaf, or "quantity", "term", "port", "rate",
+    "initial", "guard"; arguments: (argument of the function, key it is bound to); terms: what a port sums.
+    """
+
+    key: str
+    kind: str
+    owner: str = ""
+    function: Equation | None = None
+    arguments: tuple[tuple[str, str], ...] = ()
+    terms: tuple[str, ...] = ()
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Keys that must be known before."""
+        return self.terms or tuple(key for _, key in self.arguments)
+
+
+@dataclass
+class Graph:
+    """Hold every node by key, in the order of declaration."""
+
+    nodes: dict[str, Node] = field(default_factory=dict)
+
+    def of_kind(self, *kinds: str) -> list[Node]:
+        """Return the nodes of some kinds."""
+        return [n for n in self.nodes.values() if n.kind in kinds]
+
+    def order(self, wanted: Iterable[str]) -> list[Node]:
+        """Return the nodes that are no leaves and lead to the wanted ones, each after what it needs.
+
+        Raises ArmidError when the equations run in a circle.
+        """
+        done: dict[str, Node] = {}
+        for key in wanted:
+            self._visit(key, done, ())
+        return [n for n in done.values() if n.kind not in LEAVES]
+
+    def _visit(self, key: str, done: dict[str, Node], path: tuple[str, ...]) -> None:
+        if key in done:
+            return
+        if key in path:
+            circle = " -> ".join((*path[path.index(key) :], key)).replace("__", ".")
+            raise ArmidError(f"the equations run in a circle: {circle}; use a state or an earlier quantity instead")
+        for needed in self.nodes[key].needs:
+            self._visit(needed, done, (*path, key))
+        done[key] = self.nodes[key]
+
+    def is_static(self, key: str) -> bool:
+        """Tell whether a node depends on parameters and constants alone."""
+        node = self.nodes[key]
+        if node.kind in LEAVES:
+            return node.kind in STATIC_LEAVES
+        return all(self.is_static(k) for k in node.needs)
+
+
+def arguments_of(function: Equation, label: str) -> list[inspect.Parameter]:
+    """Return the arguments of an equation; refuse *args and **kwargs."""
+    arguments = list(inspect.signature(function).parameters.values())
+    for a in arguments:
+        if a.kind not in (a.POSITIONAL_OR_KEYWORD, a.POSITIONAL_ONLY):
+            raise ArmidError(f"{label} has the argument '{a}': plain named arguments are expected")
+    return arguments
+
+
+def bind(
+    function: Equation, label: str, find: Callable[[str], str | None], known: Iterable[str]
+) -> tuple[tuple[str, str], ...]:
+    """Return (argument, key) for each argument that has a meaning here.
+
+    Raises ArmidError with one sentence for a name that nobody offers; an argument with a default may stay unbound.
+    """
+    bound = []
+    for argument in arguments_of(function, label):
+        key = find(argument.name)
+        if key is not None:
+            bound.append((argument.name, key))
+        elif argument.default is argument.empty:
+            raise ArmidError(f"{label} asks for '{argument.name}', which nobody offers here: "
+                             f"{nearest(argument.name, known)}")  # fmt: skip
+    return tuple(bound)
+
+
+def finder(plant: Plant, effect: Effect | None, initial: bool) -> tuple[Callable[[str], str | None], list[str]]:
+    """Return how names are looked up for one owner, and the names there are."""
+    own = {} if effect is None else {
+        **{p.name: f"{effect.name}__{p.name}" for p in effect.parameters},
+        **{s.name: f"{'initial__' if initial else ''}{effect.name}__{s.name}" for s in effect.states},
+        **{g.name: f"{effect.name}__{g.name}" for g in effect.guards if g.latch},
+    }  # fmt: skip
+    shared = [*(p.name for p in plant.parameters), *(c.name for c in plant.constants), *plant.quantities]
+    names = {n: n for n in [*shared, *plant.ports]}
+    names |= {s.name: f"initial__{s.name}" if initial else s.name for s in plant.states}
+    if not initial:
+        names |= {n: n for n in [*(i.name for i in plant.inputs), *(g.name for g in plant.guards if g.latch), "time"]}
+    names |= {alias: names[name] for alias, name in plant.aliases.items() if name in names}
+    names |= own
+    return names.get, list(names)
+
+
+def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:
+    """Bind every equation of the plant and its effects.
+
+    Raises ArmidError for an unknown name or port, for two effects of one name, and for a circle.
+    """
+    graph = Graph()
+    add = _adder(graph)
+    _leaves(plant, effects, add)
+    for owner in (None, *effects):
+        _equations(plant, owner, add)
+    for port in plant.ports:
+        terms = tuple(f"{e.name}__{port}" for e in effects if port in e.adds)
+        add(Node(port, "port", terms=terms))
+    graph.order(n.key for n in graph.nodes.values())
+    for node in graph.of_kind("initial"):
+        if not all(graph.is_static(k) or graph.nodes[k].kind == "initial" for k in node.needs):
+            raise ArmidError(f"the initial value of '{node.key.removeprefix('initial__').replace('__', '.')}' "
+                             "depends on what moves: parameters, constants and initial states are expected")  # fmt: skip
+    return graph
+
+
+def _adder(graph: Graph) -> Callable[[Node], None]:
+    def add(node: Node) -> None:
+        if node.key in graph.nodes:
+            raise ArmidError(f"'{node.key.replace('__', '.')}' is there twice: each effect at most once is expected")
+        graph.nodes[node.key] = node
+
+    return add
+
+
+def _leaves(plant: Plant, effects: tuple[Effect, ...], add: Callable[[Node], None]) -> None:
+    leaves = [(p.name, "parameter") for p in plant.parameters] + [(s.name, "state") for s in plant.states]
+    for e in effects:
+        leaves += [(f"{e.name}__{p.name}", "parameter") for p in e.parameters]
+        leaves += [(f"{e.name}__{s.name}", "state") for s in e.states]
+        leaves += [(f"{e.name}__{g.name}", "latch") for g in e.guards if g.latch]
+    leaves += [(c.name, "constant") for c in plant.constants] + [(i.name, "input") for i in plant.inputs]
+    leaves += [(g.name, "latch") for g in plant.guards if g.latch] + [("time", "time")]
+    for key, kind in leaves:
+        add(Node(key, kind))
+
+
+def _equations(plant: Plant, effect: Effect | None, add: Callable[[Node], None]) -> None:
+    owner, prefix = ("", "") if effect is None else (effect.name, f"{effect.name}__")
+    who = f"plant '{plant.name}'" if effect is None else f"effect '{owner}'"
+
+    def equation(key: str, kind: str, function: Equation, what: str) -> None:
+        find, known = finder(plant, effect, kind == "initial")
+        add(Node(key, kind, owner, function, bind(function, f"{who}, {what},", find, known)))
+
+    if effect is None:
+        for name, function in plant.quantities.items():
+            equation(name, "quantity", function, f"quantity '{name}'")
+    else:
+        for port, function in effect.adds.items():
+            if port not in plant.ports:
+                raise ArmidError(f"{who} adds to the port '{port}', which plant '{plant.name}' does not offer: "
+                                 f"{nearest(port, plant.ports)}")  # fmt: skip
+            equation(f"{prefix}{port}", "term", function, f"port '{port}'")
+    holder = plant if effect is None else effect
+    for state in holder.states:
+        equation(f"rate__{prefix}{state.name}", "rate", state.rate, f"rate of '{state.name}'")
+        equation(f"initial__{prefix}{state.name}", "initial", state.initial, f"initial value of '{state.name}'")
+    for guard in holder.guards:
+        equation(f"guard__{prefix}{guard.name}", "guard", guard.function, f"guard '{guard.name}'")

@@ -1,0 +1,84 @@
+"""A plant and the effects added to it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from armid.model.effect import Effect, State
+from armid.model.equations import equations_text
+from armid.model.errors import ArmidError, nearest
+from armid.model.graph import Graph, build_graph
+from armid.model.parameter import Parameter
+from armid.model.plant import Plant
+from armid.model.scales import resolve
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Compose a plant with effects: `model + effect`, `model - "effect"`; `print(model)` shows the equations.
+
+    Raises ArmidError when an effect asks for an unknown name or port, or is added twice.
+    """
+
+    plant: Plant
+    effects: tuple[Effect, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [e.name for e in self.effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise ArmidError(f"effect '{name}' is in the model already: each effect at most once is expected")
+        _ = self.graph
+
+    def __add__(self, effect: Effect) -> "Model":
+        return replace(self, effects=(*self.effects, effect))
+
+    def __sub__(self, effect: Effect | str) -> "Model":
+        name = effect if isinstance(effect, str) else effect.name
+        names = [e.name for e in self.effects]
+        if name not in names:
+            raise ArmidError(f"effect '{name}' is not in the model: {nearest(name, names)}")
+        return replace(self, effects=tuple(e for e in self.effects if e.name != name))
+
+    def __str__(self) -> str:
+        return equations_text(self.plant, self.effects, self.graph)
+
+    @cached_property
+    def graph(self) -> Graph:
+        """Every equation bound to what it needs."""
+        return build_graph(self.plant, self.effects)
+
+    @cached_property
+    def parameters(self) -> dict[str, Parameter]:
+        """Qualified name (`p0`, `coulomb.level`) -> Parameter in SI, in the order of the candidate vector."""
+        own = {p.name: resolve(p, self.plant.scales) for p in self.plant.parameters}
+        added = {f"{e.name}.{p.name}": resolve(p, self.plant.scales) for e in self.effects for p in e.parameters}
+        return own | added
+
+    @cached_property
+    def states(self) -> dict[str, State]:
+        """Qualified name -> State, in the order of integration."""
+        own = {s.name: s for s in self.plant.states}
+        return own | {f"{e.name}.{s.name}": s for e in self.effects for s in e.states}
+
+    @cached_property
+    def latches(self) -> list[str]:
+        """Qualified names of the one-way switches."""
+        own = [g.name for g in self.plant.guards if g.latch]
+        return own + [f"{e.name}.{g.name}" for e in self.effects for g in e.guards if g.latch]
+
+    @cached_property
+    def constants(self) -> dict[str, float]:
+        """Name -> default value, SI."""
+        return {c.name: c.value for c in self.plant.constants}
+
+    def constant_values(self, given: Mapping[str, float]) -> list[float]:
+        """Return all constants in order, the given ones replacing defaults.
+
+        Raises ArmidError for a constant that the plant does not have.
+        """
+        for name in given:
+            if name not in self.constants:
+                raise ArmidError(f"constant '{name}' is not one of plant '{self.plant.name}': "
+                                 f"{nearest(name, self.constants)}")  # fmt: skip
+        return [float(given.get(name, value)) for name, value in self.constants.items()]

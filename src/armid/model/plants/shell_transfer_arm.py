@@ -1,0 +1,264 @@
+"""The shell transfer arm of Zhao and Hou (Eqs 1-7).
+
+The paper prints no constants: every default below is an engineering estimate that gives a sensible machine (REF).
+Angles are positive in lowering, with gravity; the current is signed, its sign says which of the two opposed field
+windings is in use. The gas pressure is integrated together with the compression V0/V, and the sine and cosine of the
+angle are integrated too: the same as p0 (V0/V)**n and cos(theta), but without powers and cosines in the loop.
+"""
+
+import numpy as np
+
+from armid.model.effect import Guard, State
+from armid.model.parameter import Parameter
+from armid.model.plant import Constant, ManoeuvreKey, Plant
+from armid.model.scales import Scales
+
+DEGREE = np.pi / 180.0
+
+
+def arm_inertia(I6_empty, I6_loaded, shell):
+    """Inertia of worm wheel, arm and shell [kg m2]."""
+    return I6_empty + shell * (I6_loaded - I6_empty)
+
+
+def total_inertia(I01, I23, I45, arm_inertia, i1, i2, i3, eta1, eta2, eta3, inertia):
+    """Inertia at the arm [kg m2] (Eq 2)."""
+    return 2 * I01 * i1**2 * eta1 * eta2 * eta3 + I23 * i2**2 * eta2 * eta3 + I45 * i3**2 * eta3 + arm_inertia + inertia
+
+
+def gravity_moment(m_empty, m_loaded, L_empty, L_loaded, shell, g):
+    """Product m g L of the arm, with or without the shell [N m]."""
+    return g * (m_empty * L_empty + shell * (m_loaded * L_loaded - m_empty * L_empty))
+
+
+def gravity_level(gravity_moment, alpha, gravity):
+    """Part of gravity along the cosine of the angle [N m]; `gravity` is an error of the angle."""
+    return gravity_moment * np.cos(alpha + gravity)
+
+
+def gravity_upright(gravity_moment, alpha, gravity):
+    """Part of gravity along the sine of the angle [N m]."""
+    return gravity_moment * np.sin(alpha + gravity)
+
+
+def gravity_torque(gravity_level, cosine, gravity_upright, sine):
+    """Torque of gravity, m g L cos(theta + alpha) [N m] (Eq 4)."""
+    return gravity_level * cosine - gravity_upright * sine
+
+
+def piston_moment(l, S):
+    """Torque per pressure of the gas [m3]."""
+    return l * S
+
+
+def balance_torque(piston_moment, pressure, gas):
+    """Torque of the balance machine [N m] (Eqs 5, 6)."""
+    return piston_moment * (pressure + gas)
+
+
+def direction(theta_C, theta_D):
+    """Direction of the stroke: +1 lowering, -1 raising."""
+    return np.sign(theta_D - theta_C)
+
+
+def damping(K_d, k):
+    """Voltage per angular velocity that the tachometer feeds back [V s/rad]."""
+    return K_d * k
+
+
+def demand(closed, K_p, theta_D, theta, damping, omega, feedback, command, direction, U, u_th):
+    """Voltage that the control asks for [V]: full until the switch E, then proportional and derivative."""
+    return np.where(
+        closed, K_p * (theta_D - theta) + command - damping * (omega + feedback), 2 * (U + u_th) * direction
+    )
+
+
+def voltage(demand, u_th, U):
+    """Motor voltage [V]: the demand shrunk toward 0 by the threshold circuit, then clipped to the supply.
+
+    The sum of a positive and a negative part: one of them is 0.
+    """
+    return np.maximum(np.minimum(demand - u_th, U), 0.0) + np.minimum(np.maximum(demand + u_th, -U), 0.0)
+
+
+def field_flux(K, current, flux):
+    """Flux of one motor's field winding [Wb]."""
+    return K * np.abs(current) + flux
+
+
+def back_emf(C_e, i1, field_flux, omega):
+    """Voltage induced in the armature [V] (Eq 7)."""
+    return C_e * i1 * (field_flux * omega)
+
+
+def motor_torque(C_T, field_flux, current):
+    """Torque of one motor [N m] (Eq 7)."""
+    return C_T * (field_flux * current)
+
+
+def drive_ratio(C_T, i1, eta1, eta2, eta3):
+    """Torque at the arm of both motors per product of flux and current."""
+    return 2 * C_T * i1 * eta1 * eta2 * eta3
+
+
+def drive_effort(field_flux, current, drive_ratio):
+    """Torque of both motors at the arm [N m]: 2 T_d i1 eta1 eta2 eta3."""
+    return field_flux * current * drive_ratio
+
+
+def recorded_speed(omega, output):
+    """Angular velocity that the gyro records [rad/s]."""
+    return omega + output
+
+
+def angle_rate(omega):
+    return omega
+
+
+def speed_rate(drive_effort, drive, balance_torque, gravity_torque, torque, total_inertia):
+    return (gravity_torque - balance_torque + drive_effort + drive + torque) / total_inertia
+
+
+def current_rate(voltage, supply, R, current, back_emf, winding, L_a):
+    # The voltage comes last: it is known last, and lanes wait for it.
+    return voltage / L_a + (supply + winding - R * current - back_emf) / L_a
+
+
+def sine_rate(cosine, omega):
+    return cosine * omega
+
+
+def cosine_rate(sine, omega):
+    return -sine * omega
+
+
+def squeeze(S, l, V0, omega, compression):
+    """Rate at which the gas is compressed, -dV/dt / V [1/s]."""
+    return S * l / V0 * (omega * compression)
+
+
+def compression_rate(squeeze, compression):
+    return squeeze * compression
+
+
+def pressure_rate(n, pressure, squeeze):
+    return n * (pressure * squeeze)
+
+
+def start_angle(theta_C):
+    return theta_C
+
+
+def start_sine(theta_C):
+    return np.sin(theta_C)
+
+
+def start_cosine(theta_C):
+    return np.cos(theta_C)
+
+
+def at_rest():
+    return 0.0
+
+
+def start_compression(V0, S, l, theta_C, theta_A):
+    return V0 / (V0 - S * l * (theta_C - theta_A))
+
+
+def start_pressure(p0, n, V0, S, l, theta_C, theta_A):
+    return p0 * (V0 / (V0 - S * l * (theta_C - theta_A))) ** n
+
+
+def distance_to_switch(theta_D, theta, delta_E):
+    return np.abs(theta_D - theta) - delta_E
+
+
+def dead_zone_low(demand, u_th):
+    return demand + u_th
+
+
+def dead_zone_high(demand, u_th):
+    return demand - u_th
+
+
+def saturation_low(demand, U, u_th):
+    return demand + U + u_th
+
+
+def saturation_high(demand, U, u_th):
+    return demand - U - u_th
+
+
+def current_sign(current):
+    return current
+
+
+ESTIMATE = "estimate (REF), not published"
+
+shell_transfer_arm = Plant(
+    name="shell_transfer_arm",
+    note="shell transfer arm with two series motors, worm gear and gas balance (Zhao & Hou, Eqs 1-7)",
+    parameters=(
+        Parameter("p0", "Pa", 2.6e6, 3.5e6, note="initial pressure of the accumulator"),
+        Parameter("k", "1", 0.6, 1.1, note="relative sensitivity of the tachometer generator"),
+        Parameter("eta3", "1", 0.45, 0.70, note="efficiency of the worm gear"),
+        Parameter("n", "1", 0.9, 1.5, note="polytropic exponent of the gas"),
+    ),
+    states=(
+        State("theta", "rad", angle_rate, start_angle, "angle_rad"),
+        State("omega", "rad/s", speed_rate, at_rest, "shaft_speed_rad_s"),
+        State("current", "A", current_rate, at_rest, "current_A"),
+        State("sine", "1", sine_rate, start_sine),
+        State("cosine", "1", cosine_rate, start_cosine),
+        State("compression", "1", compression_rate, start_compression),
+        State("pressure", "Pa", pressure_rate, start_pressure),
+    ),
+    quantities={
+        f.__name__: f
+        for f in (
+            arm_inertia, total_inertia, gravity_moment, gravity_level, gravity_upright, gravity_torque, squeeze,
+            piston_moment, balance_torque, direction, damping, demand, voltage, field_flux, back_emf, motor_torque,
+            drive_ratio, drive_effort, recorded_speed,
+        )
+    },  # fmt: skip
+    constants=(
+        Constant("I01", 2.0e-3, "kg m2", ESTIMATE), Constant("I23", 4.0e-3, "kg m2", ESTIMATE),
+        Constant("I45", 1.2e-2, "kg m2", ESTIMATE), Constant("I6_loaded", 64.0, "kg m2", ESTIMATE),
+        Constant("I6_empty", 31.1, "kg m2", ESTIMATE),
+        Constant("i1", 120.0, "1", ESTIMATE), Constant("i2", 60.0, "1", ESTIMATE), Constant("i3", 24.0, "1", ESTIMATE),
+        Constant("eta1", 0.97, "1", ESTIMATE), Constant("eta2", 0.97, "1", ESTIMATE),
+        Constant("m_loaded", 118.0, "kg", ESTIMATE), Constant("m_empty", 72.5, "kg", ESTIMATE),
+        Constant("L_loaded", 0.58, "m", ESTIMATE), Constant("L_empty", 0.4106, "m", ESTIMATE),
+        Constant("alpha", 5.0 * DEGREE, "rad", ESTIMATE), Constant("g", 9.81, "m/s2"),
+        Constant("l", 0.060, "m", ESTIMATE), Constant("S", 1.9635e-3, "m2", ESTIMATE),
+        Constant("V0", 0.40e-3, "m3", ESTIMATE), Constant("theta_A", -55.0 * DEGREE, "rad", ESTIMATE),
+        Constant("R", 0.40, "ohm", ESTIMATE), Constant("L_a", 2.0e-3, "H", ESTIMATE),
+        Constant("K", 4.5e-5, "Wb/A", ESTIMATE), Constant("C_e", 20.0, "1", ESTIMATE),
+        Constant("C_T", 20.0, "1", ESTIMATE), Constant("K_p", 280.0, "V/rad", ESTIMATE),
+        Constant("K_d", 70.0, "V s/rad", ESTIMATE), Constant("u_th", 0.5, "V", ESTIMATE),
+        Constant("delta_E", 25.0 * DEGREE, "rad", ESTIMATE),
+        Constant("theta_C", -48.0 * DEGREE, "rad", "start angle of the manoeuvre"),
+        Constant("theta_D", 22.0 * DEGREE, "rad", "target angle of the manoeuvre"),
+        Constant("shell", 1.0, "1", "1 with the shell, 0 without"),
+        Constant("U", 28.0, "V", "supply voltage of the manoeuvre"),
+    ),
+    ports={
+        "torque": "N m", "gravity": "rad", "inertia": "kg m2", "drive": "N m", "flux": "Wb", "winding": "V",
+        "supply": "V", "gas": "Pa", "feedback": "rad/s", "command": "V", "output": "rad/s",
+    },
+    guards=(
+        Guard("closed", distance_to_switch, latch=True),
+        Guard("dead_zone_low", dead_zone_low), Guard("dead_zone_high", dead_zone_high),
+        Guard("saturation_low", saturation_low), Guard("saturation_high", saturation_high),
+        Guard("current_sign", current_sign),
+    ),
+    keys=(
+        ManoeuvreKey("start_angle_deg", "theta_C", DEGREE, -55.0, 45.0, required=True),
+        ManoeuvreKey("target_angle_deg", "theta_D", DEGREE, -55.0, 45.0, required=True),
+        ManoeuvreKey("shell", "shell", boolean=True), ManoeuvreKey("supply_V", "U", 1.0, 1.0, 100.0),
+    ),
+    aliases={"I": "current", "speed": "omega", "angle": "theta", "T_d": "motor_torque"},
+    output="recorded_speed",
+    output_unit="rad/s",
+    scales=Scales(effort=1000.0, speed=2.0, effort_unit="N m", length_unit="rad"),
+)  # fmt: skip

@@ -1,0 +1,112 @@
+"""Choose how finely time is cut, from the error measured on a spread of candidates."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from armid.model import ArmidError, Manoeuvre, Model
+from armid.simulation.simulate import LONGEST, Array, Schedule, Simulation, simulate
+
+STANDARD, FINE = "standard", "fine"
+# Errors of the recorded signal that are allowed, as shares of the plant's speed scale (arm: 2 rad/s).
+ALLOWED = {STANDARD: 5e-6, FINE: 1e-7}
+# What steps over several samples may change: for good (all of them together, shares of the speed scale; one step does a
+# hundredth of it, which no derivative sees), and between their ends (shares of the allowed error).
+LASTING, PASSING = 1.5e-8, 0.1
+SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+MARGIN = 0.5
+N_PROBES = 48
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Hold a schedule and the error [unit of the signal] that was measured for it on the probes."""
+
+    schedule: Schedule
+    error: float
+    reached: bool
+
+
+def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
+    """Return candidates spread over a box (Sobol points without scrambling), shape (n_probes, n_parameters)."""
+    spread = qmc.Sobol(len(low), scramble=False).random(64)[1 : n_probes + 1] if len(low) else np.zeros((1, 0))
+    return low + (high - low) * spread
+
+
+def difference(a: Simulation, b: Simulation) -> float:
+    """Return the largest difference of two simulations where both hold."""
+    good = ~(a.failed | b.failed)
+    return float(np.max(np.abs(a.output[good] - b.output[good]), initial=0.0))
+
+
+def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:
+    """Return the largest difference after the first switch, where long steps have ended."""
+    switched = np.min(list(a.switch_times.values()), axis=0)
+    good = ~(a.failed | b.failed) & np.isfinite(switched)
+    after = np.arange(a.output.shape[1]) * interval > switched[good, None]
+    return float(np.max(np.abs(a.output[good] - b.output[good])[after], initial=0.0))
+
+
+def calibrate(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str = STANDARD) -> Calibration:
+    """Choose the coarsest schedule whose error on the candidates stays within half of what is allowed.
+
+    The error of n steps between samples is estimated from the difference to 2n steps: fourth order, 16/15 of it.
+    candidates: shape (n_candidates, n_parameters), usually `probes` of the bounds.
+
+    Raises ArmidError for an unknown accuracy.
+    """
+    if accuracy not in ALLOWED:
+        raise ArmidError(f"accuracy '{accuracy}' is unknown: {' or '.join(ALLOWED)} is expected")
+    allowed = ALLOWED[accuracy] * model.plant.scales.speed
+    runs: dict[int, Simulation] = {}
+
+    def run(n: int) -> Simulation:
+        return runs.setdefault(n, simulate(model, manoeuvre, candidates, Schedule(n)) if n not in runs else runs[n])
+
+    error = np.inf
+    for n in SUBSTEPS:
+        error = difference(run(n), run(2 * n)) * 16 / 15
+        if error <= MARGIN * allowed:
+            break
+    schedule = Schedule(n, weights=switch_weights(candidates, run(n)))
+    schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
+    return Calibration(schedule, error, bool(error <= allowed))
+
+
+def switch_weights(candidates: Array, run: Simulation) -> Array | None:
+    """Return weights of the parameters in the time of the first switch (least squares), None without a switch."""
+    if not run.switch_times or len(candidates) < 2 * candidates.shape[1] + 2:
+        return None
+    times = np.array(next(iter(run.switch_times.values())))
+    known = np.isfinite(times)
+    if known.sum() < candidates.shape[1] + 2 or np.ptp(times[known]) == 0.0:
+        return None
+    times[~known] = times[known].max()
+    spread = np.where(np.ptp(candidates, axis=0) > 0, np.ptp(candidates, axis=0), 1.0)
+    design = np.column_stack([np.ones(len(candidates)), candidates / spread])
+    return np.asarray(np.linalg.lstsq(design, times, rcond=None)[0][1:] / spread)
+
+
+def long_steps(
+    model: Model, manoeuvre: Manoeuvre, candidates: Array, schedule: Schedule, run: Simulation, allowed: float
+) -> NDArray[np.int64] | None:
+    """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may."""
+    if not model.latches or model.plant.inputs or manoeuvre.n_samples < 2 * LONGEST:
+        return None
+    lasting = LASTING * model.plant.scales.speed
+    plan = np.ones(manoeuvre.n_samples - 1, dtype=np.int64)
+    start, last = 0, manoeuvre.n_samples - 1
+    for span in (2, 4, 8):
+        for first in range(start + 10 - start % 10, last, 10 if start < 200 else 40):
+            longer = plan.copy()
+            longer[first:] = span
+            tried = simulate(model, manoeuvre, candidates, replace(schedule, plan=longer))
+            kept = lasting_difference(tried, run, manoeuvre.interval) <= lasting
+            if kept and difference(tried, run) <= PASSING * allowed:
+                plan, start = longer, first
+                break
+        else:
+            break
+    return plan if plan.max() > 1 else None

@@ -1,0 +1,85 @@
+"""Compiled simulators: one generated module for each model, kept on disk so that a second start compiles nothing."""
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import llvmlite
+import numba
+import numpy as np
+
+from armid.model import ArmidError, Model
+from armid.simulation import lane_math, lane_numpy, lanes
+from armid.simulation.generate import generate_module
+
+
+# One register of AVX-512, two of AVX2. Measured on the arm: 16 lanes are slower, because their values no longer fit.
+LANE_WIDTH = 8
+
+
+def cache_folder() -> Path:
+    """Return the folder of generated modules (ARMID_CACHE, else the user's cache folder)."""
+    given = os.environ.get("ARMID_CACHE")
+    if given:
+        return Path(given)
+    base = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
+    return (Path(base) if base else Path.home() / ".cache") / "armid"
+
+
+def module_name(text: str) -> str:
+    """Return a name that changes with the text and with everything it is compiled from."""
+    digest = hashlib.sha256(text.encode())
+    for module in (lanes, lane_math, lane_numpy):
+        digest.update(Path(str(module.__file__)).read_bytes())
+    for version in (numba.__version__, llvmlite.__version__, np.__version__, sys.version):
+        digest.update(version.encode())
+    return f"armid_model_{digest.hexdigest()[:20]}"
+
+
+def write_once(path: Path, text: str) -> None:
+    """Write a file so that another process sees all of it or nothing."""
+    if path.exists() and path.read_text() == text:
+        return
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".part", delete=False) as part:
+        part.write(text)
+    os.replace(part.name, path)
+
+
+def load_module(text: str) -> ModuleType:
+    """Return the generated module, from the cache folder where it can be written."""
+    name = module_name(text)
+    if name in sys.modules:
+        return sys.modules[name]
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_once(folder / f"{name}.py", text)
+    except OSError as error:
+        raise ArmidError(f"the cache folder {folder} cannot be written ({error.strerror}): set ARMID_CACHE to a "
+                         "folder that can") from error  # fmt: skip
+    spec = importlib.util.spec_from_file_location(name, folder / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+KERNELS: WeakKeyDictionary[Model, tuple[Callable[..., Any], int]] = WeakKeyDictionary()
+
+
+def compile_model(model: Model) -> tuple[Callable[..., Any], int]:
+    """Return the compiled `simulate` of a model and its lane width; the same model is looked up, not made again.
+
+    Raises ArmidError when an equation cannot be compiled, naming it.
+    """
+    if model not in KERNELS:
+        KERNELS[model] = (load_module(generate_module(model, LANE_WIDTH)).simulate, LANE_WIDTH)
+    return KERNELS[model]
