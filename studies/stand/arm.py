@@ -1,0 +1,88 @@
+"""Constants of the simulated arm."""
+
+import math
+from dataclasses import dataclass
+
+from stand.refusal import RefusalError
+
+GRAVITY = 9.81
+SHELL_INERTIA = 45.5 * 0.85**2
+"""Inertia of the shell about the trunnion [kg m2]: 45.5 kg at 0.85 m, both estimates."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """Hold what the shell changes: mass [kg], lever of the centre of mass [m], inertia I6 [kg m2]."""
+
+    mass: float
+    lever: float
+    inertia: float
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Hold the constants of paper Eqs 1-7 in SI units.
+
+    The first four are what an identifier must find. The paper prints no value of the others: all of them are
+    engineering estimates of a sensible machine.
+    """
+
+    p0: float = 3.05e6
+    k: float = 1.0
+    eta3: float = 0.55
+    n: float = 1.4
+    motor_inertia: float = 2.0e-3
+    gear_inertia: float = 4.0e-3
+    worm_inertia: float = 1.2e-2
+    ratio_motor: float = 120.0
+    ratio_gear: float = 60.0
+    ratio_worm: float = 24.0
+    eta1: float = 0.97
+    eta2: float = 0.97
+    loaded: Load = Load(mass=118.0, lever=0.58, inertia=64.0)
+    empty: Load = Load(mass=72.5, lever=0.4106, inertia=31.1)
+    gravity_angle: float = math.radians(5.0)
+    piston_lever: float = 0.060
+    piston_area: float = 1.9635e-3
+    gas_volume: float = 0.40e-3
+    travel: tuple[float, float] = (math.radians(-55.0), math.radians(45.0))
+    resistance: float = 0.40
+    inductance: float = 2.0e-3
+    excitation: float = 4.5e-5
+    emf_constant: float = 20.0
+    torque_constant: float = 20.0
+    position_gain: float = 280.0
+    speed_gain: float = 70.0
+    threshold: float = 0.5
+    switch_distance: float = math.radians(25.0)
+
+    def __post_init__(self) -> None:
+        """Refuse a truth that describes no machine."""
+        for name in ("p0", "k", "eta3", "n"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise RefusalError(f"{name} must be a positive number, not {value}")
+        if self.eta3 > 1.0:
+            raise RefusalError(f"eta3 is an efficiency and cannot exceed 1, but is {self.eta3}")
+
+    def load(self, shell: bool) -> Load:
+        """Give the load with or without the shell."""
+        return self.loaded if shell else self.empty
+
+    def inertia(self, shell: bool) -> float:
+        """Give the inertia about the trunnion J [kg m2].
+
+        J = 2 I01 i1^2 eta1 eta2 eta3 + I23 i2^2 eta2 eta3 + I45 i3^2 eta3 + I6 (paper Eq 2).
+        """
+        motors = 2.0 * self.motor_inertia * self.ratio_motor**2 * self.eta1 * self.eta2 * self.eta3
+        gears = self.gear_inertia * self.ratio_gear**2 * self.eta2 * self.eta3
+        worm = self.worm_inertia * self.ratio_worm**2 * self.eta3
+        return motors + gears + worm + self.load(shell).inertia
+
+    def volume(self, angle: float) -> float:
+        """Give the gas volume V = V0 - S l (theta - theta_A) [m3] at an angle [rad] (paper Eq 5)."""
+        return self.gas_volume - self.piston_area * self.piston_lever * (angle - self.travel[0])
+
+    def pressure(self, angle: float) -> float:
+        """Give the pressure of a polytropic gas p = p0 (V0/V)^n [Pa] at an angle [rad] (paper Eq 5)."""
+        return float(self.p0 * (self.gas_volume / self.volume(angle)) ** self.n)

@@ -1,0 +1,84 @@
+"""How the simulated arm is measured."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from stand.refusal import RefusalError
+from stand.trajectory import SAMPLES_PER_SECOND, Trajectory
+
+FloatArray = npt.NDArray[np.float64]
+REST_SAMPLES = 100
+NOISE_DAMPING = 0.7
+"""Damping ratio of the gyro that colours the noise, an estimate."""
+
+
+@dataclass(frozen=True)
+class Gyro:
+    """Hold what the gyro does to the speed it is shown, in deg/s and Hz; 0 switches any but the range off.
+
+    The paper gives a range of +-200 deg/s, a resolution below 0.15 % and 1 kHz. The step of 0.1 deg/s is an estimate:
+    about what 12 bits make of 400 deg/s (0.098), and below 0.15 % of 200 deg/s (0.3). The noise is an estimate too.
+    """
+
+    noise_deg_s: float = 0.25
+    quantisation_deg_s: float = 0.1
+    noise_bandwidth_hz: float = 0.0
+    range_deg_s: float = 200.0
+
+    def __post_init__(self) -> None:
+        """Refuse an instrument that cannot be."""
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise RefusalError(f"the gyro's {each.name} must be a number of 0 or more, not {value}")
+        if self.range_deg_s <= self.quantisation_deg_s:
+            raise RefusalError("the gyro's range must exceed its quantisation step")
+        if self.noise_bandwidth_hz >= SAMPLES_PER_SECOND / 2:
+            raise RefusalError(f"the noise bandwidth must stay below 500 Hz, but is {self.noise_bandwidth_hz} Hz")
+
+    @property
+    def decimals(self) -> int:
+        """Give the decimals that write a multiple of the quantisation step exactly, at most 6."""
+        step = self.quantisation_deg_s
+        exact = (digits for digits in range(6) if step and math.isclose(round(step, digits), step, rel_tol=1e-9))
+        return next(exact, 6)
+
+
+def record_times(trajectory: Trajectory) -> FloatArray:
+    """Give the times of a record [s]: 100 ms of rest under the brake, then the manoeuvre from t = 0."""
+    return np.arange(-REST_SAMPLES, trajectory.time_s.size) / SAMPLES_PER_SECOND
+
+
+def measure(trajectory: Trajectory, gyro: Gyro, bias_deg_s: float, rng: np.random.Generator) -> FloatArray:
+    """Give one record of a trajectory [deg/s], rest included: speed plus noise, rounded to steps, kept in range."""
+    rest = np.full(REST_SAMPLES, bias_deg_s)
+    shown = np.concatenate((rest, np.degrees(trajectory.gyro)))
+    return _quantise(shown + noise(shown.size, gyro, rng), gyro)
+
+
+def noise(size: int, gyro: Gyro, rng: np.random.Generator) -> FloatArray:
+    """Draw stationary noise of the asked rms [deg/s]: white, or white noise that a second-order gyro has smoothed.
+
+    The colour is the impulse response h(t) = exp(-z w t) sin(w sqrt(1 - z^2) t), w = 2 pi f, scaled to unit energy.
+    """
+    if not gyro.noise_bandwidth_hz:
+        return gyro.noise_deg_s * rng.standard_normal(size)
+    natural = 2.0 * math.pi * gyro.noise_bandwidth_hz
+    memory = math.ceil(8.0 * SAMPLES_PER_SECOND / (NOISE_DAMPING * natural))
+    time = np.arange(1, memory + 1) / SAMPLES_PER_SECOND
+    ringing = np.sin(natural * math.sqrt(1.0 - NOISE_DAMPING**2) * time)
+    response = np.exp(-NOISE_DAMPING * natural * time) * ringing
+    white = rng.standard_normal(size + memory - 1)
+    return gyro.noise_deg_s * np.convolve(white, response / np.linalg.norm(response), mode="valid")
+
+
+def _quantise(speed: FloatArray, gyro: Gyro) -> FloatArray:
+    """Round to whole steps inside the range; adding 0 turns a written -0 into 0."""
+    step = gyro.quantisation_deg_s
+    if not step:
+        return np.clip(speed, -gyro.range_deg_s, gyro.range_deg_s)
+    most = math.floor(gyro.range_deg_s / step + 1e-9)
+    return np.clip(np.round(speed / step), -most, most) * step + 0.0

@@ -1,0 +1,184 @@
+"""The simulated arm: the references, the undeclared effects and their limits."""
+
+import csv
+import math
+from dataclasses import fields, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stand.arm import Arm
+from stand.effects import Effects
+from stand.manoeuvre import KNOWN, Manoeuvre
+from stand.motion import Motion
+from stand.refusal import RefusalError
+from stand.trajectory import Trajectory, simulate
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+with (REFERENCE / "index.csv").open() as index:
+    ROWS = list(csv.DictReader(index))
+
+SIZES = {
+    "coulomb": 40.0,
+    "stribeck": 40.0,
+    "viscous": 15.0,
+    "drag": 15.0,
+    "tilt_deg": 2.0,
+    "worm_loss": 0.3,
+    "flux_saturation": 150.0,
+    "brush_drop": 1.0,
+    "winding_heating": 2e-5,
+    "supply_sag": 0.01,
+    "gas_heat_loss": 2.0,
+    "tachometer_lag": 0.005,
+    "tachometer_offset_deg_s": 2.0,
+    "gyro_bandwidth_hz": 40.0,
+    "gyro_bias_deg_s": 0.3,
+    "gyro_scale": 0.005,
+    "rocking_hz": 10.0,
+}
+STIFF = {"tachometer_lag": 1e-5, "gyro_bandwidth_hz": 1e4, "rocking_hz": 1e3}
+NEARLY_NULL = {name: 1e-6 * size for name, size in SIZES.items() if name not in STIFF} | {
+    "flux_saturation": 1e9,
+    "gas_heat_loss": 1e7,
+}
+
+
+@cache
+def moved(effects: Effects | None = None, name: str = "lower", duration_s: float = 1.2) -> Trajectory:
+    """Simulate a known manoeuvre once."""
+    return simulate(Motion(Arm(), KNOWN[name], effects or Effects()), duration_s)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row["file"])
+def test_agrees_with_the_independent_integrator(row: dict[str, str]) -> None:
+    arm = Arm(float(row["p0_MPa"]) * 1e6, float(row["k"]), float(row["eta3"]), float(row["n"]))
+    stroke = float(row["start_angle_deg"]), float(row["target_angle_deg"])
+    manoeuvre = Manoeuvre(row["manoeuvre"], *stroke, row["shell"] == "1", float(row["supply_V"]))
+    found = simulate(Motion(arm, manoeuvre), 1.2)
+    time, angle, speed, current = np.loadtxt(REFERENCE / row["file"], delimiter=",", skiprows=1).T
+    assert np.allclose(found.time_s, time, rtol=0, atol=1e-12)
+    assert np.abs(found.states["angle"] - angle).max() < 1e-7
+    assert np.abs(found.states["speed"] - speed).max() < 1e-6
+    assert np.abs(found.states["current"] - current).max() < 1e-3
+    assert found.switch_s == pytest.approx(float(row["switch_time_s"]), abs=1e-9)
+
+
+def test_a_short_stroke_is_in_closed_loop_from_the_start() -> None:
+    assert moved(name="inside_E").switch_s == 0.0
+
+
+def test_a_record_that_ends_before_the_switch_has_none() -> None:
+    short = moved(duration_s=0.3)
+    assert short.switch_s is None
+    assert np.abs(short.gyro - moved().gyro[:301]).max() < 1e-9
+
+
+def test_every_effect_is_tested_here() -> None:
+    assert {each.name for each in fields(Effects) if "of" not in each.metadata} == set(SIZES)
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_an_effect_at_zero_is_the_declared_arm_exactly(name: str) -> None:
+    null = moved(Effects(**{name: 0.0}))
+    assert np.array_equal(null.gyro, moved().gyro)
+    assert list(null.states) == ["angle", "speed", "current"]
+
+
+@pytest.mark.parametrize(("name", "size"), SIZES.items())
+def test_an_effect_changes_what_the_gyro_shows(name: str, size: float) -> None:
+    assert np.abs(moved(Effects(**{name: size})).gyro - moved().gyro).max() > math.radians(0.25)
+
+
+@pytest.mark.parametrize(("name", "size"), NEARLY_NULL.items())
+def test_an_effect_near_its_null_is_near_the_declared_arm(name: str, size: float) -> None:
+    assert np.abs(moved(Effects(**{name: size})).gyro - moved().gyro).max() < 1e-5
+
+
+@pytest.mark.parametrize(("name", "size"), STIFF.items())
+def test_a_fast_lag_or_tray_is_near_the_declared_arm(name: str, size: float) -> None:
+    """Take the stroke in closed loop from the start, and shortly, since these limits are stiff."""
+    shown = moved(Effects(**{name: size}), "inside_E", 0.1).gyro
+    assert np.abs(shown - moved(name="inside_E", duration_s=0.1).gyro).max() < 1e-3
+
+
+def test_refuses_an_effect_too_stiff_to_integrate() -> None:
+    with pytest.raises(RefusalError, match="too stiff"):
+        moved(Effects(tachometer_lag=1e-9), "inside_E", 0.1)
+
+
+@pytest.mark.parametrize(
+    "name", ["coulomb", "stribeck", "viscous", "drag", "flux_saturation", "brush_drop", "winding_heating", "supply_sag"]
+)
+def test_a_loss_delays_the_switch_both_ways(name: str) -> None:
+    for manoeuvre in ("lower", "raise"):
+        lossy, declared = (moved(effects, manoeuvre).switch_s for effects in (Effects(**{name: SIZES[name]}), None))
+        assert lossy is not None
+        assert declared is not None
+        assert lossy > declared + 5e-4
+
+
+def test_a_worm_that_loses_torque_brakes_less() -> None:
+    lossy, declared = moved(Effects(worm_loss=0.3)), moved()
+    assert np.abs(lossy.gyro - declared.gyro)[:578].max() < 2e-3
+    assert lossy.states["angle"].max() > declared.states["angle"].max() + 0.003
+
+
+def test_the_tachometer_follows_late() -> None:
+    states = moved(Effects(tachometer_lag=0.005)).states
+    assert np.allclose(states["tachometer"][200:500], states["speed"][195:495], rtol=0, atol=2e-3)
+
+
+def test_the_gyro_shows_the_speed_late() -> None:
+    """Expect the delay of a ramp, 2 z / w = 7 ms, before the switch."""
+    late = moved(Effects(gyro_bandwidth_hz=0.7 / (math.pi * 0.007)))
+    assert np.allclose(late.gyro[200:500], late.states["speed"][193:493], rtol=0, atol=2e-3)
+
+
+def test_a_tilt_is_another_angle_of_gravity() -> None:
+    arm = replace(Arm(), gravity_angle=Arm().gravity_angle + math.radians(2.0))
+    expected = simulate(Motion(arm, KNOWN["lower"]), 1.2)
+    assert np.abs(moved(Effects(tilt_deg=2.0)).gyro - expected.gyro).max() < 1e-9
+
+
+def test_a_sagging_supply_is_twice_its_resistance_in_the_winding() -> None:
+    expected = simulate(Motion(replace(Arm(), resistance=0.42), KNOWN["lower"]), 1.2)
+    assert np.abs(moved(Effects(supply_sag=0.01)).gyro - expected.gyro).max() < 1e-9
+
+
+def test_a_gas_that_exchanges_heat_at_once_is_isothermal_in_the_long_run() -> None:
+    states = moved(Effects(gas_heat_loss=1e-3)).states
+    isotherm = np.array([replace(Arm(), n=1.0).pressure(angle) for angle in states["angle"]])
+    assert np.abs(states["pressure"] / isotherm - 1.0)[10:].max() < 1e-3
+
+
+def test_the_gyro_error_is_bias_and_scale() -> None:
+    expected = moved().gyro * 1.005 + math.radians(0.3)
+    assert np.allclose(moved(Effects(gyro_bias_deg_s=0.3, gyro_scale=0.005)).gyro, expected, rtol=0, atol=1e-12)
+
+
+def test_a_loose_shell_rocks_at_the_frequency_of_the_two_bodies() -> None:
+    motion = Motion(Arm(), KNOWN["lower"], Effects(rocking_hz=10.0, rocking_damping=0.001))
+    states = simulate(motion, 0.5).states
+    stretch = states["shell_angle"] - states["angle"]
+    wave = np.diff(stretch - np.polyval(np.polyfit(np.arange(501), stretch, 4), np.arange(501)))
+    crossings = np.flatnonzero(np.diff(np.sign(wave)))
+    found = 500.0 / np.diff(crossings).mean()
+    expected = 10.0 * math.sqrt(Arm().inertia(True) / motion.inertia)
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+def test_no_shell_no_rocking() -> None:
+    assert np.array_equal(moved(Effects(rocking_hz=10.0), "empty").gyro, moved(name="empty").gyro)
+
+
+def test_all_effects_together_run_in_both_directions() -> None:
+    for name in ("lower", "raise"):
+        assert np.isfinite(moved(Effects(**SIZES), name).gyro).all()
+
+
+def test_refuses_to_leave_the_travel() -> None:
+    with pytest.raises(RefusalError, match="leave the travel"):
+        simulate(Motion(Arm(p0=9e6), KNOWN["lower"]), 1.2)

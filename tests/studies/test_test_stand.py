@@ -1,0 +1,151 @@
+"""The campaigns of the test stand: format, reproducibility, independence and refusals."""
+
+import ast
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stand.command import main
+
+ROOT = Path(__file__).parents[2]
+STAND = ROOT / "studies"
+PAPER_ARM = STAND / "campaigns" / "paper_arm"
+QUICK = ["--manoeuvres", "short,empty", "--repeats", "2", "--duration", "0.2"]
+
+
+def told(folder: Path) -> dict[str, Any]:
+    return tomllib.loads((folder / "campaign.toml").read_text())
+
+
+def speeds(file: Path) -> Any:
+    return np.loadtxt(file, delimiter=",", skiprows=1)
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("stand") / "quick"
+    assert main([str(folder), *QUICK, "--seed", "3", "--window-s", "0", "0.15", "--effect", "coulomb=30"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def remade(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run the command of the committed README as a user would, into another folder."""
+    folder = tmp_path_factory.mktemp("stand") / "again"
+    line = next(line for line in (PAPER_ARM / "README.md").read_text().splitlines() if line.startswith("python "))
+    words = [str(folder) if word == "studies/campaigns/paper_arm" else word for word in shlex.split(line)]
+    subprocess.run([sys.executable, "-W", "error", *words[1:]], cwd=ROOT, check=True, capture_output=True)
+    return folder
+
+
+def imports(file: Path) -> set[str]:
+    """Name the top-level packages that a file imports anywhere."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {each.name.split(".")[0] for each in node.names}
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            found.add(str(node.module).split(".")[0])
+        assert not (isinstance(node, ast.Name) and node.id == "__import__")
+    return found
+
+
+def test_the_stand_imports_nothing_of_the_package() -> None:
+    files = [STAND / "test_stand.py", *(STAND / "stand").rglob("*.py")]
+    used = set().union(*(imports(file) for file in files)) - sys.stdlib_module_names
+    assert len(files) > 10
+    assert used <= {"stand", "numpy", "scipy", "pandas", "matplotlib", "seaborn"}
+    assert not any("importlib" in imports(file) for file in files)
+
+
+def test_plotting_is_imported_only_to_plot() -> None:
+    code = "import sys, stand.command; sys.exit('matplotlib' in sys.modules or 'armid' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=STAND, check=False).returncode == 0
+
+
+def test_a_campaign_is_written_in_the_fixed_format(quick: Path) -> None:
+    assert {each.name for each in quick.iterdir()} == {
+        "campaign.toml", "README.md", "short.csv", "short_2.csv", "empty.csv"
+    }  # fmt: skip
+    manoeuvre = {"start_angle_deg": -48.0, "shell": True, "supply_V": 28.0, "window_s": [0.0, 0.15]}
+    first = {"file": "short.csv", "role": "train", "target_angle_deg": -8.0, **manoeuvre}
+    last = {"file": "empty.csv", "role": "holdout", **manoeuvre, "target_angle_deg": 22.0, "shell": False}
+    again = first | {"file": "short_2.csv", "repeat_of": "short.csv"}
+    heading = {"name": "quick", "plant": "shell_transfer_arm", "gyro_range_deg_s": 200}
+    assert told(quick) == {**heading, "records": [first, again, last]}
+    assert (quick / "short.csv").read_text().startswith("time_s,angular_velocity_deg_s\n-0.100,")
+    assert speeds(quick / "short.csv").shape == (301, 2)
+
+
+def test_a_campaign_says_synthetic_and_how_it_was_made(quick: Path) -> None:
+    heading = (quick / "campaign.toml").read_text().split("\nname")[0]
+    for words in ("SYNTHETIC", "p0 = 3050000 Pa", "coulomb = 30", "0.25 deg/s rms, white", "default_rng: 3"):
+        assert words in heading
+        assert words in (quick / "README.md").read_text()
+    assert str(quick.parent) not in heading
+
+
+def test_the_command_a_campaign_names_makes_it_again(quick: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.chdir(tmp_path)
+    line = (quick / "campaign.toml").read_text().splitlines()[1].removeprefix("# Made by: ")
+    assert main(shlex.split(line)[2:]) == 0
+    for file in quick.iterdir():
+        assert (tmp_path / "quick" / file.name).read_text() == file.read_text()
+
+
+def test_another_seed_gives_another_noise(quick: Path, tmp_path: Path) -> None:
+    assert main([str(tmp_path / "quick"), *QUICK, "--seed", "4"]) == 0
+    assert (tmp_path / "quick" / "short.csv").read_text() != (quick / "short.csv").read_text()
+
+
+def test_repeats_differ_by_their_noise_alone(quick: Path, tmp_path: Path) -> None:
+    first, second = (speeds(quick / f"{name}.csv") for name in ("short", "short_2"))
+    assert np.array_equal(first[:, 0], second[:, 0])
+    assert (first - second)[:, 1].std() == pytest.approx(0.25 * np.sqrt(2.0), rel=0.15)
+    assert main([str(tmp_path / "still"), *QUICK, "--noise-deg-s", "0"]) == 0
+    assert (tmp_path / "still" / "short.csv").read_text() == (tmp_path / "still" / "short_2.csv").read_text()
+
+
+def test_a_manoeuvre_can_be_written_out(tmp_path: Path) -> None:
+    options = [
+        "--manoeuvres",
+        "up=20:-30.5:empty:24,short",
+        "--repeats",
+        "1",
+        "--duration",
+        "0.05",
+        "--holdout",
+        "short",
+    ]
+    assert main([str(tmp_path / "c"), *options]) == 0
+    record = told(tmp_path / "c")["records"][0]
+    assert (record["start_angle_deg"], record["target_angle_deg"], record["supply_V"]) == (20.0, -30.5, 24.0)
+    assert (record["file"], record["role"], record["shell"]) == ("up.csv", "train", False)
+
+
+def test_a_record_at_the_end_of_the_gyros_range_is_named(tmp_path: Path) -> None:
+    assert main([str(tmp_path / "c"), *QUICK, "--gyro-range-deg-s", "30"]) == 0
+    assert "are cut there: short.csv, short_2.csv" in (tmp_path / "c" / "README.md").read_text()
+
+
+def test_the_committed_campaign_can_be_made_again(remade: Path) -> None:
+    assert told(remade) == told(PAPER_ARM)
+    assert {each.name for each in remade.iterdir()} == {each.name for each in PAPER_ARM.iterdir()}
+    for record in told(PAPER_ARM)["records"]:
+        difference = speeds(remade / record["file"]) - speeds(PAPER_ARM / record["file"])
+        assert np.abs(difference).max() < 0.1 + 1e-9
+
+
+def test_the_figure_is_a_picture(remade: Path) -> None:
+    assert (remade / "repeats.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_committed_campaign_is_small() -> None:
+    assert sum(file.stat().st_size for file in PAPER_ARM.iterdir()) < 500_000
