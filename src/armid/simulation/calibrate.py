@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from armid.model import ArmidError, Manoeuvre, Model
 from armid.simulation.simulate import LONGEST, Array, Schedule, Simulation, simulate
@@ -30,9 +29,15 @@ class Calibration:
 
 
 def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
-    """Return candidates spread over a box (Sobol points without scrambling), shape (n_probes, n_parameters)."""
-    spread = qmc.Sobol(len(low), scramble=False).random(64)[1 : n_probes + 1] if len(low) else np.zeros((1, 0))
-    return low + (high - low) * spread
+    """Return candidates spread evenly over a box (Kronecker sequence), shape (n_probes, n_parameters).
+
+    x_i = frac(i a), a_j = g**-j with g the root of g**(d + 1) = g + 1. Source: Roberts 2018, generalised golden ratio.
+    """
+    ratio = 2.0
+    for _ in range(60):
+        ratio = (1.0 + ratio) ** (1.0 / (len(low) + 1))
+    steps = ratio ** -np.arange(1.0, len(low) + 1.0)
+    return low + (high - low) * ((np.arange(1, n_probes + 1)[:, np.newaxis] * steps) % 1.0)
 
 
 def difference(a: Simulation, b: Simulation) -> float:

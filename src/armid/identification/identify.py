@@ -1,0 +1,113 @@
+"""Find the parameters of a model from the train records of a campaign."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.optimize import minimize
+
+from armid.fitness import Fitness
+from armid.identifiability import Information, information_at
+from armid.identification.errors import Errors, campaign_errors
+from armid.identifiers import Identifier
+from armid.model import ArmidError, Model
+from armid.problem import IdentificationProblem, Meter, MeterTermination, Replay, Space, replays
+from armid.record import Campaign
+
+Array = NDArray[np.float64]
+# A parameter this close to its bound, as a share of the range, is held by the bound and not by the records.
+AT_BOUND = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Hold the result of one run.
+
+    candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
+    (None without such records). trace: evaluations and best fitness at each improvement.
+    """
+
+    campaign: Campaign
+    model: Model
+    space: Space
+    fitness: Fitness
+    identifier: str
+    candidate: Array
+    value: float
+    information: Information
+    train: Errors
+    holdout: Errors | None
+    trace: tuple[NDArray[np.int64], Array]
+    train_replays: tuple[Replay, ...]
+    holdout_replays: tuple[Replay, ...]
+    budget: int
+    used: int
+    n_failed: int
+    seed: int
+    stopped: str
+
+    @property
+    def at_bound(self) -> NDArray[np.bool_]:
+        """Which of all parameters are free and sit on a bound."""
+        margin = AT_BOUND * (self.space.high - self.space.low)
+        low, high = self.candidate <= self.space.low + margin, self.candidate >= self.space.high - margin
+        return self.space.free & (low | high)
+
+
+def identify(
+    campaign: Campaign,
+    model: Model,
+    space: Space,
+    fitness: Fitness,
+    identifier: Identifier,
+    budget: int = 12_000,
+    seed: int = 1,
+    target: float | None = None,
+    accuracy: str | None = None,
+    progress: Callable[[Meter], None] | None = None,
+) -> Identification:
+    """Search the free parameters on the train records, then judge the best candidate on train and holdout.
+
+    budget: simulations, one candidate through all train records counts as one. target: fitness at which to stop (the
+    paper's step 7). progress: called with the meter after each generation. Holdout records are simulated once, after
+    the search.
+
+    Raises ArmidError when nothing can be searched or every candidate diverged.
+    """
+    train = replays(campaign.train, model, space, accuracy)
+    meter = Meter(budget, target)
+    if space.free.any():
+        stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
+        if meter.best_x is None:
+            raise ArmidError(f"all {meter.used} candidates diverged: narrower bounds or other constants are expected")
+        x = meter.best_x
+    else:
+        stopped, x = "no parameter is free", np.empty(0)
+    candidate = space.complete(x[np.newaxis])[0]
+    holdout = replays(campaign.holdout, model, space, accuracy)
+    errors = campaign_errors(train, candidate)
+    assert errors is not None
+    trace = meter.trace()
+    return Identification(
+        campaign, model, space, fitness, identifier.name, candidate, meter.best_f, information_at(train, space, x),
+        errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
+        budget, meter.used, meter.n_failed, seed, stopped,
+    )  # fmt: skip
+
+
+def search(
+    problem: IdentificationProblem,
+    meter: Meter,
+    identifier: Identifier,
+    seed: int,
+    progress: Callable[[Meter], None] | None,
+) -> str:
+    """Run the identifier until the meter stops it or it stops itself; say which."""
+    algorithm = identifier.build(meter.budget)
+    # A given None would be called.
+    told = {"callback": lambda _: progress(meter)} if progress else {}
+    minimize(problem, algorithm, MeterTermination(meter), seed=seed, copy_algorithm=False, **told)
+    if meter.reached:
+        return "target reached"
+    return "budget used" if meter.exhausted else f"{identifier.name} stopped by itself"

@@ -1,0 +1,93 @@
+"""Records and the model side by side: what the model does in each of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.model import Manoeuvre, Model
+from armid.problem.space import Space
+from armid.record import Piece, Record
+from armid.simulation import FINE, STANDARD, Calibration, calibrate, probes, simulate
+
+Array = NDArray[np.float64]
+# Below this many times the engine's standard error the noise no longer hides that error.
+NOISE_HIDES = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Simulate the pieces of one record, each on its own calibrated schedule."""
+
+    record: Record
+    model: Model
+    pieces: tuple[Piece, ...]
+    calibrations: tuple[Calibration, ...]
+    threads: int = 1
+
+    def outputs(self, candidates: Array) -> Iterator[tuple[Piece, Array]]:
+        """Yield each piece with the recorded signal of whole candidates in its window, (n_candidates, n_samples)."""
+        for piece, calibration in zip(self.pieces, self.calibrations, strict=True):
+            run = simulate(self.model, piece.manoeuvre, candidates, calibration.schedule, self.threads)
+            yield piece, run.output[:, piece.window] if piece.window.start else run.output
+
+    def signal(self, candidates: Array) -> Array:
+        """Return the signal in the windows of all pieces, end to end, shape (n_candidates, n_samples)."""
+        parts = [output for _, output in self.outputs(candidates)]
+        return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
+
+    @property
+    def measured(self) -> Array:
+        """Measured signal in the windows of all pieces, end to end [unit of the record]."""
+        return np.concatenate([p.measured[p.window] for p in self.pieces])
+
+    @property
+    def times(self) -> Array:
+        """Times of these samples [s]."""
+        return np.concatenate([p.manoeuvre.times()[p.window] for p in self.pieces])
+
+    @property
+    def engine_error(self) -> float:
+        """Largest error of the engine that was measured on the probes [unit of the record]."""
+        return max(c.error for c in self.calibrations)
+
+
+def accuracy_for(record: Record, model: Model) -> str:
+    """Return "fine" for a record whose noise would not hide the engine's standard error, else "standard"."""
+    standard_error = 5e-6 * model.plant.scales.speed
+    return FINE if record.noise.rms < NOISE_HIDES * standard_error else STANDARD
+
+
+def replay_of(record: Record, model: Model, space: Space, accuracy: str | None = None, threads: int = 1) -> Replay:
+    """Calibrate the engine on candidates spread over the space and make a record ready to be simulated.
+
+    accuracy: "standard", "fine", or None: as the record's noise asks for.
+    Raises ArmidError for an unknown accuracy.
+    """
+    spread = space.complete(probes(space.low[space.free], space.high[space.free]))
+    wanted = accuracy or accuracy_for(record, model)
+    pieces = tuple(p.until_window_end() for p in record.pieces)
+    known: dict[object, Calibration] = {}
+    calibrations = [calibrated(model, p.manoeuvre, spread, wanted, known) for p in pieces]
+    return Replay(record, model, pieces, tuple(calibrations), threads)
+
+
+def calibrated(
+    model: Model, manoeuvre: Manoeuvre, spread: Array, accuracy: str, known: dict[object, Calibration]
+) -> Calibration:
+    """Return the calibration of a manoeuvre; the same manoeuvre is not calibrated twice."""
+    key = (accuracy, manoeuvre.interval, manoeuvre.n_samples, manoeuvre.hold, tuple(sorted(manoeuvre.constants.items())),
+           tuple((k, v.tobytes()) for k, v in sorted(manoeuvre.inputs.items())))  # fmt: skip
+    if key not in known:
+        known[key] = calibrate(model, manoeuvre, spread, accuracy)
+    return known[key]
+
+
+def replays(
+    records: Sequence[Record], model: Model, space: Space, accuracy: str | None = None, threads: int = 1
+) -> tuple[Replay, ...]:
+    """Make several records ready to be simulated."""
+    return tuple(replay_of(r, model, space, accuracy, threads) for r in records)
+
+

@@ -1,0 +1,117 @@
+"""Which parameters are searched, between which bounds, and what the others are."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.model import ArmidError, Model, nearest
+from armid.record import Override
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Space:
+    """Hold the box of the free parameters and the values of the fixed ones, SI.
+
+    names, units, low, high, fixed: one entry for each parameter of the model, in its order; fixed is NaN where free.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    low: Array
+    high: Array
+    fixed: Array
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which parameters are searched."""
+        return np.isnan(self.fixed)
+
+    @property
+    def free_names(self) -> tuple[str, ...]:
+        """Names of the searched parameters."""
+        return tuple(n for n, f in zip(self.names, self.free, strict=True) if f)
+
+    def complete(self, X: Array) -> Array:
+        """Return whole candidates: X, shape (n_candidates, n_free), with the fixed values put in."""
+        whole = np.tile(self.fixed, (len(X), 1))
+        whole[:, self.free] = X
+        return whole
+
+    def with_bounds(self, name: str, low: float, high: float) -> "Space":
+        """Return the space with a parameter free between new bounds.
+
+        Raises ArmidError for an unknown name and for bounds that are no interval.
+        """
+        i = self.index(name)
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise ArmidError(f"bounds of '{name}' are {low:g} and {high:g}: two finite numbers, low < high, are expected")
+        return replace(self, low=put(self.low, i, low), high=put(self.high, i, high), fixed=put(self.fixed, i, np.nan))
+
+    def with_fixed(self, name: str, value: float) -> "Space":
+        """Return the space with a parameter fixed.
+
+        Raises ArmidError for an unknown name and for a value that is not finite.
+        """
+        i = self.index(name)
+        if not np.isfinite(value):
+            raise ArmidError(f"'{name}' is fixed at {value}: a finite number is expected")
+        return replace(self, fixed=put(self.fixed, i, value))
+
+    def index(self, name: str) -> int:
+        """Return the place of a parameter; refuse an unknown name with ArmidError."""
+        if name not in self.names:
+            raise ArmidError(f"parameter '{name}' is not in the model: {nearest(name, self.names)}")
+        return self.names.index(name)
+
+
+def put(values: Array, i: int, value: float) -> Array:
+    """Return a copy with one entry replaced."""
+    changed = values.copy()
+    changed[i] = value
+    return changed
+
+
+def space_of(
+    model: Model,
+    overrides: Mapping[str, Override] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+) -> Space:
+    """Return the space of a model: declared bounds, then a campaign's overrides, then the caller's bounds and values.
+
+    Raises ArmidError for a name that the model does not have, and for a parameter both bounded and fixed.
+    """
+    parameters = model.parameters.values()
+    space = Space(
+        tuple(model.parameters), tuple(p.unit for p in parameters), column(p.low for p in parameters),
+        column(p.high for p in parameters), column(np.nan if p.fixed is None else p.fixed for p in parameters),
+    )  # fmt: skip
+    for name, override in (overrides or {}).items():
+        space = overridden(space, name, override)
+    for name, (low, high) in (bounds or {}).items():
+        if name in (fixed or {}):
+            raise ArmidError(f"parameter '{name}' is given both bounds and a fixed value: one of them is expected")
+        space = space.with_bounds(name, low, high)
+    for name, value in (fixed or {}).items():
+        space = space.with_fixed(name, value)
+    return space
+
+
+def overridden(space: Space, name: str, override: Override) -> Space:
+    """Apply what a campaign says; a parameter of an effect that is not in the model is passed over."""
+    if name not in space.names:
+        return space
+    i = space.index(name)
+    if override.low is not None or override.high is not None:
+        low = space.low[i] if override.low is None else override.low
+        space = space.with_bounds(name, low, space.high[i] if override.high is None else override.high)
+    return space if override.fixed is None else space.with_fixed(name, override.fixed)
+
+
+def column(values: Iterable[float]) -> Array:
+    """Return numbers as an array."""
+    return np.array(list(values), dtype=np.float64)

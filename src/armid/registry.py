@@ -1,0 +1,130 @@
+"""What there is to choose from: the catalogues, installed entry points, and files that the user names."""
+
+import importlib.util
+import inspect
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Plant, nearest
+
+KINDS = ("plants", "effects", "fitness", "identifiers")
+
+
+@dataclass
+class Registry:
+    """Hold what a command may name; `fitness` and `identifiers` are read from their catalogues when first asked for."""
+
+    plants: dict[str, Plant] = field(default_factory=lambda: dict(PLANTS))
+    effects: dict[str, Effect] = field(default_factory=lambda: dict(EFFECTS))
+    own_fitness: dict[str, Any] = field(default_factory=dict)
+    own_identifiers: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def fitness(self) -> dict[str, Any]:
+        """Name -> Fitness."""
+        from armid.fitness import FITNESS, as_fitness  # noqa: PLC0415 - compiled code that `simulate` does not need
+
+        return FITNESS | {name: as_fitness(name, own) for name, own in self.own_fitness.items()}
+
+    @property
+    def identifiers(self) -> dict[str, Any]:
+        """Name -> Identifier."""
+        from armid.identifiers import IDENTIFIERS, as_identifier  # noqa: PLC0415 - pymoo takes time to import
+
+        return IDENTIFIERS | {name: as_identifier(name, own) for name, own in self.own_identifiers.items()}
+
+    def add(self, kind: str, name: str, thing: Any) -> None:
+        """Register a user's own.
+
+        Raises ArmidError when the name is taken: a user's own must not stand silently in for ours.
+        """
+        known = {"plants": self.plants, "effects": self.effects, "fitness": self.own_fitness,
+                 "identifiers": self.own_identifiers}[kind]  # fmt: skip
+        builtin = getattr(self, kind)
+        if name in builtin:
+            raise ArmidError(f"{kind}: '{name}' is there already, give yours another name")
+        known[name] = thing
+
+
+def load_registry(plugins: Iterable[str] = ()) -> Registry:
+    """Return the catalogues, the entry points of installed packages, and what `FILE.py:attribute` names.
+
+    Raises ArmidError for a plug-in that cannot be found or is none of ours.
+    """
+    registry = Registry()
+    for kind in KINDS:
+        for point in entry_points(group=f"armid.{kind}"):
+            thing = point.load()
+            registry.add(kind, thing.name if kind in ("plants", "effects") else point.name, thing)
+    for plugin in plugins:
+        kind, name, thing = load_plugin(plugin)
+        registry.add(kind, name, thing)
+    return registry
+
+
+def load_plugin(plugin: str) -> tuple[str, str, Any]:
+    """Return kind, name and object of `FILE.py:attribute`. This runs the file's code.
+
+    Raises ArmidError when the file or the attribute is missing, the file fails, or the object is none of ours.
+    """
+    path, _, attribute = plugin.rpartition(":")
+    if not path or not attribute:
+        raise ArmidError(f"plug-in '{plugin}' is not of the form FILE.py:attribute")
+    file = Path(path)
+    if not file.is_file():
+        raise ArmidError(f"plug-in '{plugin}': there is no file {file}")
+    module = load_file(file)
+    if not hasattr(module, attribute):
+        names = [n for n in vars(module) if not n.startswith("_")]
+        raise ArmidError(f"plug-in '{plugin}': {file.name} has no '{attribute}', {nearest(attribute, names)}")
+    thing = getattr(module, attribute)
+    kind = kind_of(thing, plugin)
+    return kind, getattr(thing, "name", attribute) if kind in ("plants", "effects") else attribute, thing
+
+
+def load_file(file: Path) -> Any:
+    """Run a Python file as a module of its own name; its folder is searched for what it imports."""
+    name = f"armid_plugin_{file.stem}"
+    if name in sys.modules and Path(str(sys.modules[name].__file__)) == file.resolve():
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, file.resolve())
+    if spec is None or spec.loader is None:
+        raise ArmidError(f"plug-in {file} is no Python file: FILE.py:attribute is expected")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    folder = str(file.resolve().parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        if isinstance(error, ArmidError):
+            raise
+        raise ArmidError(f"plug-in {file} fails when it is read: {type(error).__name__}: {error}") from error
+    return module
+
+
+def kind_of(thing: Any, plugin: str) -> str:
+    """Tell what a user's object is.
+
+    Raises ArmidError for an object that is neither plant, effect, fitness nor identifier.
+    """
+    if isinstance(thing, Plant):
+        return "plants"
+    if isinstance(thing, Effect):
+        return "effects"
+    if hasattr(thing, "function") and hasattr(thing, "join"):
+        return "fitness"
+    if inspect.isfunction(thing) and {"measured", "simulated"} <= set(inspect.signature(thing).parameters):
+        return "fitness"
+    if hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing):
+        return "identifiers"
+    raise ArmidError(
+        f"plug-in '{plugin}' is a {type(thing).__name__}: a Plant, an Effect, a fitness function "
+        "(measured, simulated) or an algorithm of pymoo is expected"
+    )
