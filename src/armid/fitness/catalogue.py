@@ -1,0 +1,39 @@
+"""The fitnesses by name."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armid.fitness.fitness import Fitness
+from armid.fitness.measures import chi_square, mean_square, relative_mean_square
+from armid.fitness.series import Array
+from armid.fitness.similarity import numerical_similarity, scored
+
+
+def dissimilarity(
+    measured: ArrayLike,
+    simulated: ArrayLike,
+    interval: float,
+    epsilon: float = 0.03,
+    xi: float = 0.030,
+    slope_threshold: float = 0.2,
+) -> Array:
+    """Return 1 - S of Eq 10 per candidate, +inf for one that is not finite; arguments and errors as `similarity`."""
+    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)
+    values: Array = 1.0 - scores[0]
+    return values
+
+
+def numerical_dissimilarity(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return 1 - S1 of Eq 13 per candidate, +inf for one that is not finite; errors as `numerical_similarity`."""
+    return 1.0 - numerical_similarity(measured, simulated, failed=-np.inf)
+
+
+_FITNESSES = (
+    Fitness("similarity", dissimilarity, "duration", note="1 - S, the paper's similarity degree (Eq 10)"),
+    Fitness("numerical_similarity", numerical_dissimilarity, "duration", note="1 - S1, its numerical part (Eq 13)"),
+    Fitness("rmse", mean_square, "samples", np.sqrt, "signal", "root of the mean square over all samples"),
+    Fitness("nrmse", relative_mean_square, "samples", np.sqrt, "1", "rmse with each record divided by its own rms"),
+    Fitness("likelihood", chi_square, "sum", None, "1", "sum of (x - x')^2 / noise^2: -2 log likelihood, white noise"),
+)
+
+FITNESS: dict[str, Fitness] = {fitness.name: fitness for fitness in _FITNESSES}

@@ -1,0 +1,126 @@
+"""What a fitness is: a number per candidate to minimise, and how the records of a campaign join."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armid.fitness.series import Array, as_series, has_failed
+from armid.model.errors import ArmidError, nearest
+
+SERIES = ("measured", "simulated")
+OF_RECORD = ("interval", "noise")
+JOINS = ("duration", "samples", "sum")
+
+
+@dataclass(frozen=True)
+class Fitness:
+    """Declare how far a candidate is from a measurement; smaller is better.
+
+    name: as studies spell it.
+    function: takes `measured` (n_samples,), `simulated` (n_candidates, n_samples), and where it names them `interval`
+        (sample interval [s]) and `noise` (noise rms [signal's unit]) of the record; returns one value per candidate.
+    join: how records join: "duration" (mean weighted by duration), "samples" (by number of samples), "sum".
+    finish: applied to the joined values, such as a square root; None: nothing.
+    unit: of the finished value; note: what it is, in words.
+    Raises ArmidError for a function that is none or asks for something unknown, and for an unknown join.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    join: str = "duration"
+    finish: Callable[[Array], Array] | None = None
+    unit: str = "1"
+    note: str = ""
+    asks: tuple[str, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.join not in JOINS:
+            raise ArmidError(f"fitness '{self.name}' joins records by '{self.join}', {nearest(self.join, JOINS)}")
+        object.__setattr__(self, "asks", argument_names(self.name, self.function))
+
+    def __call__(
+        self, measured: ArrayLike, simulated: ArrayLike, interval: float | None = None, noise: float | None = None
+    ) -> Array:
+        """Return the value of each candidate on one record, (n_candidates,), +inf where it has none; not finished yet.
+
+        measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
+        interval: [s]; noise: [signal's unit]; needed when the function asks for them.
+        Raises ArmidError when one is missing and when the function returns anything but one number per candidate.
+        """
+        x, rows = as_series(measured, simulated)
+        given = {"measured": x, "simulated": rows, "interval": interval, "noise": noise}
+        for name in self.asks:
+            if given[name] is None:
+                raise ArmidError(f"fitness '{self.name}' asks for the {name} of the record, which is not known")
+        values = one_per_candidate(self.name, self.function(**{name: given[name] for name in self.asks}), len(rows))
+        return np.where(has_failed(rows) | ~np.isfinite(values), np.inf, values)
+
+
+def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return what a function asks of a record; refuse with ArmidError what a record cannot give.
+
+    An argument with a default is the function's own option, unless its name looks like a misspelt one of a record.
+    """
+    if not callable(function):
+        raise ArmidError(f"fitness '{name}' is {function!r}, expected a function of (measured, simulated)")
+    try:
+        parameters = inspect.signature(function).parameters
+    except ValueError as error:
+        raise ArmidError(f"fitness '{name}' does not tell its arguments, expected (measured, simulated)") from error
+    known = SERIES + OF_RECORD
+    for argument, parameter in parameters.items():
+        optional = parameter.default is not parameter.empty
+        own = optional and argument not in known and not get_close_matches(argument, known)
+        bindable = argument in known and parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
+        if not (own or bindable):
+            raise ArmidError(f"fitness '{name}' asks for '{argument}', {nearest(argument, known)}")
+    for series in SERIES:
+        if series not in parameters:
+            raise ArmidError(f"fitness '{name}' has no argument '{series}', expected (measured, simulated)")
+    return tuple(argument for argument in parameters if argument in known)
+
+
+def one_per_candidate(name: str, values: object, n_candidates: int) -> Array:
+    """Return the values as float64; refuse with ArmidError anything but one number per candidate."""
+    try:
+        numbers = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArmidError(f"fitness '{name}' returned a {type(values).__name__}, expected numbers") from error
+    if numbers.shape != (n_candidates,):
+        raise ArmidError(f"fitness '{name}' returned shape {numbers.shape}, expected ({n_candidates},)")
+    return numbers
+
+
+def join_records(fitness: Fitness, values: ArrayLike, durations: ArrayLike, n_samples: ArrayLike) -> Array:
+    """Join the values of a campaign's records: one finished value per candidate, (n_candidates,), +inf if one failed.
+
+    values: what the fitness returned, (n_records, n_candidates); durations: of the records' windows [s], (n_records,);
+    n_samples: of the records, (n_records,).
+    Raises ArmidError for shapes that do not match and for weights that are not above 0.
+    """
+    table = np.asarray(values, dtype=np.float64)
+    weights = {"duration": durations, "samples": n_samples, "sum": np.ones(len(table))}[fitness.join]
+    weight = np.asarray(weights, dtype=np.float64)
+    if table.ndim != 2 or weight.shape != table.shape[:1] or len(table) == 0:
+        raise ArmidError(f"{table.shape} values and {weight.shape} weights of records do not match")
+    if not ((weight > 0.0) & (weight < np.inf)).all():
+        raise ArmidError(f"fitness '{fitness.name}' weighs records by {fitness.join}, expected numbers above 0")
+    failed = ~np.isfinite(table).all(axis=0)
+    # no matrix product: its rounding of one candidate may depend on how many others there are
+    total = (weight[:, np.newaxis] * np.where(failed, 0.0, table)).sum(axis=0)
+    joined = total if fitness.join == "sum" else total / weight.sum()
+    finished = joined if fitness.finish is None else fitness.finish(joined)
+    return np.where(failed | ~np.isfinite(finished), np.inf, finished)
+
+
+def as_fitness(name: str, obj: Fitness | Callable[..., Any]) -> Fitness:
+    """Return a Fitness as it is, or make one of a plain function (measured, simulated) -> value per candidate.
+
+    Records then join by duration. Raises ArmidError as `Fitness` does.
+    """
+    return obj if isinstance(obj, Fitness) else Fitness(name, obj, note="a function of the user")

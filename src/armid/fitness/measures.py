@@ -1,0 +1,71 @@
+"""Distances between the measured series and a population's series, one number per candidate.
+
+No temporary of the population's size is made. A candidate that holds a NaN or an infinity gets +inf.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from armid.fitness.series import Array, as_series
+from armid.model.errors import ArmidError
+
+
+def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return the mean of (x - x')^2 [signal's unit squared], (n_candidates,).
+
+    measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
+    """
+    x, rows = as_series(measured, simulated)
+    return np.asarray(_sums_of_squares(x, rows)) / x.size
+
+
+def rmse(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return the root of the mean of (x - x')^2 [signal's unit], (n_candidates,)."""
+    return np.sqrt(mean_square(measured, simulated))
+
+
+def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return the mean of (x - x')^2 over the mean of x^2 [1], (n_candidates,).
+
+    Raises ArmidError for a measured series that is zero throughout.
+    """
+    x, rows = as_series(measured, simulated)
+    whole = float(np.square(x).sum())
+    if whole == 0.0:
+        raise ArmidError("the measured series is zero throughout, expected an rms above 0 to divide by")
+    return np.asarray(_sums_of_squares(x, rows)) / whole
+
+
+def nrmse(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return the rmse over the rms of the measured series [1], (n_candidates,); errors as `relative_mean_square`."""
+    return np.sqrt(relative_mean_square(measured, simulated))
+
+
+def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array:
+    """Return the sum of (x - x')^2 / noise^2 [1], (n_candidates,): -2 log likelihood for white noise, up to a constant.
+
+    noise: rms of the measuring noise [signal's unit]. Raises ArmidError unless it is a number above 0.
+    """
+    if not 0.0 < noise < np.inf:
+        raise ArmidError(f"the noise of the record is {noise}, expected an rms above 0 in the signal's unit")
+    x, rows = as_series(measured, simulated)
+    return np.asarray(_sums_of_squares(x, rows)) / noise**2
+
+
+# Neither nnan nor ninf may be added: a NaN in y has to reach the sum.
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+def _sum_of_squares(x, y):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(x.size):
+        total += (x[i] - y[i]) ** 2
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _sums_of_squares(x, rows):  # type: ignore[no-untyped-def]
+    sums = np.empty(rows.shape[0])
+    for c in range(rows.shape[0]):
+        total = _sum_of_squares(x, rows[c])
+        sums[c] = np.inf if np.isnan(total) else total
+    return sums

@@ -1,0 +1,149 @@
+"""Fitnesses: what they are bound to, how records join, and that no NaN leaves."""
+
+import pickle
+import subprocess
+import sys
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.typing import NDArray
+
+from armid.fitness import FITNESS, Fitness, as_fitness, join_records, numerical_similarity, similarity
+from armid.fitness.catalogue import dissimilarity
+
+Array = NDArray[np.float64]
+OF_RECORD = {"interval": 0.001, "noise": 0.2}
+
+
+def records() -> list[tuple[Array, Array]]:
+    """Return two records of different length: measured (n_samples,) and simulated (5, n_samples)."""
+    rng = np.random.default_rng(1)
+    series = [np.sin(np.linspace(0.0, turns, n)) * size for n, turns, size in ((401, 7.0, 1.0), (150, 4.0, 9.0))]
+    return [(x, x + 0.1 * np.abs(x).max() * rng.standard_normal((5, x.size))) for x in series]
+
+
+def joined(fitness: Fitness, pairs: list[tuple[Array, Array]]) -> Array:
+    values = [fitness(x, rows, **OF_RECORD) for x, rows in pairs]
+    n_samples = np.array([x.size for x, _ in pairs])
+    return join_records(fitness, values, (n_samples - 1) * 0.001, n_samples)
+
+
+def test_the_campaign_value_of_each_fitness() -> None:
+    (x, a), (y, b) = pairs = records()
+    squares = [np.sum((x - a) ** 2, axis=1), np.sum((y - b) ** 2, axis=1)]
+    relative = [squares[0] / np.sum(x**2) * x.size, squares[1] / np.sum(y**2) * y.size]
+    durations = np.array([0.400, 0.149])
+    mean = lambda u, v: (durations[0] * u + durations[1] * v) / durations.sum()  # noqa: E731
+    expected = {
+        "similarity": 1.0 - mean(similarity(x, a, 0.001)[0], similarity(y, b, 0.001)[0]),
+        "numerical_similarity": 1.0 - mean(numerical_similarity(x, a), numerical_similarity(y, b)),
+        "rmse": np.sqrt((squares[0] + squares[1]) / (x.size + y.size)),
+        "nrmse": np.sqrt((relative[0] + relative[1]) / (x.size + y.size)),
+        "likelihood": (squares[0] + squares[1]) / 0.2**2,
+    }
+    assert set(FITNESS) == set(expected)
+    for name, values in expected.items():
+        np.testing.assert_allclose(joined(FITNESS[name], pairs), values, rtol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("name", FITNESS)
+def test_contract_of_every_fitness(name: str) -> None:
+    fitness = FITNESS[name]
+    pairs = records()
+    good = joined(fitness, pairs)
+    assert good.shape == (5,)
+    assert np.isfinite(good).all()
+    perfect = joined(fitness, [(x, x[np.newaxis]) for x, _ in pairs])
+    assert perfect[0] == 0.0
+    assert (good > perfect).all()
+    pairs[1][1][2, 7] = np.nan
+    spoilt = joined(fitness, pairs)
+    assert spoilt[2] == np.inf
+    np.testing.assert_array_equal(np.delete(spoilt, 2), np.delete(good, 2))
+    assert pickle.loads(pickle.dumps(fitness)).name == name
+
+
+def test_thresholds_of_the_similarity_are_options() -> None:
+    x, rows = records()[0]
+    loose = Fitness("loose", partial(dissimilarity, slope_threshold=50.0))
+    np.testing.assert_array_equal(loose(x, rows, 0.001), 1.0 - similarity(x, rows, 0.001, slope_threshold=50.0)[0])
+
+
+def test_a_plain_function_becomes_a_fitness() -> None:
+    x, rows = records()[0]
+    mine = as_fitness("mine", lambda measured, simulated: np.abs(simulated - measured).max(axis=1))
+    assert (mine.name, mine.join, mine.finish) == ("mine", "duration", None)
+    np.testing.assert_array_equal(mine(x, rows), np.abs(rows - x).max(axis=1))
+    assert as_fitness("other", mine) is mine
+    compiled = as_fitness("compiled", njit(lambda measured, simulated: simulated[:, 0] - measured[0] + 1.0))
+    np.testing.assert_array_equal(compiled(x, rows), rows[:, 0] - x[0] + 1.0)
+
+
+def test_arguments_bind_by_name_and_order_does_not_matter() -> None:
+    def mine(simulated: Array, noise: float, *, measured: Array, interval: float, power: float = 2.0) -> Array:
+        return np.full(len(simulated), interval * noise * power * measured.size)
+
+    x, rows = records()[0]
+    fitness = as_fitness("mine", mine)
+    assert fitness.asks == ("simulated", "noise", "measured", "interval")
+    np.testing.assert_allclose(fitness(x, rows, **OF_RECORD), 0.001 * 0.2 * 2.0 * 401)
+    with pytest.raises(ValueError, match="'mine' asks for the noise of the record"):
+        fitness(x, rows, interval=0.001)
+
+
+def test_what_a_function_returns_is_checked() -> None:
+    x, rows = records()[0]
+    rows = np.vstack([rows, np.full((1, x.size), np.nan)])
+    values = as_fitness("mine", lambda measured, simulated: [1.0, np.nan, np.inf, -np.inf, 2, 3])(x, rows)
+    np.testing.assert_array_equal(values, [1.0, np.inf, np.inf, np.inf, 2.0, np.inf])
+    for bad in (np.zeros(5), np.zeros((6, 1)), 1.0, "a", None, [1.0, "b"]):
+        with pytest.raises(ValueError, match=r"fitness 'mine' returned .*, expected"):
+            as_fitness("mine", lambda measured, simulated, bad=bad: bad)(x, rows)
+
+
+@pytest.mark.parametrize(
+    ("function", "sentence"),
+    [
+        (lambda measured, simulatd: 0, "asks for 'simulatd', did you mean 'simulated'?"),
+        (lambda measured, simulated, intervall: 0, "asks for 'intervall', did you mean 'interval'?"),
+        (lambda measured, simulated, intervl=0.001: 0, "asks for 'intervl', did you mean 'interval'?"),
+        (lambda measured, simulated, zzz: 0, "known: measured, simulated, interval, noise"),
+        (lambda simulated: 0, "has no argument 'measured'"),
+        (lambda measured, simulated, /: 0, "asks for 'measured'"),
+        (lambda *series: 0, "asks for 'series'"),
+        (lambda measured, simulated, **rest: 0, "asks for 'rest'"),
+        (3.0, "is 3.0, expected a function"),
+    ],
+)
+def test_refuses_a_function_that_a_record_cannot_feed(function: Any, sentence: str) -> None:
+    with pytest.raises(ValueError) as refusal:
+        as_fitness("mine", function)
+    assert sentence in str(refusal.value)
+
+
+def test_refuses_an_unknown_join() -> None:
+    with pytest.raises(ValueError, match="joins records by 'durations', did you mean 'duration'"):
+        Fitness("mine", lambda measured, simulated: 0, join="durations")
+
+
+@pytest.mark.parametrize("weights", [(1.0, 0.0), (1.0, np.nan), (1.0,), ()])
+def test_refuses_weights_that_do_not_fit(weights: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match=r"weighs records|do not match"):
+        join_records(FITNESS["rmse"], np.ones((2, 3)), (1.0, 1.0), weights)
+
+
+def test_likelihood_needs_noise() -> None:
+    x, rows = records()[0]
+    for noise in (None, 0.0):
+        with pytest.raises(ValueError, match="noise"):
+            FITNESS["likelihood"](x, rows, noise=noise)
+
+
+def test_importing_is_light() -> None:
+    heavy = ("pymoo", "matplotlib", "seaborn", "pydantic", "pandas")
+    script = f"import sys, armid.fitness; print([m for m in {heavy!r} if m in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"

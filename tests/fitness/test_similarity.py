@@ -1,0 +1,252 @@
+"""The fast similarity degree against Eqs 10-14 as they are printed, written out below without any haste."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from armid.fitness import numerical_similarity, similarity
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+INTERVAL, EPSILON, XI, THRESHOLD = 0.001, 0.03, 0.030, 0.2
+Array = NDArray[np.float64]
+
+
+def literal_s1(x: Array, y: Array) -> float:
+    """Eqs 11-13, case by case; negative s_i clipped to 0."""
+    total = 0.0
+    for a, b in zip(x, y, strict=True):
+        if a == 0.0 and b == 0.0:
+            s = 1.0
+        elif a == 0.0 or b == 0.0 or (a < 0.0) != (b < 0.0):
+            s = 0.0
+        else:
+            s = max(0.0, 1.0 - abs(a - b) / abs(a))
+        total += s * abs(a)
+    return float(total / sum(abs(a) for a in x))
+
+
+def literal_landmarks(x: Array, interval: float, epsilon: float, xi: float) -> tuple[list[int], list[float]]:
+    """Steps 1 to 4 of section III.B; returns the ends of the subintervals and the normalised levels there."""
+    low, high = min(x), max(x)
+    level = [float((v - low) / (high - low)) for v in x]
+    steps = [(i, level[i + 1] - level[i]) for i in range(len(x) - 1) if level[i + 1] != level[i]]
+    extrema = [i + 1 for (i, d), (_, e) in pairwise(steps) if d * e < 0]
+    while True:
+        small = []
+        for k in range(len(extrema) - 1):
+            a, b = extrema[k], extrema[k + 1]
+            if abs(level[b] - level[a]) < epsilon and (b - a) * interval < xi:
+                small.append((abs(level[b] - level[a]), k))
+        if not small:
+            ends = [0, *extrema, len(x) - 1]
+            return ends, [level[i] for i in ends]
+        _, k = min(small)
+        del extrema[k : k + 2]
+
+
+def literal_pairs(ends: list[int], ends2: list[int]) -> list[tuple[int, int]]:
+    """Pair subintervals by order, or by overlap, largest first, when their numbers differ."""
+    n, n2 = len(ends) - 1, len(ends2) - 1
+    if n == n2:
+        return [(i, i) for i in range(n)]
+    overlaps = []
+    for i in range(n):
+        for j in range(n2):
+            overlap = min(ends[i + 1], ends2[j + 1]) - max(ends[i], ends2[j])
+            if overlap > 0:
+                overlaps.append((-overlap, i, j))
+    pairs: list[tuple[int, int]] = []
+    for _, i, j in sorted(overlaps):
+        if all(i != p and j != q for p, q in pairs):
+            pairs.append((i, j))
+    return pairs
+
+
+def literal_s2(x: Array, y: Array, interval: float, epsilon: float, xi: float, threshold: float) -> float:
+    """Step 5 and Eq 14."""
+    if min(y) == max(y):
+        return 0.0
+    ends, level = literal_landmarks(x, interval, epsilon, xi)
+    ends2, level2 = literal_landmarks(y, interval, epsilon, xi)
+    similar = 0.0
+    for i, j in literal_pairs(ends, ends2):
+        length, length2 = (ends[i + 1] - ends[i]) * interval, (ends2[j + 1] - ends2[j]) * interval
+        if abs((level[i + 1] - level[i]) / length - (level2[j + 1] - level2[j]) / length2) < threshold:
+            similar += length + length2
+    return similar / (2 * (len(x) - 1) * interval)
+
+
+def agree(x: Array, rows: Array, interval: float, epsilon: float, xi: float, threshold: float) -> None:
+    """Compare the fast degree of each row with the literal one."""
+    s, s1, s2 = similarity(x, rows, interval, epsilon, xi, threshold)
+    literal1 = [literal_s1(x, y) for y in rows]
+    literal2 = [literal_s2(x, y, interval, epsilon, xi, threshold) for y in rows]
+    np.testing.assert_allclose(s1, literal1, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(s2, literal2, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(s, np.sqrt(s1 * s2), rtol=1e-15)
+    np.testing.assert_array_equal(numerical_similarity(x, rows), s1)
+    assert ((s >= 0) & (s <= 1) & (s1 >= 0) & (s1 <= 1) & (s2 >= 0) & (s2 <= 1)).all()
+
+
+def smooth(rng: np.random.Generator, n: int) -> Array:
+    t = np.linspace(0.0, 1.0, n)
+    slow = np.sin(2 * np.pi * rng.uniform(0.3, 4) * t + rng.uniform(0, 6))
+    return slow + 0.3 * np.sin(2 * np.pi * rng.uniform(1, 30) * t)
+
+
+SERIES = {
+    "smooth": smooth,
+    "noisy": lambda rng, n: smooth(rng, n) + rng.uniform(0, 0.1) * rng.standard_normal(n),
+    "quantised": lambda rng, n: np.round(smooth(rng, n) + 0.02 * rng.standard_normal(n), 1),
+    "finely quantised": lambda rng, n: np.round((smooth(rng, n) + 0.03 * rng.standard_normal(n)) / 0.02) * 0.02,
+    "few levels": lambda rng, n: rng.integers(0, rng.integers(2, 9), n).astype(float),
+    "plateaus": lambda rng, n: np.repeat(smooth(rng, n), 7)[:n],
+    "walk": lambda rng, n: np.cumsum(rng.standard_normal(n)),
+    "walk of whole steps": lambda rng, n: np.round(np.cumsum(rng.standard_normal(n))),
+    "wild": lambda rng, n: rng.standard_normal(n) * np.exp(2.0 * rng.standard_normal(n)),
+}
+
+
+@pytest.mark.parametrize("kind", SERIES)
+@pytest.mark.parametrize("seed", range(4))
+def test_agrees_with_the_literal_equations(kind: str, seed: int) -> None:
+    rng = np.random.default_rng([seed, *kind.encode()])
+    for n in (2, 3, 5, 10, 40, 150):
+        for _ in range(4):
+            x = SERIES[kind](rng, n)
+            if x.min() == x.max():
+                continue
+            noise = rng.uniform(0.0, 0.2) * rng.standard_normal((2, n))
+            rows = np.array([*(make(rng, n) for make in SERIES.values()), *(x + noise), np.round(x + noise[0], 1)])
+            options = ((0.001, 0.01, 0.002), (0.03, 0.1, 0.3, 2.0), (0.03, 0.005, 0.1, 1.0), (0.2, 2.0, 20.0))
+            agree(x, rows, *(float(rng.choice(values)) for values in options))
+
+
+@pytest.fixture(scope="module")
+def trajectories() -> Array:
+    """Angular velocities [rad/s] of the reference arm at 1 kHz, the first 0.7 s."""
+    files = sorted(REFERENCE.glob("trajectory_*.csv"))
+    return np.array([np.loadtxt(file, delimiter=",", skiprows=1, usecols=2)[:701] for file in files])
+
+
+def test_agrees_with_the_literal_equations_on_the_arm(trajectories: Array) -> None:
+    rng = np.random.default_rng(1)
+    assert len(trajectories) == 14
+    gyro = np.deg2rad(0.15)
+    for x in trajectories[:7]:
+        noisy = x + np.deg2rad(0.3) * rng.standard_normal(x.size)
+        agree(x, trajectories, INTERVAL, EPSILON, XI, THRESHOLD)
+        agree(noisy, np.array([x, noisy[::-1].copy(), 1.01 * x]), INTERVAL, EPSILON, XI, THRESHOLD)
+        agree(np.round(noisy / gyro) * gyro, trajectories[::5], INTERVAL, EPSILON, XI, 2.0)
+
+
+def test_noise_alone_costs_what_is_said_of_the_reference_arm(trajectories: Array) -> None:
+    x = trajectories[0]
+    noise = np.deg2rad(0.3) * np.random.default_rng(2).standard_normal((20, x.size))
+    degrees = np.array([similarity(x + e, x[np.newaxis], INTERVAL) for e in noise])
+    s, s1, _ = np.median(degrees, axis=(0, 2))
+    assert s1 == pytest.approx(0.997, abs=0.0005)
+    assert s == pytest.approx(0.9985, abs=0.001)
+
+
+@pytest.mark.parametrize("kind", SERIES)
+def test_a_series_equals_itself_exactly(kind: str) -> None:
+    rng = np.random.default_rng(3)
+    for n in (2, 30, 701):
+        x = SERIES[kind](rng, n) + np.linspace(0.0, 1.0, n)
+        assert [float(v[0]) for v in similarity(x, x[np.newaxis], INTERVAL)] == [1.0, 1.0, 1.0]
+
+
+def test_values_by_hand() -> None:
+    x = np.array([0.0, 1.0, 2.0, 1.0, 0.0])
+    rows = np.array([2 * x, -x, 0 * x, 0.5 * x, [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 2.0, 1.0, 1.0, 0.0]])
+    s, s1, s2 = similarity(x, rows, 1.0, slope_threshold=0.3)
+    np.testing.assert_allclose(s1, [0.0, 0.0, 0.0, 0.5, 0.75, 0.5])
+    # 0.5 x normalises to x; the ramp has 1 interval of slope 0.25 [1/s] against 0.5, paired with the first by overlap;
+    # the last has slopes 1 and -1/3 against 0.5 and -0.5, so its second interval is similar: (2 + 3) / 8
+    np.testing.assert_allclose(s2, [1.0, 0.0, 0.0, 1.0, 0.75, 0.625])
+    np.testing.assert_allclose(s, np.sqrt(s1 * s2))
+
+
+def test_thresholds_decide_what_a_landmark_is() -> None:
+    x = np.sin(np.linspace(0.0, np.pi, 701))
+    blip = x.copy()
+    blip[100:110] += 0.02 * np.sin(np.linspace(0.0, np.pi, 10))
+    blip = blip[np.newaxis]
+    assert similarity(x, blip, 0.001)[2][0] == 1.0
+    for option in ({"epsilon": 0.0}, {"xi": 0.0}):
+        assert similarity(x, blip, 0.001, **option)[2][0] < 1.0
+    assert similarity(x, 1.0 - x[np.newaxis], 0.001)[2][0] == 0.0
+    assert similarity(x, 1.0 - x[np.newaxis], 0.001, slope_threshold=10.0)[2][0] == 1.0
+
+
+def test_a_failed_candidate_harms_no_other() -> None:
+    rng = np.random.default_rng(4)
+    x, rows = smooth(rng, 701), np.array([smooth(rng, 701) for _ in range(12)])
+    clean = np.array(similarity(x, rows, INTERVAL))
+    for bad, (row, sample) in zip((np.nan, np.inf, -np.inf), ((2, 5), (5, 0), (8, 700)), strict=True):
+        rows[row, sample] = bad
+    spoilt = np.array(similarity(x, rows, INTERVAL))
+    failed = [2, 5, 8]
+    assert (spoilt[:, failed] == 0.0).all()
+    np.testing.assert_array_equal(np.delete(spoilt, failed, 1), np.delete(clean, failed, 1))
+    assert (numerical_similarity(x, rows)[failed] == 0.0).all()
+
+
+def test_a_candidate_does_not_depend_on_its_neighbours() -> None:
+    rng = np.random.default_rng(5)
+    x, rows = smooth(rng, 301), np.array([SERIES["noisy"](rng, 301) for _ in range(9)])
+    together = np.array(similarity(x, rows, INTERVAL))
+    alone = np.hstack([np.array(similarity(x, row[np.newaxis], INTERVAL)) for row in rows])
+    np.testing.assert_array_equal(together, alone)
+
+
+def test_a_diverged_candidate_stays_within_bounds() -> None:
+    x = smooth(np.random.default_rng(6), 101)
+    for size in (1e6, 1e150, 1e300):
+        s, s1, s2 = similarity(x, size * x[np.newaxis], INTERVAL)
+        assert (s[0], s1[0]) == (0.0, 0.0)
+        assert 0.0 <= s2[0] <= 1.0
+
+
+def test_a_constant_candidate_has_no_shape() -> None:
+    x = np.linspace(1.0, 2.0, 11)
+    s, s1, s2 = similarity(x, np.full((1, 11), 1.5), 0.1)
+    assert (s[0], s2[0]) == (0.0, 0.0)
+    assert s1[0] > 0.5
+
+
+def test_other_layouts_give_the_same() -> None:
+    rng = np.random.default_rng(7)
+    x, rows = np.round(100 * smooth(rng, 60)), np.round(100 * np.array([smooth(rng, 60) for _ in range(3)]))
+    expected = similarity(x, rows, 1)
+    for other in (np.asfortranarray(rows), rows.astype(int), rows.tolist(), np.repeat(rows, 2, axis=1)[:, ::2]):
+        np.testing.assert_array_equal(similarity(x.tolist(), other, 1), expected)
+    assert all(v.shape == (0,) for v in similarity(x, np.empty((0, 60)), 1))
+
+
+@pytest.mark.parametrize(
+    ("measured", "options", "sentence"),
+    [
+        (np.zeros(5), {}, "zero throughout"),
+        (np.full(5, 2.0), {}, "constant"),
+        (np.array([1.0, np.nan, 2.0, 3.0, 4.0]), {}, "1 of 5 measured values are no finite numbers"),
+        (np.arange(4.0), {}, r"shape \(1, 5\), expected \(n_candidates, 4\)"),
+        (np.ones((2, 5)), {}, "expected .n_samples,."),
+        (np.arange(5.0), {"interval": 0.0}, "interval is 0.0"),
+        (np.arange(5.0), {"slope_threshold": np.nan}, "slope_threshold nan"),
+        (np.arange(5.0), {"epsilon": -0.1}, "epsilon is -0.1"),
+        (np.arange(5.0), {"xi": np.inf}, "xi inf"),
+    ],
+)
+def test_refuses_in_a_sentence(measured: Array, options: dict[str, float], sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        similarity(measured, np.ones((1, 5)), **{"interval": 0.001, **options})
+
+
+def test_refuses_a_zero_measurement_for_s1_alone() -> None:
+    with pytest.raises(ValueError, match="zero throughout"):
+        numerical_similarity(np.zeros(3), np.ones((1, 3)))

@@ -1,0 +1,408 @@
+"""The paper's swarm: its equations, what pymoo expects of it, and pyswarms as an independent second opinion."""
+
+import copy
+import json
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pymoo.algorithms.soo.nonconvex.pso import PSO
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.callback import Callback
+from pymoo.core.evaluator import Evaluator
+from pymoo.core.problem import Problem
+from pymoo.optimize import minimize
+from pymoo.util.display.single import SingleObjectiveOutput
+from scipy.stats import ks_2samp
+
+from armid.identifiers.catalogue import IDENTIFIERS, Identifier, as_identifier
+from armid.identifiers.pso import PaperPSO
+from armid.problem.meter import Meter
+from armid.problem.termination import MeterTermination
+
+Array = NDArray[np.float64]
+
+
+def valley(x: Array) -> Array:
+    """Return the height of a narrow curved valley in four dimensions, (n, 4) -> (n,); 0 at 1, 1, 1, 1."""
+    a, b, c, d = x.T
+    steps = ((a, b), (b, c), (c, d))
+    return np.asarray(sum(100.0 * (v - u * u) ** 2 + (1.0 - u) ** 2 for u, v in steps))
+
+
+class Valley(Problem):  # type: ignore[misc]
+    """The valley in [-2, 2]^4; counts, and fails where asked to."""
+
+    def __init__(self, fail_above: float = np.inf, meter: Meter | None = None) -> None:
+        super().__init__(n_var=4, n_obj=1, xl=-2.0, xu=2.0)
+        self.fail_above, self.meter = fail_above, meter
+        self.seen: list[Array] = []
+
+    def _evaluate(self, x: Array, out: dict[str, Any], *_: Any, **__: Any) -> None:
+        f = np.where(x[:, 0] > self.fail_above, np.nan, valley(x))
+        self.seen.append(x.copy())
+        if self.meter is not None:
+            n = self.meter.grant(len(x))
+            self.meter.record(x[:n], f[:n], np.isnan(f[:n]))
+            f[n:] = np.nan
+        out["F"] = f
+
+
+def literal_swarm(seed: int, n_particles: int, n_iterations: int, limit: Array) -> tuple[Array, Array]:
+    """Eqs 8-9 particle by particle in [-2, 2]^4; returns positions, (n_iterations, n_particles, 4), and the bests."""
+    random = np.random.default_rng(seed)
+    draw = lambda: random.random((n_particles, 4))  # noqa: E731
+    x, v = -2.0 + 4.0 * draw(), np.minimum(0.2 * 4.0, limit) * (2.0 * draw() - 1.0)
+    p, f = x.copy(), valley(x)
+    visited, bests = [x.copy()], [f.min()]
+    for t in range(1, n_iterations):
+        sigma = 0.4 + (0.9 - 0.4) * (n_iterations - t) / n_iterations
+        r1, r2, g = draw(), draw(), p[np.argmin(f)].copy()
+        for i in range(n_particles):
+            for d in range(4):
+                faster = sigma * v[i, d] + 1.2 * r1[i, d] * (p[i, d] - x[i, d]) + 1.7 * r2[i, d] * (g[d] - x[i, d])
+                v[i, d] = min(max(faster, -limit[d]), limit[d])
+                x[i, d] = min(max(x[i, d] + v[i, d], -2.0), 2.0)
+        now = valley(x)
+        for i in range(n_particles):
+            if now[i] < f[i]:
+                p[i], f[i] = x[i], now[i]
+        visited.append(x.copy())
+        bests.append(f.min())
+    return np.array(visited), np.array(bests)
+
+
+class Bests(Callback):  # type: ignore[misc]
+    """Keep the best of each generation and what else a callback may look at."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.bests: list[float] = []
+        self.rows: list[tuple[int, int, int]] = []
+        self.pops: list[Any] = []
+
+    def notify(self, algorithm: Algorithm) -> None:
+        self.bests.append(float(algorithm.opt[0].F[0]) if len(algorithm.opt) else np.nan)
+        self.rows.append((algorithm.n_gen, algorithm.evaluator.n_eval, len(algorithm.pop)))
+        self.pops.append((algorithm.pop, algorithm.pop.get("F").copy()))
+
+
+@pytest.mark.parametrize(("limit", "fraction"), [("literal", 0.5), (0.1, 0.1)])
+def test_moves_as_the_equations_say(limit: str | float, fraction: float) -> None:
+    problem, bests = Valley(), Bests()
+    swarm = PaperPSO(n_particles=13, n_iterations=40, velocity_limit=limit)
+    minimize(problem, swarm, seed=3, callback=bests)
+    visited, literal = literal_swarm(3, 13, 40, np.full(4, fraction * 4.0))
+    np.testing.assert_array_equal(np.array(problem.seen), visited)
+    np.testing.assert_array_equal(bests.bests, literal)
+
+
+def test_golden_run() -> None:
+    result = minimize(Valley(), PaperPSO(n_particles=8, n_iterations=12), seed=1)
+    golden = [-0.6260962430294871, 0.7016724509797485, 0.5964150869848239, 0.700896466192912]
+    np.testing.assert_allclose(result.X, golden, rtol=1e-9)
+    np.testing.assert_allclose(result.F[0], 25.48436622399027, rtol=1e-9)
+
+
+def test_the_paper_s_settings_make_12000_evaluations() -> None:
+    for termination in (("n_eval", 12000), ("n_iter", 150), None):
+        result = minimize(Valley(), PaperPSO(), termination, seed=1)
+        assert result.algorithm.evaluator.n_eval == 12000
+        assert sum(map(len, result.problem.seen)) == 12000
+        assert result.algorithm.n_gen - 1 == 150
+    assert minimize(Valley(), PaperPSO(), ("n_gen", 200), seed=1).algorithm.evaluator.n_eval == 16000
+    assert minimize(Valley(), PaperPSO(termination=("n_gen", 3)), seed=1).algorithm.evaluator.n_eval == 240
+
+
+def test_inertia_falls_from_the_first_swarm_on() -> None:
+    swarm = PaperPSO()
+    assert swarm.inertia(0) == pytest.approx(0.9)
+    assert swarm.inertia(1) == pytest.approx(0.4 + 0.5 * 149 / 150)
+    assert swarm.inertia(150) == swarm.inertia(400) == pytest.approx(0.4)
+
+
+def test_the_literal_limit_is_the_magnitude_of_the_box() -> None:
+    problem = Problem(n_var=3, n_obj=1, xl=np.array([3.0, -4.0, -5.0]), xu=np.array([3.5, 1.0, 0.0]))
+    assert PaperPSO().setup(problem)._limit.tolist() == [3.5, 4.0, 5.0]
+    assert PaperPSO(velocity_limit=0.2).setup(problem)._limit.tolist() == pytest.approx([0.1, 1.0, 1.0])
+
+
+SCRIPT = """
+import sys
+sys.path.insert(0, {folder!r})
+from test_pso import PaperPSO, Valley, minimize
+result = minimize(Valley(), PaperPSO(), seed=7)
+print(result.X.tobytes().hex(), result.F.tobytes().hex(), result.pop.get("X").tobytes().hex()[-64:])
+"""
+
+
+def test_the_same_bits_in_another_process() -> None:
+    result = minimize(Valley(), PaperPSO(), seed=7)
+    here = [result.X.tobytes().hex(), result.F.tobytes().hex(), result.pop.get("X").tobytes().hex()[-64:]]
+    script = SCRIPT.format(folder=str(Path(__file__).parent))
+    for _ in range(2):
+        there = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+        assert there.stdout.split() == here
+    other = minimize(Valley(), PaperPSO(), seed=8)
+    assert other.X.tobytes().hex() != here[0]
+
+
+def test_global_random_numbers_are_left_alone() -> None:
+    before = pickle.dumps(np.random.get_state())
+    minimize(Valley(), PaperPSO(), ("n_gen", 3), seed=1)
+    assert pickle.dumps(np.random.get_state()) == before
+
+
+@pytest.mark.parametrize("budget", [1, 79, 80, 81, 1000, 12000])
+def test_the_meter_ends_the_run_exactly(budget: int) -> None:
+    meter = Meter(budget)
+    problem = Valley(meter=meter)
+    result = minimize(problem, IDENTIFIERS["pso"].build(budget), MeterTermination(meter), seed=1)
+    assert (meter.used, meter.left) == (budget, 0)
+    assert result.F[0] == meter.best_f
+    np.testing.assert_array_equal(result.X, meter.best_x)
+    seen = np.concatenate(problem.seen)
+    assert len(seen) - budget < 80
+    np.testing.assert_array_equal(meter.log().X, seen[:budget])
+
+
+def test_the_meter_ends_the_run_at_its_target() -> None:
+    meter = Meter(12000, target=0.2)
+    result = minimize(Valley(meter=meter), PaperPSO(), MeterTermination(meter), seed=1)
+    assert meter.best_f <= 0.2
+    assert meter.used < 12000
+    assert result.F[0] == meter.best_f
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_best_is_never_lost_and_the_box_is_kept(seed: int) -> None:
+    problem, bests = Valley(), Bests()
+    result = minimize(problem, PaperPSO(), seed=seed, callback=bests)
+    seen = np.concatenate(problem.seen)
+    values = valley(seen)
+    assert (np.abs(seen) <= 2.0).all()
+    np.testing.assert_array_equal(bests.bests, np.minimum.accumulate(values)[79::80])
+    assert result.F[0] == values.min()
+    np.testing.assert_array_equal(result.X, seen[np.argmin(values)])
+    assert result.F[0] < 1.0
+
+
+def test_a_failing_region_poisons_nothing() -> None:
+    result = minimize(Valley(fail_above=1.5), PaperPSO(), seed=1)
+    assert np.isfinite(result.F[0])
+    assert result.F[0] < 1.0
+    nothing = minimize(Valley(fail_above=-3.0), PaperPSO(), ("n_gen", 5), seed=1)
+    assert nothing.X is None
+    assert nothing.opt is None
+    late = minimize(Valley(fail_above=-1.8), PaperPSO(), seed=1)
+    assert np.isfinite(late.F[0])
+
+
+def test_every_evaluator_gives_the_same_run() -> None:
+    light = minimize(Valley(), PaperPSO(), seed=5)
+    plain = minimize(Valley(), PaperPSO(), seed=5, evaluator=Evaluator())
+    given = minimize(Valley(), PaperPSO(evaluator=Evaluator()), seed=5)
+    for other in (plain, given):
+        np.testing.assert_array_equal(other.pop.get("X"), light.pop.get("X"))
+        assert other.algorithm.evaluator.n_eval == light.algorithm.evaluator.n_eval == 12000
+
+
+def test_what_pymoo_shows_of_a_run_is_true() -> None:
+    bests = Bests()
+    result = minimize(Valley(), PaperPSO(), ("n_gen", 6), seed=2, callback=bests, save_history=True)
+    assert bests.rows == [(n, 80 * n, 80) for n in range(1, 7)]
+    for pop, f in bests.pops:
+        np.testing.assert_array_equal(pop.get("F"), f)
+    assert [len(h.problem.seen) for h in result.history] == [1, 2, 3, 4, 5, 6]
+    assert [float(h.opt[0].F[0]) for h in result.history] == bests.bests
+    x, f, cv, feas, n_gen = result.pop.get("X", "F", "CV", "FEAS", "n_gen")
+    np.testing.assert_array_equal(valley(x), f[:, 0])
+    assert (cv == 0.0).all()
+    assert feas.all()
+    assert set(n_gen) <= {1, 2, 3, 4, 5, 6}
+    assert result.F[0] == f.min() == result.opt[0].F[0]
+    assert result.CV[0] == 0.0
+    assert all(individual.evaluated >= {"F", "G", "H"} for individual in result.pop)
+
+
+def test_ask_and_tell() -> None:
+    swarm = PaperPSO(n_iterations=20)
+    swarm.setup(Valley(), seed=4)
+    while swarm.has_next():
+        infills = swarm.ask()
+        infills.set("F", valley(infills.get("X"))[:, np.newaxis])
+        swarm.tell(infills=infills)
+    expected = minimize(Valley(), PaperPSO(n_iterations=20), seed=4)
+    np.testing.assert_array_equal(swarm.result().X, expected.X)
+
+
+def test_a_run_can_be_copied_and_pickled_on_its_way() -> None:
+    swarm = PaperPSO().setup(Valley(), seed=4)
+    for _ in range(10):
+        swarm.next()
+    twins = copy.deepcopy(swarm), pickle.loads(pickle.dumps(swarm))
+    expected = swarm.run().X
+    for twin in twins:
+        np.testing.assert_array_equal(twin.run().X, expected)
+
+
+def test_prints_with_an_output(capsys: pytest.CaptureFixture[str]) -> None:
+    minimize(Valley(), PaperPSO(output=SingleObjectiveOutput()), ("n_gen", 3), seed=1, verbose=True)
+    lines = capsys.readouterr().out.splitlines()
+    assert "f_min" in lines[1]
+    assert lines[-1].split("|")[1].strip() == "240"
+
+
+def test_values_of_the_problem_beside_the_fitness_reach_the_individuals() -> None:
+    class Talkative(Valley):
+        def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+            super()._evaluate(x, out, *args, **kwargs)
+            out["twice"] = 2.0 * valley(x)
+
+    pop = minimize(Talkative(), PaperPSO(), ("n_gen", 3), seed=1).pop
+    np.testing.assert_array_equal(pop.get("twice"), 2.0 * pop.get("F")[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"n_particle": 80}, "no option 'n_particle', did you mean 'n_particles'?"),
+        ({"sede": 3}, "no option 'sede', did you mean 'seed'?"),
+        ({"n_particles": 0}, "n_particles is 0, expected a whole number above 0"),
+        ({"n_iterations": 1.5}, "n_iterations is 1.5"),
+        ({"c1": -1.0}, "c1 is -1.0, expected a number of at least 0"),
+        ({"c2": float("nan")}, "c2 is nan"),
+        ({"first_inertia": "0.9"}, "first_inertia is '0.9'"),
+        ({"velocity_limit": "litteral"}, "velocity_limit is 'litteral', expected 'literal' or a fraction"),
+        ({"velocity_limit": 0.0}, "velocity_limit is 0.0"),
+        ({"first_velocity": None}, "first_velocity is None"),
+    ],
+)
+def test_refuses_options_in_a_sentence(options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValueError) as refusal:
+        PaperPSO(**options)
+    assert sentence in str(refusal.value)
+
+
+def test_refuses_what_minimize_would_swallow() -> None:
+    with pytest.raises(ValueError, match="no option 'sede', did you mean 'seed'"):
+        minimize(Valley(), PaperPSO(), sede=3)
+
+
+@pytest.mark.parametrize(
+    ("problem", "sentence"),
+    [
+        (Problem(n_var=2, n_obj=2, xl=0.0, xu=1.0), "2 objectives"),
+        (Problem(n_var=2, n_obj=1, n_ieq_constr=1, xl=0.0, xu=1.0), "1 constraints"),
+        (Problem(n_var=2, n_obj=1), "bounds are None and None"),
+        (Problem(n_var=2, n_obj=1, xl=0.0, xu=np.inf), "expected a finite box"),
+        (Problem(n_var=2, n_obj=1, xl=1.0, xu=0.0), "expected a finite box"),
+    ],
+)
+def test_refuses_problems_it_cannot_search(problem: Problem, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        minimize(problem, PaperPSO(), seed=1)
+
+
+def test_refuses_to_move_without_a_problem_or_its_particles() -> None:
+    with pytest.raises(ValueError, match="no problem yet"):
+        PaperPSO().ask()
+    swarm = PaperPSO().setup(Valley(), seed=1)
+    with pytest.raises(ValueError, match="3 candidates were told to the swarm, expected its 80"):
+        swarm.tell(infills=swarm.ask()[:3])
+
+
+def test_spends_less_than_half_of_pymoo_s_own_swarm() -> None:
+    def seconds(algorithm: Algorithm) -> float:
+        return float(min(minimize(Valley(), algorithm, ("n_gen", 50), seed=1).exec_time for _ in range(3)))
+
+    assert seconds(PaperPSO()) < 0.5 * seconds(PSO(pop_size=80))
+
+
+PYSWARMS = """
+import json, logging
+import numpy as np
+from pyswarms.single.global_best import GlobalBestPSO
+logging.disable(logging.CRITICAL)
+
+def valley(x):
+    a, b, c, d = x.T
+    return sum(100.0 * (v - u * u) ** 2 + (1.0 - u) ** 2 for u, v in ((a, b), (b, c), (c, d)))
+
+low, high, errors = np.full(4, -2.0), np.full(4, 2.0), []
+for seed in range(60):
+    np.random.seed(seed)
+    swarm = GlobalBestPSO(80, 4, {"c1": 1.2, "c2": 1.7, "w": 0.9}, (low, high), {"w": "lin_variation"}, "nearest",
+                          (low, high))
+    swarm.swarm.velocity = 0.2 * 4.0 * (2.0 * np.random.random((80, 4)) - 1.0)
+    schedule = swarm.oh
+    swarm.oh = lambda options, iternow, itermax: schedule(options, iternow=iternow + 1, itermax=itermax)
+    errors.append(float(swarm.optimize(valley, 150, verbose=False)[0]))
+print(json.dumps(errors))
+"""
+
+
+def test_pyswarms_finds_as_much(tmp_path: Path) -> None:
+    # in a process and a folder of its own: pyswarms draws from the global generator, reconfigures logging, writes a log
+    # file; its first iteration counts as 0 and its first velocities fill the limit, so both are matched to ours there
+    theirs = subprocess.run([sys.executable, "-c", PYSWARMS], cwd=tmp_path, capture_output=True, text=True, check=True)
+    ours = [minimize(Valley(), PaperPSO(), seed=seed).F[0] for seed in range(60)]
+    a, b = np.log10(ours), np.log10(json.loads(theirs.stdout))
+    assert len(b) == 60
+    assert ks_2samp(a, b).pvalue > 0.01
+    assert abs(np.median(a) - np.median(b)) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("budget", "n_particles", "n_iterations"), [(12000, 80, 150), (81, 80, 2), (80, 80, 1), (7, 7, 1)]
+)
+def test_the_catalogue_stretches_the_schedule_over_the_budget(budget: int, n_particles: int, n_iterations: int) -> None:
+    swarm = IDENTIFIERS["pso"].build(budget)
+    assert (swarm.n_particles, swarm.n_iterations) == (n_particles, n_iterations)
+    assert swarm is not IDENTIFIERS["pso"].build(budget)
+
+
+def test_the_catalogue_refuses_a_budget_that_is_none() -> None:
+    for budget in (0, -5, 1.5, "12"):
+        with pytest.raises(ValueError, match="expected a whole number above 0"):
+            IDENTIFIERS["pso"].build(budget)  # type: ignore[arg-type]
+
+
+def a_small_swarm(budget: int) -> PaperPSO:
+    return PaperPSO(n_particles=4, n_iterations=budget // 4)
+
+
+def test_as_identifier() -> None:
+    pso = IDENTIFIERS["pso"]
+    assert as_identifier("other", pso) is pso
+    assert (pso.is_global, pso.uses_gradient, pso.is_stochastic) == (True, False, True)
+    from_class, from_function = as_identifier("a", PaperPSO), as_identifier("b", a_small_swarm)
+    assert isinstance(from_class, Identifier)
+    assert from_class.build(12000).n_iterations == 150
+    assert from_function.build(40).n_iterations == 10
+    for identifier in (pso, from_class, from_function):
+        assert pickle.loads(pickle.dumps(identifier)).build(40).n_particles > 0
+
+
+@pytest.mark.parametrize(
+    ("obj", "sentence"),
+    [
+        (PaperPSO(), "is a PaperPSO built already, expected a subclass"),
+        (3, "is 3, expected a subclass of pymoo's Algorithm or a function of the budget"),
+        (dict, "expected a subclass"),
+        (lambda budget, more: PaperPSO(), "expected a subclass"),
+    ],
+)
+def test_as_identifier_refuses(obj: Any, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        as_identifier("mine", obj)
+
+
+def test_a_function_that_returns_no_algorithm_is_refused() -> None:
+    with pytest.raises(ValueError, match="identifier 'mine' returned a int, expected an Algorithm"):
+        as_identifier("mine", lambda budget: budget).build(10)
