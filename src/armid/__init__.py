@@ -1,1 +1,33 @@
-"""Identify the unknown parameters of a driven arm from its measured motion."""
+"""Identify the unknown parameters of a driven arm from its measured motion.
+
+Names are read from their modules when they are first asked for, so that a command imports only what it needs.
+"""
+
+from importlib import import_module
+from typing import Any
+
+WHERE = {
+    "armid.model": (
+        "EFFECTS", "PLANTS", "ArmidError", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
+        "Parameter", "Plant", "Scales", "State",
+    ),
+    "armid.simulation": ("Schedule", "Simulation", "calibrate", "probes", "simulate"),
+    "armid.record": ("Campaign", "Record", "read_campaign", "write_campaign"),
+    "armid.fitness": ("FITNESS", "Fitness", "numerical_similarity", "similarity"),
+    "armid.problem": ("IdentificationProblem", "Meter", "MeterTermination", "Space", "replays", "space_of"),
+    "armid.identifiers": ("IDENTIFIERS", "Identifier", "PaperPSO"),
+    "armid.identifiability": ("Information", "information_at", "sensitivities"),
+    "armid.identification": ("Identification", "identify"),
+    "armid.registry": ("Registry", "load_registry"),
+}  # fmt: skip
+HOME = {name: module for module, names in WHERE.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in HOME:
+        raise AttributeError(f"module 'armid' has no attribute '{name}'")
+    return getattr(import_module(HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(HOME)

@@ -79,3 +79,11 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
 
 def _unit(node: Node, plant: Plant) -> str:
     return f"  [{plant.ports[node.key]}]" if node.kind == "port" else ""
+
+
+def returned_text(function: Equation) -> str:
+    """Return the expression that a function returns, in its own names, or its call when it has several lines."""
+    expression = returned_expression(function)
+    if expression is None:
+        return f"{function.__name__}({', '.join(inspect.signature(function).parameters)})"
+    return ast.unparse(Rename({}).visit(expression))

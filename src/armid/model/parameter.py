@@ -21,10 +21,11 @@ class Parameter:
 
     name: as the equations spell it.
     unit: a physical unit, or a product of the plant's scales `effort`, `speed`, `inertia` (effort over speed, times 1 s) such as
-        `effort/speed`; then `low`, `high`, `null` and `fixed` are multiples of that scale.
+        `effort/speed`; then `low`, `high`, `null`, `fixed` and `nominal` are multiples of that scale.
     low, high: bounds of the search, SI (or multiples of the scale).
     null: the value at which an effect vanishes (None for a parameter of a plant or of an effect's shape).
     fixed: the value at which it stays unless someone frees it (None: it is free).
+    nominal: the value a simulation takes when nobody says another (None: `null`, then `fixed`, then there is none).
     note: what it is, in words.
     """
 
@@ -34,6 +35,7 @@ class Parameter:
     high: float
     null: float | None = None
     fixed: float | None = None
+    nominal: float | None = None
     note: str = ""
 
     def __post_init__(self) -> None:

@@ -69,11 +69,6 @@ def resolve(parameter: Parameter, scales: Scales) -> Parameter:
     size = 1.0
     for word, power in powers.items():
         size *= sizes.get(word, 1.0) ** power
-    return replace(
-        parameter,
-        unit=physical_unit(powers, scales),
-        low=parameter.low * size,
-        high=parameter.high * size,
-        null=None if parameter.null is None else parameter.null * size,
-        fixed=None if parameter.fixed is None else parameter.fixed * size,
-    )
+    values = {name: getattr(parameter, name) for name in ("low", "high", "null", "fixed", "nominal")}
+    scaled = {name: None if value is None else value * size for name, value in values.items()}
+    return replace(parameter, unit=physical_unit(powers, scales), **scaled)

@@ -199,10 +199,10 @@ shell_transfer_arm = Plant(
     name="shell_transfer_arm",
     note="shell transfer arm with two series motors, worm gear and gas balance (Zhao & Hou, Eqs 1-7)",
     parameters=(
-        Parameter("p0", "Pa", 2.6e6, 3.5e6, note="initial pressure of the accumulator"),
-        Parameter("k", "1", 0.6, 1.1, note="relative sensitivity of the tachometer generator"),
-        Parameter("eta3", "1", 0.45, 0.70, note="efficiency of the worm gear"),
-        Parameter("n", "1", 0.9, 1.5, note="polytropic exponent of the gas"),
+        Parameter("p0", "Pa", 2.6e6, 3.5e6, nominal=3.05e6, note="initial pressure of the accumulator"),
+        Parameter("k", "1", 0.6, 1.1, nominal=1.0, note="relative sensitivity of the tachometer generator"),
+        Parameter("eta3", "1", 0.45, 0.70, nominal=0.55, note="efficiency of the worm gear"),
+        Parameter("n", "1", 0.9, 1.5, nominal=1.4, note="polytropic exponent of the gas"),
     ),
     states=(
         State("theta", "rad", angle_rate, start_angle, "angle_rad"),

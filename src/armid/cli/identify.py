@@ -1,0 +1,134 @@
+"""`armid identify`: parameters from the records of a campaign."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armid.cli.options import (
+    Accuracy,
+    CampaignPath,
+    Effects,
+    Plugins,
+    accuracy_of,
+    chosen,
+    interval,
+    intervals,
+    model_of,
+    numbers,
+)
+
+if TYPE_CHECKING:
+    from armid.identification import Identification
+
+SIMILARITIES = ("similarity", "numerical_similarity")
+
+
+def identify(
+    campaign: CampaignPath,
+    identifier: Annotated[str, typer.Option(help="Who searches: see `armid list identifiers`.")] = "pso",
+    fitness: Annotated[str, typer.Option(help="What is minimised: see `armid list fitness`.")] = "similarity",
+    effects: Effects = "",
+    bounds: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable.")
+    ] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
+    ] = None,
+    window: Annotated[str, typer.Option(metavar="A:B", help="What fitness and errors see of every record, s.")] = "",
+    budget: Annotated[int, typer.Option(help="Simulations: one candidate through all train records counts as one.")] = 12_000,
+    target: Annotated[
+        float | None,
+        typer.Option(help="Stop when reached: the similarity degree for a similarity, else the value of the fitness."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of everything random; the same seed gives the same result.")] = 1,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for result.json and the figures.")
+    ] = None,
+    accuracy: Accuracy = "auto",
+    plugin: Plugins = None,
+) -> None:
+    """Identify the free parameters of a model from the train records and judge it on train and holdout.
+
+    Prints parameters with 95 % intervals (from sensitivities and measured noise), warnings in words, and errors.
+    """
+    from armid.identification import identify as run  # noqa: PLC0415 - pymoo takes time to import
+    from armid.problem import space_of  # noqa: PLC0415
+    from armid.record import read_campaign  # noqa: PLC0415
+    from armid.registry import load_registry  # noqa: PLC0415
+
+    registry = load_registry(plugin or ())
+    read = read_campaign(campaign, registry.plants, registry.effects)
+    if window:
+        read = read.with_window(*interval(window, "--window"))
+    model = model_of(read, effects, registry)
+    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
+    distance: Any = chosen(fitness, registry.fitness, "fitness")
+    searcher: Any = chosen(identifier, registry.identifiers, "identifier")
+    goal = 1.0 - target if target is not None and fitness in SIMILARITIES else target
+    with Progress(budget) as progress:
+        found = run(read, model, space, distance, searcher, budget, seed, goal, accuracy_of(accuracy), progress.update)
+    report(found)
+    if out is not None:
+        write(found, out)
+
+
+def report(found: "Identification") -> None:
+    """Print tables and remarks."""
+    from rich.console import Console  # noqa: PLC0415 - takes time to import
+
+    from armid.identification.words import error_table, parameter_table, remarks  # noqa: PLC0415
+
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    console.print(parameter_table(found))
+    console.print(error_table(found))
+    for remark in remarks(found):
+        console.print(f"- {remark}", highlight=False, markup=False)
+    console.print(f"{found.used} of {found.budget} simulations used, {found.stopped}; seed {found.seed}.", highlight=False)
+
+
+def write(found: "Identification", out: Path) -> None:
+    """Write result.json and the figures, all or none."""
+    from armid.cli.simulate import NewFiles  # noqa: PLC0415
+    from armid.identification.figures import convergence_figure, fit_figure  # noqa: PLC0415
+    from armid.identification.result import result_of  # noqa: PLC0415
+
+    with NewFiles(out) as files:
+        files.path("result.json").write_text(json.dumps(result_of(found), indent=2, allow_nan=False) + "\n")
+        fit_figure(found, files.path("fit.png"))
+        if len(found.trace[0]):
+            convergence_figure(found, files.path("convergence.png"))
+    print(f"wrote result.json, fit.png and convergence.png to {out}")
+
+
+class Progress:
+    """Show a bar with rate and time left on a terminal, nothing elsewhere."""
+
+    def __init__(self, budget: int) -> None:
+        self.budget = budget
+        self.bar: Any = None
+
+    def __enter__(self) -> "Progress":
+        if sys.stderr.isatty():
+            from rich.console import Console  # noqa: PLC0415
+            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
+
+            self.bar = Progress(
+                TextColumn("{task.completed:.0f}/{task.total:.0f} simulations"), BarColumn(),
+                TextColumn("{task.speed:.0f}/s"), TimeRemainingColumn(), TextColumn("best {task.fields[best]:.6g}"),
+                console=Console(stderr=True),
+            )  # fmt: skip
+            self.task = self.bar.add_task("", total=self.budget, best=float("inf"))
+            self.bar.start()
+        return self
+
+    def update(self, meter: Any) -> None:
+        """Move the bar."""
+        if self.bar is not None:
+            self.bar.update(self.task, completed=meter.used, best=meter.best_f)
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.stop()

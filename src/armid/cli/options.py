@@ -1,0 +1,99 @@
+"""Options that several commands share, and how their texts become values."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armid.model import ArmidError, Model, nearest
+from armid.registry import Registry
+
+if TYPE_CHECKING:
+    from armid.record import Campaign
+
+CampaignPath = Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="Folder of a campaign, or its campaign.toml.")]
+Plugins = Annotated[
+    list[str] | None,
+    typer.Option("--plugin", metavar="FILE.py:attribute",
+                 help="Register your own plant, effect, fitness or identifier; runs the file's code. Repeatable."),
+]  # fmt: skip
+Effects = Annotated[
+    str, typer.Option("--effects", metavar="NAME,NAME", help="Effects to add to those that the campaign declares.")
+]
+Accuracy = Annotated[
+    str,
+    typer.Option("--accuracy", metavar="standard|fine|auto",
+                 help="Error of the engine: standard 1e-5 rad/s, fine 2e-7 rad/s (shares of the plant's speed scale); "
+                 "auto: fine where the noise would not hide the standard error."),
+]  # fmt: skip
+
+
+def number(text: str, option: str) -> float:
+    """Return a number; refuse anything else with one sentence."""
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ArmidError(f"{option}: '{text}' is no number") from error
+
+
+def assignments(texts: list[str] | None, option: str) -> dict[str, str]:
+    """Return NAME -> text of options of the form NAME=TEXT.
+
+    Raises ArmidError for another form and for a name given twice.
+    """
+    found: dict[str, str] = {}
+    for text in texts or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name or not value:
+            raise ArmidError(f"{option} '{text}' is not of the form NAME=VALUE")
+        if name in found:
+            raise ArmidError(f"{option}: '{name}' is given twice")
+        found[name] = value
+    return found
+
+
+def numbers(texts: list[str] | None, option: str) -> dict[str, float]:
+    """Return NAME -> number."""
+    return {name: number(value, f"{option} {name}") for name, value in assignments(texts, option).items()}
+
+
+def interval(text: str, option: str) -> tuple[float, float]:
+    """Return the two numbers of LOW:HIGH."""
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise ArmidError(f"{option} '{text}' is not of the form LOW:HIGH")
+    return number(low, option), number(high, option)
+
+
+def intervals(texts: list[str] | None, option: str) -> dict[str, tuple[float, float]]:
+    """Return NAME -> (low, high)."""
+    return {name: interval(value, f"{option} {name}") for name, value in assignments(texts, option).items()}
+
+
+def chosen(name: str, known: dict[str, object], what: str) -> object:
+    """Return what is registered under a name.
+
+    Raises ArmidError with the nearest valid name.
+    """
+    if name not in known:
+        raise ArmidError(f"{what} '{name}' is not known: {nearest(name, known)}")
+    return known[name]
+
+
+def accuracy_of(text: str) -> str | None:
+    """Return the engine's accuracy, None for auto."""
+    if text not in ("standard", "fine", "auto"):
+        raise ArmidError(f"--accuracy '{text}': {nearest(text, ('standard', 'fine', 'auto'))}")
+    return None if text == "auto" else text
+
+
+def model_of(campaign: "Campaign", effects: str, registry: Registry) -> Model:
+    """Return the campaign's model with further effects added."""
+    model = Model(campaign.plant)
+    wanted = [*campaign.effects, *(name.strip() for name in effects.split(",") if name.strip())]
+    for name in wanted:
+        effect = registry.effects.get(name)
+        if effect is None:
+            raise ArmidError(f"effect '{name}' is not known: {nearest(name, registry.effects)}")
+        model = model + effect
+    return model

@@ -1,0 +1,125 @@
+"""`armid simulate`: what a model does in each record of a campaign."""
+
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from armid.cli.options import Accuracy, CampaignPath, Effects, Plugins, accuracy_of, model_of, numbers
+from armid.model import ArmidError, Model, nearest
+from armid.record import Campaign, Override, Piece, Record, read_campaign, write_table
+from armid.registry import load_registry
+from armid.simulation import FINE, STANDARD, calibrate, simulate
+
+Array = NDArray[np.float64]
+SIGNAL = {"rad/s": "angular_velocity_rad_s", "m/s": "velocity_m_s"}
+
+
+def simulate_command(
+    campaign: CampaignPath,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for one CSV file a record.")],
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a parameter, SI. Repeatable.")
+    ] = None,
+    effects: Effects = "",
+    accuracy: Accuracy = "auto",
+    plugin: Plugins = None,
+) -> None:
+    """Simulate every record of a campaign and write DIR/<record's file name>.
+
+    Columns: time_s (the record's times from 0 on), the states, and the recorded signal, SI. A parameter that is not
+    set takes the value that the campaign fixes, else its nominal one.
+    """
+    registry = load_registry(plugin or ())
+    read = read_campaign(campaign, registry.plants, registry.effects)
+    model = model_of(read, effects, registry)
+    candidate = candidate_of(model, read, numbers(settings, "--set"))
+    wanted = accuracy_of(accuracy)
+    with NewFiles(out) as files:
+        for record in read.records:
+            write_table(files.path(record.file), simulated_table(record, model, candidate, wanted))
+    for name, value in zip(model.parameters, candidate, strict=True):
+        print(f"{name} = {value:.9g} {model.parameters[name].unit}")
+    print(f"wrote {len(read.records)} files to {out}")
+
+
+def candidate_of(model: Model, campaign: Campaign, given: dict[str, float]) -> Array:
+    """Return the whole candidate: given values, then what the campaign fixes, then nominal and null values.
+
+    Raises ArmidError for an unknown name, a value that is not finite, and a parameter without any value.
+    """
+    for name, value in given.items():
+        if name not in model.parameters:
+            raise ArmidError(f"--set: parameter '{name}' is not in the model: {nearest(name, model.parameters)}")
+        if not np.isfinite(value):
+            raise ArmidError(f"--set {name}: {value} was found, a finite number is expected")
+    values = []
+    for name, p in model.parameters.items():
+        choices = (given.get(name), campaign.parameters.get(name, Override()).fixed, p.nominal, p.null, p.fixed)
+        value = next((v for v in choices if v is not None), None)
+        if value is None:
+            raise ArmidError(f"parameter '{name}' has no nominal value: --set {name}=VALUE is expected ({p.unit})")
+        values.append(value)
+    return np.array(values)
+
+
+def simulated_table(record: Record, model: Model, candidate: Array, accuracy: str | None) -> dict[str, Array]:
+    """Return header -> values of one record, over its whole length."""
+    parts = [simulated_piece(p, record, model, candidate, accuracy) for p in record.whole_pieces]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def simulated_piece(
+    piece: Piece, record: Record, model: Model, candidate: Array, accuracy: str | None
+) -> dict[str, Array]:
+    """Return header -> values of one piece."""
+    hidden = record.noise.rms >= 10.0 * 5e-6 * model.plant.scales.speed
+    wanted = accuracy or (STANDARD if hidden else FINE)
+    calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted)
+    run = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
+    if run.failed[0]:
+        raise ArmidError(f"record '{record.file}': the simulation diverges with these parameters")
+    speed = model.plant.aliases.get("omega", "omega")
+    table = {"time_s": piece.manoeuvre.times()}
+    for name, state in model.states.items():
+        if name == speed:
+            table[SIGNAL[model.plant.output_unit]] = run.output[0]
+        elif state.column:
+            table[state.column] = run.states[name][0]
+    table.setdefault(SIGNAL[model.plant.output_unit], run.output[0])
+    if any("output" in e.adds for e in model.effects):
+        table[model.states[speed].column] = run.states[speed][0]
+    return table
+
+
+class NewFiles:
+    """Write files beside a folder and move them in when all are there, so that nothing half-written is found."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __enter__(self) -> "NewFiles":
+        if self.folder.exists() and not self.folder.is_dir():
+            raise ArmidError(f"--out {self.folder} is a file: a folder is expected")
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._beside = TemporaryDirectory(dir=self.folder, prefix=".armid-")
+        self._names: list[str] = []
+        return self
+
+    def path(self, name: str) -> Path:
+        """Return where to write a file for now."""
+        self._names.append(name)
+        path = Path(self._beside.name) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            for name in self._names:
+                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+                os.replace(Path(self._beside.name) / name, self.folder / name)
+        self._beside.cleanup()

@@ -1,0 +1,103 @@
+"""Figures of one identification: the fit (as the paper's Fig. 10) and the convergence (as Fig. 11)."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armid.identification.identify import Identification
+from armid.identification.words import SHOWN
+from armid.problem import Replay
+
+# Okabe-Ito: told apart by colour-blind readers.
+MEASURED, SIMULATED, RESIDUAL = "#000000", "#D55E00", "#0072B2"
+MOST_RECORDS = 8
+
+
+def style() -> Any:
+    """Return pyplot on a backend without a screen, in the house style."""
+    import matplotlib as mpl  # noqa: PLC0415 - takes time to import, and only figures need it
+    import seaborn as sns  # noqa: PLC0415
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt  # noqa: PLC0415
+
+    sns.set_theme(context="notebook", style="ticks", font_scale=1.0)
+    return plt
+
+
+def fit_figure(found: Identification, path: Path) -> None:
+    """Draw measured and simulated signal of each record, the residual below."""
+    plt = style()
+    replays = [*found.train_replays, *found.holdout_replays]
+    shown = replays if len(replays) <= MOST_RECORDS else chosen(found)
+    columns = 1 if len(shown) == 1 else 2
+    rows = -(-len(shown) // columns)
+    ratios = [h for _ in range(rows) for h in (3, 1.4)]
+    size = (6.8 * columns, 4.4 * rows + 0.6)
+    figure, axes = plt.subplots(2 * rows, columns, figsize=size, squeeze=False, height_ratios=ratios, layout="constrained")
+    for i, replay in enumerate(shown):
+        row, column = 2 * (i // columns), i % columns
+        draw_record(axes[row, column], axes[row + 1, column], replay, found)
+    for unused in axes.T.reshape(columns, rows, 2).transpose(1, 0, 2).reshape(-1, 2)[len(shown) :]:
+        for axis in unused:
+            axis.set_visible(False)
+    figure.suptitle(title(found, len(shown), len(replays)), fontsize="large")
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def chosen(found: Identification) -> list[Replay]:
+    """Return the first records of each role, when there are too many to draw."""
+    half = MOST_RECORDS // 2
+    train, holdout = list(found.train_replays), list(found.holdout_replays)
+    n_holdout = min(len(holdout), max(half, MOST_RECORDS - len(train)))
+    return train[: MOST_RECORDS - n_holdout] + holdout[:n_holdout]
+
+
+def title(found: Identification, drawn: int, there_are: int) -> str:
+    """Return what the figure shows."""
+    model = " + ".join([found.model.plant.name, *(e.name for e in found.model.effects)])
+    some = "" if drawn == there_are else f" ({drawn} of {there_are} records)"
+    return f"{found.campaign.name}: {model}, {found.identifier} on {found.fitness.name}{some}"
+
+
+def draw_record(upper: Any, lower: Any, replay: Replay, found: Identification) -> None:
+    """Draw one record into a pair of axes."""
+    unit, factor = SHOWN[found.campaign.unit]
+    times, measured = replay.times, replay.measured * factor
+    simulated = replay.signal(found.candidate[np.newaxis])[0] * factor
+    upper.plot(times, measured, color=MEASURED, lw=1.6, label="measured")
+    upper.plot(times, simulated, color=SIMULATED, lw=1.3, ls="--", label="simulated")
+    lower.axhline(0.0, color="0.6", lw=0.8)
+    lower.plot(times, measured - simulated, color=RESIDUAL, lw=0.8)
+    rms = np.sqrt(np.mean((measured - simulated) ** 2))
+    upper.set_title(f"{replay.record.file} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
+    upper.set_ylabel(f"speed [{unit}]")
+    upper.tick_params(labelbottom=False)
+    upper.legend(loc="best", fontsize="small", frameon=False)
+    lower.set_ylabel(f"residual\n[{unit}]")
+    lower.set_xlabel("time [s]")
+    for axis in (upper, lower):
+        axis.margins(x=0.01)
+        axis.spines[["top", "right"]].set_visible(False)
+
+
+def convergence_figure(found: Identification, path: Path) -> None:
+    """Draw the best fitness, or for a similarity its degree, against the number of simulations."""
+    plt = style()
+    similarity = found.fitness.name in ("similarity", "numerical_similarity")
+    evaluations, values = found.trace
+    x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
+    figure, axis = plt.subplots(figsize=(6.8, 4.2), layout="constrained")
+    axis.step(x, 1.0 - y if similarity else y, where="post", color=RESIDUAL, lw=1.8)
+    if not similarity and np.min(y) > 0.0:
+        axis.set_yscale("log")
+    unit = f" [{found.campaign.unit}]" if found.fitness.unit == "signal" else ""
+    axis.set_ylabel("similarity degree of the best" if similarity else f"best {found.fitness.name}{unit}")
+    axis.set_xlabel("simulations")
+    final = 1.0 - found.value if similarity else found.value
+    axis.set_title(f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {final:.6g}", fontsize="medium")
+    axis.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
