@@ -56,8 +56,9 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     Raises ArmidError for a plug-in that cannot be found or is none of ours.
     """
     registry = Registry()
+    installed = entry_points()
     for kind in KINDS:
-        for point in entry_points(group=f"armid.{kind}"):
+        for point in installed.select(group=f"armid.{kind}"):
             thing = point.load()
             registry.add(kind, thing.name if kind in ("plants", "effects") else point.name, thing)
     for plugin in plugins:

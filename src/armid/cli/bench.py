@@ -1,14 +1,20 @@
 """`armid bench`: how fast, how right, how large."""
 
-from typing import Annotated
+import click
 
-import typer
+from armid.cli.options import plugin_option
+from armid.registry import load_registry
 
 
-def bench(
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions: rougher figures in a few seconds.")] = False,
-) -> None:
-    """Measure the engine against scipy and a plain loop, in one run, and print every ratio in one table."""
+@click.command("bench")
+@click.option("--quick", is_flag=True, help="Fewer repetitions: rougher figures in a few seconds.")
+@plugin_option
+def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
+    """Measure speed, error and memory.
+
+    The engine against scipy and a plain loop, in one run, every ratio in one table.
+    """
     from armid.bench import bench_table, run_bench  # noqa: PLC0415 - imports what it measures
 
+    load_registry(plugins)
     print(bench_table(run_bench(quick=quick)))

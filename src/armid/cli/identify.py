@@ -3,21 +3,21 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
+import click
 
 from armid.cli.options import (
-    Accuracy,
-    CampaignPath,
-    Effects,
-    Plugins,
     accuracy_of,
+    accuracy_option,
+    campaign_argument,
     chosen,
+    effects_option,
     interval,
     intervals,
     model_of,
     numbers,
+    plugin_option,
 )
 
 if TYPE_CHECKING:
@@ -26,40 +26,39 @@ if TYPE_CHECKING:
 SIMILARITIES = ("similarity", "numerical_similarity")
 
 
-def identify(
-    campaign: CampaignPath,
-    identifier: Annotated[str, typer.Option(help="Who searches: see `armid list identifiers`.")] = "pso",
-    fitness: Annotated[str, typer.Option(help="What is minimised: see `armid list fitness`.")] = "similarity",
-    effects: Effects = "",
-    bounds: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable.")
-    ] = None,
-    fix: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
-    ] = None,
-    window: Annotated[str, typer.Option(metavar="A:B", help="What fitness and errors see of every record, s.")] = "",
-    budget: Annotated[int, typer.Option(help="Simulations: one candidate through all train records counts as one.")] = 12_000,
-    target: Annotated[
-        float | None,
-        typer.Option(help="Stop when reached: the similarity degree for a similarity, else the value of the fitness."),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of everything random; the same seed gives the same result.")] = 1,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for result.json and the figures.")
-    ] = None,
-    accuracy: Accuracy = "auto",
-    plugin: Plugins = None,
-) -> None:
-    """Identify the free parameters of a model from the train records and judge it on train and holdout.
+@click.command("identify")
+@campaign_argument
+@click.option("--identifier", default="pso", show_default=True, help="Who searches: see `armid list identifiers`.")
+@click.option("--fitness", default="similarity", show_default=True, help="What is minimised: see `armid list fitness`.")
+@effects_option
+@click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
+              help="Free a parameter between bounds, SI. Repeatable.")
+@click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
+@click.option("--window", default="", metavar="A:B", help="What fitness and errors see of every record, s.")
+@click.option("--budget", default=12_000, show_default=True,
+              help="Simulations: one candidate through all train records counts as one.")
+@click.option("--target", type=float,
+              help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.")
+@click.option("--seed", default=1, show_default=True, help="Seed of everything random; the same gives the same result.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for result.json and the figures.")
+@accuracy_option
+@plugin_option
+def identify_command(
+    campaign: Path, identifier: str, fitness: str, effects: str, bounds: tuple[str, ...], fix: tuple[str, ...],
+    window: str, budget: int, target: float | None, seed: int, out: Path | None, accuracy: str,
+    plugins: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Identify parameters from the train records.
 
-    Prints parameters with 95 % intervals (from sensitivities and measured noise), warnings in words, and errors.
+    The result is judged on train and holdout. Prints parameters with 95 % intervals (from sensitivities and measured
+    noise), warnings in words, and errors.
     """
     from armid.identification import identify as run  # noqa: PLC0415 - pymoo takes time to import
     from armid.problem import space_of  # noqa: PLC0415
     from armid.record import read_campaign  # noqa: PLC0415
     from armid.registry import load_registry  # noqa: PLC0415
 
-    registry = load_registry(plugin or ())
+    registry = load_registry(plugins)
     read = read_campaign(campaign, registry.plants, registry.effects)
     if window:
         read = read.with_window(*interval(window, "--window"))
@@ -86,7 +85,8 @@ def report(found: "Identification") -> None:
     console.print(error_table(found))
     for remark in remarks(found):
         console.print(f"- {remark}", highlight=False, markup=False)
-    console.print(f"{found.used} of {found.budget} simulations used, {found.stopped}; seed {found.seed}.", highlight=False)
+    last = f"{found.used} of {found.budget} simulations used, {found.stopped}; seed {found.seed}."
+    console.print(last, highlight=False)
 
 
 def write(found: "Identification", out: Path) -> None:

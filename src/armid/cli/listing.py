@@ -1,22 +1,20 @@
 """`armid list`: what there is to choose from."""
 
-from typing import Annotated
+import click
 
-import typer
-
-from armid.cli.options import Plugins, chosen
+from armid.cli.options import chosen, plugin_option
 from armid.model import Effect, Parameter, Plant
 from armid.model.equations import returned_text
 from armid.registry import KINDS, Registry, load_registry
 
 
-def list_command(
-    what: Annotated[str, typer.Argument(metavar="effects|plants|fitness|identifiers", help="What to list.")],
-    plugin: Plugins = None,
-) -> None:
+@click.command("list")
+@click.argument("what", metavar="effects|plants|fitness|identifiers")
+@plugin_option
+def list_command(what: str, plugins: tuple[str, ...]) -> None:
     """List what is registered: names, equations, parameters, units."""
     chosen(what, dict.fromkeys(KINDS), "list")
-    registry = load_registry(plugin or ())
+    registry = load_registry(plugins)
     texts = {"effects": effect_texts, "plants": plant_texts, "fitness": fitness_texts, "identifiers": identifier_texts}
     print("\n\n".join(texts[what](registry)))
 
@@ -57,7 +55,9 @@ def plant_text(plant: Plant) -> str:
     lines += [f"  state {s.name} [{s.unit}]" for s in plant.states]
     lines += [f"  quantity {name} = {returned_text(f)}" for name, f in plant.quantities.items()]
     lines += [f"  port {name} [{unit}]" for name, unit in plant.ports.items()]
-    lines += [f"  input {i.name} [{i.unit}] from {' or '.join(i.columns) or 'a column that you name'}" for i in plant.inputs]
+    lines += [
+        f"  input {i.name} [{i.unit}] from {' or '.join(i.columns) or 'a column that you name'}" for i in plant.inputs
+    ]
     lines += [f"  constant {c.name} = {c.value:g} {c.unit}{f' ({c.note})' if c.note else ''}" for c in plant.constants]
     lines += [f"  key {k.key} sets {k.constant}" for k in plant.keys]
     lines += [f"  {alias} is another name for {name}" for alias, name in plant.aliases.items()]
@@ -73,6 +73,7 @@ def identifier_texts(registry: Registry) -> list[str]:
     """Return one line for each identifier."""
     lines = []
     for name, i in registry.identifiers.items():
-        words = [w for w, on in (("global", i.is_global), ("gradient", i.uses_gradient), ("stochastic", i.is_stochastic)) if on]
+        kinds = {"global": i.is_global, "gradient": i.uses_gradient, "stochastic": i.is_stochastic}
+        words = [word for word, on in kinds.items() if on]
         lines.append(f"{name}: {i.note or 'no note'} ({', '.join(words) or 'local'})")
     return lines

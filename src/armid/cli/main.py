@@ -4,34 +4,31 @@ import sys
 import warnings
 from typing import Any
 
-import typer
+import click
 
-from armid.cli import simulate as simulate_command
-from armid.cli.bench import bench
-from armid.cli.check import check
-from armid.cli.identify import identify
-from armid.cli.importing import import_app
+from armid.cli.bench import bench_command
+from armid.cli.check import check_command
+from armid.cli.identify import identify_command
+from armid.cli.importing import import_group
 from armid.cli.listing import list_command
+from armid.cli.simulate import simulate_command
 from armid.model import ArmidError
 
 BAD_INPUT, INTERRUPTED = 2, 130
-# Typer brings its own copy of click or uses the installed one, depending on its version: ask it for the class.
-USAGE_ERROR: Any = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
 
-app = typer.Typer(
-    help="Identify the unknown parameters of a driven arm from its measured motion.\n\nCAMPAIGN is a folder with "
-    "campaign.toml and one CSV file a record, or that campaign.toml. Numbers are SI unless a name says otherwise.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-app.command("simulate")(simulate_command.simulate_command)
-app.command("identify")(identify)
-app.command("list")(list_command)
-app.command("check")(check)
-app.command("bench")(bench)
-app.add_typer(import_app, name="import")
+
+@click.group("armid", context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="armid")
+def app() -> None:
+    """Identify the unknown parameters of a driven arm from its measured motion.
+
+    CAMPAIGN is a folder with campaign.toml and one CSV file a record, or that campaign.toml. Numbers are SI unless a
+    name says otherwise.
+    """
+
+
+for command in (simulate_command, identify_command, list_command, check_command, bench_command, import_group):
+    app.add_command(command)
 
 
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
@@ -43,12 +40,15 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a command; bad input gives one sentence and exit code 2."""
     warnings.showwarning = show_warning
     try:
-        code = app(arguments, prog_name="armid", standalone_mode=False)
+        code = app.main(arguments, prog_name="armid", standalone_mode=False)
     except ArmidError as error:
         stop(str(error), BAD_INPUT)
-    except (typer.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt):
         stop("interrupted", INTERRUPTED)
-    except USAGE_ERROR as error:
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.format_message())
+        sys.exit(BAD_INPUT)
+    except click.ClickException as error:
         stop(f"{error.format_message()} (see --help)", BAD_INPUT)
     except BrokenPipeError:
         sys.stderr.close()

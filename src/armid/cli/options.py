@@ -1,9 +1,10 @@
 """Options that several commands share, and how their texts become values."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
+import click
 
 from armid.model import ArmidError, Model, nearest
 from armid.registry import Registry
@@ -11,21 +12,19 @@ from armid.registry import Registry
 if TYPE_CHECKING:
     from armid.record import Campaign
 
-CampaignPath = Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="Folder of a campaign, or its campaign.toml.")]
-Plugins = Annotated[
-    list[str] | None,
-    typer.Option("--plugin", metavar="FILE.py:attribute",
-                 help="Register your own plant, effect, fitness or identifier; runs the file's code. Repeatable."),
-]  # fmt: skip
-Effects = Annotated[
-    str, typer.Option("--effects", metavar="NAME,NAME", help="Effects to add to those that the campaign declares.")
-]
-Accuracy = Annotated[
-    str,
-    typer.Option("--accuracy", metavar="standard|fine|auto",
-                 help="Error of the engine: standard 1e-5 rad/s, fine 2e-7 rad/s (shares of the plant's speed scale); "
-                 "auto: fine where the noise would not hide the standard error."),
-]  # fmt: skip
+campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
+plugin_option = click.option(
+    "--plugin", "plugins", multiple=True, metavar="FILE.py:attribute",
+    help="Register your own plant, effect, fitness or identifier; runs the file's code. Repeatable.",
+)  # fmt: skip
+effects_option = click.option(
+    "--effects", default="", metavar="NAME,NAME", help="Effects to add to those that the campaign declares."
+)
+accuracy_option = click.option(
+    "--accuracy", default="auto", show_default=True, metavar="standard|fine|auto",
+    help="Error of the engine: standard 1e-5 rad/s, fine 2e-7 rad/s (shares of the plant's speed scale); auto: fine "
+    "where the noise would not hide the standard error.",
+)  # fmt: skip
 
 
 def number(text: str, option: str) -> float:
@@ -36,13 +35,13 @@ def number(text: str, option: str) -> float:
         raise ArmidError(f"{option}: '{text}' is no number") from error
 
 
-def assignments(texts: list[str] | None, option: str) -> dict[str, str]:
+def assignments(texts: Iterable[str], option: str) -> dict[str, str]:
     """Return NAME -> text of options of the form NAME=TEXT.
 
     Raises ArmidError for another form and for a name given twice.
     """
     found: dict[str, str] = {}
-    for text in texts or []:
+    for text in texts:
         name, equals, value = text.partition("=")
         if not equals or not name or not value:
             raise ArmidError(f"{option} '{text}' is not of the form NAME=VALUE")
@@ -52,7 +51,7 @@ def assignments(texts: list[str] | None, option: str) -> dict[str, str]:
     return found
 
 
-def numbers(texts: list[str] | None, option: str) -> dict[str, float]:
+def numbers(texts: Iterable[str], option: str) -> dict[str, float]:
     """Return NAME -> number."""
     return {name: number(value, f"{option} {name}") for name, value in assignments(texts, option).items()}
 
@@ -65,7 +64,7 @@ def interval(text: str, option: str) -> tuple[float, float]:
     return number(low, option), number(high, option)
 
 
-def intervals(texts: list[str] | None, option: str) -> dict[str, tuple[float, float]]:
+def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float]]:
     """Return NAME -> (low, high)."""
     return {name: interval(value, f"{option} {name}") for name, value in assignments(texts, option).items()}
 

@@ -3,13 +3,20 @@
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
 
+import click
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
-from armid.cli.options import Accuracy, CampaignPath, Effects, Plugins, accuracy_of, model_of, numbers
+from armid.cli.options import (
+    accuracy_of,
+    accuracy_option,
+    campaign_argument,
+    effects_option,
+    model_of,
+    numbers,
+    plugin_option,
+)
 from armid.model import ArmidError, Model, nearest
 from armid.record import Campaign, Override, Piece, Record, read_campaign, write_table
 from armid.registry import load_registry
@@ -19,22 +26,22 @@ Array = NDArray[np.float64]
 SIGNAL = {"rad/s": "angular_velocity_rad_s", "m/s": "velocity_m_s"}
 
 
+@click.command("simulate")
+@campaign_argument
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write to.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, SI. Repeatable.")
+@effects_option
+@accuracy_option
+@plugin_option
 def simulate_command(
-    campaign: CampaignPath,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for one CSV file a record.")],
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a parameter, SI. Repeatable.")
-    ] = None,
-    effects: Effects = "",
-    accuracy: Accuracy = "auto",
-    plugin: Plugins = None,
+    campaign: Path, out: Path, settings: tuple[str, ...], effects: str, accuracy: str, plugins: tuple[str, ...]
 ) -> None:
-    """Simulate every record of a campaign and write DIR/<record's file name>.
+    """Simulate every record of a campaign.
 
-    Columns: time_s (the record's times from 0 on), the states, and the recorded signal, SI. A parameter that is not
-    set takes the value that the campaign fixes, else its nominal one.
+    Writes DIR/<record's file name>. Columns: time_s (the record's times from 0 on), the states, and the recorded
+    signal, SI. A parameter that is not set takes the value that the campaign fixes, else its nominal one.
     """
-    registry = load_registry(plugin or ())
+    registry = load_registry(plugins)
     read = read_campaign(campaign, registry.plants, registry.effects)
     model = model_of(read, effects, registry)
     candidate = candidate_of(model, read, numbers(settings, "--set"))
@@ -79,7 +86,7 @@ def simulated_piece(
     """Return header -> values of one piece."""
     hidden = record.noise.rms >= 10.0 * 5e-6 * model.plant.scales.speed
     wanted = accuracy or (STANDARD if hidden else FINE)
-    calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted)
+    calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted, spans=False)
     run = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
     if run.failed[0]:
         raise ArmidError(f"record '{record.file}': the simulation diverges with these parameters")

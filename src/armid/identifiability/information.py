@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from armid.problem.replay import Replay
 from armid.problem.space import Space
+from armid.record.noise import correlation_sum
 
 Array = NDArray[np.float64]
 # Step of the central differences, as a share of the range: above rounding, below curvature.
@@ -14,6 +15,22 @@ STEP = 1e-4
 NORMAL_95 = 1.959963984540054
 # Directions whose information is below this share of the strongest cannot be told from nothing.
 SINGULAR = 1e-13
+# A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
+# engine it is the engine's.
+MISFIT, ENGINE_ERRORS = 2.0, 3.0
+
+
+@dataclass(frozen=True)
+class Level:
+    """Say how far a record scatters about the model.
+
+    rms: [unit of the record]; effective_fraction: independent samples per sample; from_residual: the residual was far
+    above the noise, so that the residual itself, with its correlation in time, is what scatters.
+    """
+
+    rms: float
+    effective_fraction: float
+    from_residual: bool = False
 
 
 @dataclass(frozen=True)
@@ -27,6 +44,7 @@ class Information:
     names: tuple[str, ...]
     deviation: Array
     correlation: Array
+    levels: tuple[Level, ...] = ()
 
     @property
     def half_width(self) -> Array:
@@ -49,20 +67,35 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
     return (signal[:n] - signal[n:]).T / (2.0 * STEP)
 
 
+def level_of(replay: Replay, space: Space, x: Array) -> Level:
+    """Return the measured noise of a record, or its residual where that is far above the noise.
+
+    A model that lacks something leaves a residual that is large and smooth; intervals from the noise alone would then
+    be too narrow by orders of magnitude.
+    """
+    noise = replay.record.noise
+    residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
+    rms = float(np.sqrt(np.mean(residual**2)))
+    if not np.isfinite(rms) or rms**2 <= MISFIT * noise.rms**2 or rms <= ENGINE_ERRORS * replay.engine_error:
+        return Level(noise.rms, noise.effective_fraction)
+    return Level(rms, 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+
+
 def information_at(replays: tuple[Replay, ...], space: Space, x: Array) -> Information:
     """Return intervals and correlations at a candidate, from the sensitivities and the measured noise.
 
-    Fisher information F = sum over records of f J^T J / noise^2 with f the share of samples that are independent;
-    covariance = F^-1 (the Cramer-Rao bound of an unbiased estimate). A noise-free record gives no interval but 0.
+    Fisher information F = sum over records of f J^T J / level^2 with f the share of samples that are independent;
+    covariance = F^-1 (the Cramer-Rao bound of an unbiased estimate). The level is the noise, or the residual where that
+    is far above it. A record without noise and without residual gives an interval of width 0.
     x: free parameters, SI, shape (n_free,).
     """
     span = space.high[space.free] - space.low[space.free]
-    noise_free = any(r.record.noise.rms == 0.0 for r in replays)
+    levels = tuple(level_of(r, space, x) for r in replays)
+    noise_free = any(level.rms == 0.0 for level in levels)
     total = np.zeros((len(x), len(x)))
-    for replay in replays:
-        noise = replay.record.noise
+    for replay, level in zip(replays, levels, strict=True):
         jacobian = sensitivities(replay, space, x)
-        weight = 1.0 if noise_free else noise.effective_fraction / noise.rms**2
+        weight = 1.0 if noise_free else level.effective_fraction / level.rms**2
         total += weight * jacobian.T @ jacobian
     covariance = inverse(total)
     deviation = np.sqrt(np.diag(covariance))
@@ -70,7 +103,7 @@ def information_at(replays: tuple[Replay, ...], space: Space, x: Array) -> Infor
         correlation = covariance / np.outer(deviation, deviation)
     correlation[~np.isfinite(correlation)] = np.nan
     known = np.isfinite(deviation)
-    return Information(space.free_names, np.where(known & noise_free, 0.0, deviation * span), correlation)
+    return Information(space.free_names, np.where(known & noise_free, 0.0, deviation * span), correlation, levels)
 
 
 def inverse(matrix: Array) -> Array:

@@ -35,14 +35,16 @@ def fit_figure(found: Identification, path: Path) -> None:
     rows = -(-len(shown) // columns)
     ratios = [h for _ in range(rows) for h in (3, 1.4)]
     size = (6.8 * columns, 4.4 * rows + 0.6)
-    figure, axes = plt.subplots(2 * rows, columns, figsize=size, squeeze=False, height_ratios=ratios, layout="constrained")
+    grid = {"figsize": size, "squeeze": False, "height_ratios": ratios, "layout": "constrained"}
+    figure, axes = plt.subplots(2 * rows, columns, **grid)
     for i, replay in enumerate(shown):
         row, column = 2 * (i // columns), i % columns
         draw_record(axes[row, column], axes[row + 1, column], replay, found)
     for unused in axes.T.reshape(columns, rows, 2).transpose(1, 0, 2).reshape(-1, 2)[len(shown) :]:
         for axis in unused:
             axis.set_visible(False)
-    figure.suptitle(title(found, len(shown), len(replays)), fontsize="large")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False)
+    figure.suptitle(title(found, len(shown), len(replays)), fontsize="large", x=0.02, ha="left")
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
@@ -75,7 +77,6 @@ def draw_record(upper: Any, lower: Any, replay: Replay, found: Identification) -
     upper.set_title(f"{replay.record.file} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
     upper.set_ylabel(f"speed [{unit}]")
     upper.tick_params(labelbottom=False)
-    upper.legend(loc="best", fontsize="small", frameon=False)
     lower.set_ylabel(f"residual\n[{unit}]")
     lower.set_xlabel("time [s]")
     for axis in (upper, lower):
@@ -97,7 +98,8 @@ def convergence_figure(found: Identification, path: Path) -> None:
     axis.set_ylabel("similarity degree of the best" if similarity else f"best {found.fitness.name}{unit}")
     axis.set_xlabel("simulations")
     final = 1.0 - found.value if similarity else found.value
-    axis.set_title(f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {final:.6g}", fontsize="medium")
+    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {final:.6g}"
+    axis.set_title(text, fontsize="medium")
     axis.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=130)
     plt.close(figure)

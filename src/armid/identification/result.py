@@ -16,6 +16,7 @@ PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 def result_of(found: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
     names = found.information.names
+    correlation = found.information.correlation
     return {
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
@@ -24,7 +25,7 @@ def result_of(found: Identification) -> dict[str, Any]:
         "error": {"train": errors(found.train), "holdout": errors(found.holdout)},
         "error_by_record": {r.record.file: r.record.role for r in (*found.train_replays, *found.holdout_replays)},
         "correlation": {
-            a: {b: finite(found.information.correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)
+            a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)
         },
         "unit": found.campaign.unit,
         "fitness": found.fitness.name,

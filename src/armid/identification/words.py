@@ -45,7 +45,8 @@ def error_table(found: Identification) -> Table:
     """Return the table of errors on train and holdout."""
     unit = found.campaign.unit
     table = Table("records", "S", "S1", "S2", f"RMSE, {SHOWN[unit][0]}", "NRMSE", "chi2/sample", title="Errors")
-    for name, replays, e in (("train", found.train_replays, found.train), ("holdout", found.holdout_replays, found.holdout)):
+    rows = (("train", found.train_replays, found.train), ("holdout", found.holdout_replays, found.holdout))
+    for name, replays, e in rows:
         if e is None:
             table.add_row(f"{name}: none", *[""] * 6)
         else:
@@ -74,7 +75,7 @@ def remarks(found: Identification) -> list[str]:
 
 def bound_remark(name: str) -> str:
     """Return the sentence for a parameter at its bound."""
-    return f"{name} sits on its bound: the records would take it further, so neither it nor its interval can be trusted."
+    return f"{name} sits on its bound: the records would take it further; neither it nor its interval can be trusted."
 
 
 def noise_remarks(found: Identification) -> list[str]:
@@ -91,8 +92,10 @@ def noise_remarks(found: Identification) -> list[str]:
         else:
             text += " from high-frequency differences of the motion, as fewer than 50 samples were recorded at rest"
         said.append(text + ".")
-    chi2 = found.train.chi2_per_sample
-    if chi2 is not None and chi2 > 2.0:
-        said.append(f"The residual is {np.sqrt(chi2):.3g} times the noise: the model lacks something, and the intervals, "
-                    "which assume that it does not, are too narrow.")  # fmt: skip
+    for replay, level in zip(found.train_replays, found.information.levels, strict=True):
+        if level.from_residual:
+            times = level.rms / replay.record.noise.rms if replay.record.noise.rms else np.inf
+            said.append(f"{replay.record.file}: the residual is {times:.3g} times the noise, so the model lacks "
+                        "something; the intervals are widened to the residual and its correlation in time, and hold only as far "
+                        "as what is lacking averages out.")  # fmt: skip
     return said

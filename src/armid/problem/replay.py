@@ -77,8 +77,9 @@ def calibrated(
     model: Model, manoeuvre: Manoeuvre, spread: Array, accuracy: str, known: dict[object, Calibration]
 ) -> Calibration:
     """Return the calibration of a manoeuvre; the same manoeuvre is not calibrated twice."""
-    key = (accuracy, manoeuvre.interval, manoeuvre.n_samples, manoeuvre.hold, tuple(sorted(manoeuvre.constants.items())),
-           tuple((k, v.tobytes()) for k, v in sorted(manoeuvre.inputs.items())))  # fmt: skip
+    constants = tuple(sorted(manoeuvre.constants.items()))
+    inputs = tuple((k, v.tobytes()) for k, v in sorted(manoeuvre.inputs.items()))
+    key = (accuracy, manoeuvre.interval, manoeuvre.n_samples, manoeuvre.hold, constants, inputs)
     if key not in known:
         known[key] = calibrate(model, manoeuvre, spread, accuracy)
     return known[key]

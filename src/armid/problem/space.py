@@ -48,7 +48,7 @@ class Space:
         """
         i = self.index(name)
         if not (np.isfinite([low, high]).all() and low < high):
-            raise ArmidError(f"bounds of '{name}' are {low:g} and {high:g}: two finite numbers, low < high, are expected")
+            raise ArmidError(f"bounds of '{name}' are {low:g} and {high:g}: finite numbers, low < high, are expected")
         return replace(self, low=put(self.low, i, low), high=put(self.high, i, high), fixed=put(self.fixed, i, np.nan))
 
     def with_fixed(self, name: str, value: float) -> "Space":

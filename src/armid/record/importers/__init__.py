@@ -1,0 +1,5 @@
+"""Public measured sets as campaigns."""
+
+from armid.record.importers.emps import import_emps
+
+__all__ = ["import_emps"]

@@ -1,0 +1,80 @@
+"""Noise of the sensor, from rest or from the motion itself."""
+
+from math import comb, log1p
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.record.record import Noise
+
+Array = NDArray[np.float64]
+FEWEST_REST_SAMPLES = 50
+FINEST_STEP = 1e-6
+ORDERS = range(3, 9)
+
+
+def noise_of(rest: Array, motion: Array, interval: float) -> Noise:
+    """Return the noise of a record.
+
+    rest: samples before the motion [unit], (n_rest,); with fewer than 50 of them the differences of `motion` [unit],
+    (n_rows,), are used. interval: between the samples of rest [s]. A signal that moves in coarse steps has at least
+    the noise step/sqrt(12), also where rest shows none.
+    """
+    floor = quantisation_step(motion) / np.sqrt(12.0)
+    if rest.size < FEWEST_REST_SAMPLES:
+        return Noise(max(difference_rms(motion), floor), None, 0.0, 1.0, motion.size, "differences")
+    mean = float(np.mean(rest))
+    # of equal values the mean can miss the value by its last digit, which would look like correlated noise
+    deviations = rest - mean if np.ptp(rest) > 0 else np.zeros_like(rest)
+    rms = float(np.sqrt(np.mean(deviations**2)))
+    total = correlation_sum(deviations)
+    # an exponential correlation rho_k = phi^k sums to phi/(1 - phi) = total, and phi = exp(-interval/time constant)
+    time_constant = interval / log1p(1 / total) if total > 0 else 0.0
+    return Noise(max(rms, floor), mean, time_constant, 1 / (1 + 2 * total), rest.size, "rest")
+
+
+def correlation_sum(deviations: Array) -> float:
+    """Return the sum of the autocorrelation over positive lags, at least 0.
+
+    It ends before the first lag whose correlation is below 2/sqrt(n), what white noise shows by chance.
+    """
+    n = deviations.size
+    power = np.abs(np.fft.rfft(deviations, 2 * n)) ** 2
+    covariance = np.fft.irfft(power)[: max(n // 2, 1)]
+    if covariance[0] <= 0:
+        return 0.0
+    correlation = covariance[1:] / covariance[0]
+    small = np.flatnonzero(correlation < 2 / np.sqrt(n))
+    return float(np.sum(correlation[: small[0] if small.size else None]))
+
+
+def difference_rms(motion: Array) -> float:
+    """Return the rms of what high differences leave of a motion [unit]; white noise is assumed.
+
+    The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
+    where the next order gives less than a tenth of it, it still saw the motion (low-passed noise falls less fast) and
+    the next is taken. The median of the absolute values keeps the transients of the motion out.
+    """
+    estimates = []
+    for order in ORDERS:
+        differences = np.abs(np.diff(motion, n=order))
+        estimates.append(1.4826 * float(np.median(differences)) / np.sqrt(comb(2 * order, order)))
+        if len(estimates) > 1 and estimates[-1] > 0.1 * estimates[-2]:
+            return float(estimates[-2])
+    return float(estimates[-1])
+
+
+def quantisation_step(motion: Array) -> float:
+    """Return the step [unit] of which all values are multiples, 0 for a signal without a coarse one."""
+    step = smallest_step(motion)
+    if step <= FINEST_STEP * float(np.max(np.abs(motion))):
+        return 0.0
+    steps = (motion - motion[0]) / step
+    return step if np.all(np.abs(steps - np.rint(steps)) < 0.02) else 0.0
+
+
+def smallest_step(motion: Array) -> float:
+    """Return the smallest change between neighbours that is not 0 [unit], 0 for a constant signal."""
+    changes = np.abs(np.diff(motion))
+    changes = changes[changes > 0]
+    return float(np.min(changes)) if changes.size else 0.0

@@ -1,0 +1,169 @@
+"""Even time grids out of the times of a file."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.model import ArmidError
+from armid.record.record import Irregularity
+
+Array = NDArray[np.float64]
+FEWEST_SAMPLES = 20
+SHORTEST_INTERVAL = 1e-9
+LATEST_START = 2.0
+MOST_FILLING = 10
+EVEN = 1e-3
+LARGE_GAP = 3.0
+
+
+class IrregularSamplingWarning(UserWarning):
+    """Say how irregular the times of a record are that was resampled."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Tell how the samples of a file come onto an even grid.
+
+    start, interval: of the grid [s]. n_samples: on the grid. first: row of the first sample at or after the start.
+    earliest: first sample of the grid that was measured and is not before t = 0.
+    resampled: False when the rows from `first` on are the samples of the grid.
+    irregularity: None for even times.
+    """
+
+    start: float
+    interval: float
+    n_samples: int
+    first: int
+    earliest: int
+    resampled: bool
+    irregularity: Irregularity | None
+
+
+def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
+    """Find the even grid of a record.
+
+    times: increasing [s], shape (n_rows,). from_rest: the grid begins at t = 0 exactly (samples before are rest), else
+    at the first sample. The interval is the slope of the times where they are even but for their rounding, else the
+    median interval. Warns with IrregularSamplingWarning when they are not.
+
+    Raises ArmidError for fewer than 20 samples after the start, a plant from rest whose record starts late, intervals
+    too short to be seconds, and times that are mostly gaps.
+    """
+    after = "after t = 0" if from_rest else "in the record"
+    first = first_row(times) if from_rest else 0
+    motion = times[first:]
+    check_number(motion.size, after, file)
+    interval, tolerance, even = fitted_grid(motion, file)
+    begin, start = float(motion[0]), 0.0 if from_rest else float(motion[0])
+    check_start(begin, start, interval, file)
+    resampled = not even or abs(begin - start) > tolerance
+    n_samples = grid_size(motion, start, interval, file) if resampled else motion.size
+    check_number(n_samples, after, file)
+    # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
+    earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN))
+    irregularity = None if even else irregularity_of(motion)
+    if irregularity is not None:
+        tell(irregularity, motion, interval, file)
+    return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
+
+
+def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear") -> Array:
+    """Return a column on the even grid, shape (n_samples,), from values and times, both (n_rows,).
+
+    Samples that are on the grid are kept. Else between samples: a straight line, whose error is interval^2/8 times the
+    curvature and which never overshoots at the kinks of a record; `hold` "zero" keeps the last value instead.
+    """
+    if not timing.resampled:
+        return np.ascontiguousarray(values[timing.first :])
+    grid = timing.start + timing.interval * np.arange(timing.n_samples)
+    if hold == "zero":
+        # a sample counts from a thousandth of an interval before its time on, so that rounding does not delay it
+        rows = np.searchsorted(times, grid + EVEN * timing.interval, side="right") - 1
+        return np.ascontiguousarray(values[np.maximum(rows, 0)])
+    return np.asarray(np.interp(grid, times, values), dtype=np.float64)
+
+
+def first_row(times: Array) -> int:
+    """Return the row of the first sample at or after t = 0, a thousandth of an interval before counting as 0."""
+    slack = EVEN * float(np.median(np.diff(times))) if times.size > 1 else 0.0
+    return int(np.searchsorted(times, -slack))
+
+
+def check_start(begin: float, start: float, interval: float, file: str) -> None:
+    """Refuse a plant from rest whose first sample comes long after t = 0."""
+    if begin - start > LATEST_START * interval:
+        raise ArmidError(f"{file}: the first sample is at {begin:.6g} s, but the arm starts at t = 0: a first sample "
+                         "at or before 0 is expected")  # fmt: skip
+
+
+def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
+    """Return interval [s], how far [s] even times may be off the line through them, and whether they are even."""
+    index = np.arange(times.size) - 0.5 * (times.size - 1)
+    middle = float(np.mean(times))
+    interval = float(index @ (times - middle)) / float(index @ index)
+    interval = rounded(interval, times - middle - interval * index)
+    if interval < SHORTEST_INTERVAL:
+        raise ArmidError(f"{file}: the samples are {interval:.3g} s apart, at least {SHORTEST_INTERVAL:g} s is "
+                         "expected")  # fmt: skip
+    tolerance = max(EVEN * interval, 0.75 * printed_resolution(times, interval))
+    even = bool(np.max(np.abs(times - middle - interval * index)) <= tolerance)
+    return interval if even else float(np.median(np.diff(times))), tolerance, even
+
+
+def printed_resolution(times: Array, interval: float) -> float:
+    """Return the decimal step [s] to which the times were rounded, 0 where it cannot explain an uneven grid."""
+    for decimals in range(10):
+        step = 10.0**-decimals
+        scaled = times / step
+        if step <= interval / 3 and np.all(np.abs(scaled - np.rint(scaled)) <= 1e-6 + 1e-15 * np.abs(scaled)):
+            return step
+    return 0.0
+
+
+def irregularity_of(times: Array) -> Irregularity | None:
+    """Return how far the intervals are from their median, None when only slow drift is there."""
+    intervals = np.diff(times)
+    median = float(np.median(intervals))
+    relative = intervals / median
+    if np.max(np.abs(relative - 1)) <= EVEN + 1.01 * printed_resolution(times, median) / median:
+        return None
+    widest = int(np.argmax(relative))
+    return Irregularity(float(np.mean(np.abs(relative - 1) > 0.01)), float(relative[widest]), float(times[widest]))
+
+
+def tell(irregularity: Irregularity, times: Array, interval: float, file: str) -> None:
+    """Warn how irregular the sampling is, and of a large gap."""
+    share, widest = irregularity.share, irregularity.largest_gap
+    text = (f"{file}: irregular sampling: {share:.2%} of {times.size - 1} intervals are off by more than 1 %, the "
+            f"largest is {widest:.3g} times the median, at t = {irregularity.at_s:.6g} s")  # fmt: skip
+    if widest > LARGE_GAP:
+        text += ", a large gap that is bridged by a straight line"
+    warnings.warn(f"{text}; resampled evenly at {interval:.6g} s", IrregularSamplingWarning, stacklevel=2)
+
+
+def grid_size(times: Array, start: float, interval: float, file: str) -> int:
+    """Return the number of grid samples up to the last measured one; refuse a grid that is mostly gaps."""
+    length = float(times[-1]) - start
+    size = length / interval
+    if size > MOST_FILLING * times.size:
+        raise ArmidError(f"{file}: {times.size} samples at a median interval of {interval:.3g} s leave most of "
+                         f"{length:.6g} s unmeasured, a record without such gaps is expected")  # fmt: skip
+    return int(size + EVEN) + 1
+
+
+def check_number(n_samples: int, after: str, file: str) -> None:
+    """Refuse a record that is too short to say anything."""
+    if n_samples < FEWEST_SAMPLES:
+        raise ArmidError(f"{file}: {n_samples} samples {after}, at least {FEWEST_SAMPLES} are expected")
+
+
+def rounded(interval: float, offsets: Array) -> float:
+    """Return the roundest interval that the times allow: 0.001 rather than 0.00099999999999.
+
+    offsets: of the times from the fitted line [s], (n_rows,); they tell how exactly its slope is known.
+    """
+    doubt = float(np.max(np.abs(offsets))) * np.sqrt(12 / offsets.size) + 1e-9 * interval
+    candidates = (float(f"{interval:.{digits}g}") for digits in range(1, 16))
+    return next((c for c in candidates if abs(c - interval) * offsets.size <= doubt), interval)

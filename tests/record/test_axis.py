@@ -1,0 +1,176 @@
+"""Records of a driven axis: start state, restarts, inputs, scales, units."""
+
+import numpy as np
+import pytest
+
+from armid.model import ArmidError, Input, Manoeuvre, Plant
+from armid.model.plants.driven_axis import driven_axis
+from armid.record import read_campaign
+from armid.record.pieces import smoothed
+
+DEGREE = np.pi / 180
+HOLDOUT = '\n[[records]]\nfile = "hold.csv"\nrole = "holdout"\n'
+AXIS = 'name = "a"\nplant = "driven_axis"\n{}\n[[records]]\nfile = "move.csv"\nrole = "train"\n'
+
+
+def test_starts_from_the_measured_state(write_axis, axis_columns):
+    record = read_campaign(write_axis()).records[0]
+    constants = record.pieces[0].manoeuvre.constants
+    assert constants["gain"] == 35.0
+    assert constants["start_speed"] == pytest.approx(axis_columns["velocity_m_s"][0], abs=5e-5)
+    assert constants["start_position"] == pytest.approx(axis_columns["position_m"][0], abs=2e-7)
+    np.testing.assert_array_equal(record.pieces[0].manoeuvre.inputs["u"], axis_columns["drive_V"])
+    np.testing.assert_array_equal(record.columns["position_m"], axis_columns["position_m"])
+    assert record.noise.source == "differences"
+    assert record.noise.mean is None
+    assert record.is_noise_free
+
+
+def test_first_sample_starts_the_clock(write_axis, axis_columns):
+    record = read_campaign(write_axis(columns={**axis_columns, "time_s": axis_columns["time_s"] + 7.25})).records[0]
+    assert record.manoeuvre.start_time == pytest.approx(7.25)
+    assert record.rest.size == 0
+    assert record.n_samples == 5501
+    np.testing.assert_allclose(record.times[[0, -1]], [7.25, 12.75])
+
+
+def test_samples_before_zero_are_simulated_but_do_not_count(write_axis, axis_columns):
+    record = read_campaign(write_axis(columns={**axis_columns, "time_s": axis_columns["time_s"] - 0.5})).records[0]
+    assert record.manoeuvre.start_time == pytest.approx(-0.5)
+    assert record.pieces[0].window == slice(500, 5501)
+
+
+def test_scales_come_from_train_records_only(write, axis_columns):
+    toml = AXIS.format("[constants]\ngain = 35.0") + HOLDOUT
+    holdout = {name: values if name == "time_s" else values * 10 for name, values in axis_columns.items()}
+    campaign = read_campaign(write(toml, move=axis_columns, hold=holdout))
+    assert campaign.plant.scales.effort == pytest.approx(35.0 * np.max(np.abs(axis_columns["drive_V"])))
+    assert campaign.plant.scales.speed == pytest.approx(np.max(np.abs(axis_columns["velocity_m_s"])))
+    assert (campaign.plant.scales.effort_unit, campaign.plant.scales.length_unit) == ("N", "m")
+    assert driven_axis.scales.effort == 1.0
+
+
+def test_a_pendulum_without_drive_takes_its_scale_from_gravity(write_axis, axis_columns):
+    toml = AXIS.format("[constants]\ngravity_moment = 1.5")
+    campaign = read_campaign(write_axis(toml=toml, columns={**axis_columns, "drive_V": axis_columns["drive_V"] * 0}))
+    assert campaign.plant.scales.effort == 1.5
+
+
+@pytest.mark.parametrize(("speed", "position", "factor"), [
+    ("angular_velocity_rad_s", "angle_rad", 1.0), ("angular_velocity_deg_s", "angle_deg", DEGREE),
+])  # fmt: skip
+def test_the_rotary_axis_is_found_by_the_unit(write_axis, axis_columns, speed, position, factor):
+    columns = {"time_s": axis_columns["time_s"], speed: axis_columns["velocity_m_s"] / factor,
+               position: axis_columns["position_m"] / factor, "drive_N_m": axis_columns["drive_V"]}  # fmt: skip
+    campaign = read_campaign(write_axis(columns=columns, toml=AXIS.format("[constants]\ngravity_moment = 1.5")))
+    assert campaign.unit == "rad/s"
+    assert [p.name for p in campaign.plant.parameters] == ["inertia"]
+    np.testing.assert_allclose(campaign.records[0].measured, axis_columns["velocity_m_s"])
+    assert campaign.records[0].constants["start_position"] == pytest.approx(axis_columns["position_m"][0], abs=2e-7)
+
+
+def test_restarts_cut_pieces_from_measured_states(write_axis, axis_columns):
+    record = read_campaign(write_axis("restart_s = 1.0\n")).records[0]
+    assert [p.start_index for p in record.pieces] == [0, 1000, 2000, 3000, 4000]
+    assert record.n_samples == 5000
+    for piece in record.pieces:
+        rows = slice(piece.start_index, piece.start_index + 1000)
+        np.testing.assert_array_equal(piece.measured, axis_columns["velocity_m_s"][rows])
+        np.testing.assert_array_equal(piece.manoeuvre.inputs["u"], axis_columns["drive_V"][rows])
+        assert piece.manoeuvre.start_time == pytest.approx(axis_columns["time_s"][piece.start_index])
+        state = piece.manoeuvre.constants
+        assert state["start_speed"] == pytest.approx(axis_columns["velocity_m_s"][piece.start_index], abs=3e-5)
+        assert state["start_position"] == pytest.approx(axis_columns["position_m"][piece.start_index], abs=3e-7)
+
+
+def test_restarts_without_position_start_at_zero(write_axis, axis_columns):
+    columns = {name: values for name, values in axis_columns.items() if name != "position_m"}
+    record = read_campaign(write_axis("restart_s = 2.5\n", columns)).records[0]
+    assert [p.manoeuvre.constants["start_position"] for p in record.pieces] == [0.0, 0.0]
+
+
+def test_window_of_a_restarted_record_leaves_pieces_out(write_axis):
+    record = read_campaign(write_axis("restart_s = 1.0\nwindow_s = [1.5, 2.005]\n")).records[0]
+    assert [(p.start_index, p.window) for p in record.pieces] == [(1000, slice(500, 1000))]
+
+
+def test_smoothing_takes_the_noise_off_a_moving_start():
+    rng = np.random.default_rng(3)
+    times = np.arange(200) / 1000
+    first, middle = [], []
+    for _ in range(400):
+        speed = 1.0 + 5.0 * times + rng.normal(0, 0.1, times.size)
+        first.append(smoothed(speed, 0, 0.001, 1) - 1.0)
+        middle.append(smoothed(speed, 100, 0.001, 1) - 1.5)
+    # of 21 samples: sqrt(4/21) of the noise at the end of a straight line, sqrt(1/21) in its middle
+    assert np.std(first) == pytest.approx(0.1 * np.sqrt(4 / 21), rel=0.2)
+    assert np.std(middle) == pytest.approx(0.1 * np.sqrt(1 / 21), rel=0.2)
+    assert abs(np.mean(first)) < 0.01
+
+
+def test_slow_samples_are_not_smoothed():
+    assert smoothed(np.array([1.0, 5.0, 2.0, 8.0]), 1, 0.05, 1) == 5.0
+
+
+def test_named_inputs_win_and_degrees_become_radians(write, axis_columns):
+    plant = Plant(
+        name="servo", parameters=driven_axis.parameters, states=driven_axis.states, output="v", output_unit="m/s",
+        quantities=driven_axis.quantities, constants=driven_axis.constants, ports=driven_axis.ports,
+        scales=driven_axis.scales, from_rest=False,
+        inputs=(*driven_axis.inputs, Input("table_angle", "rad"), Input("wind", "m/s", ("wind_m_s",), required=False)),
+    )  # fmt: skip
+    columns = {**axis_columns, "reserve_V": axis_columns["drive_V"] + 1.0, "table_deg": axis_columns["time_s"]}
+    toml = AXIS.format('[inputs]\ntable_angle = "table_deg"').replace("driven_axis", "servo")
+    toml += '[records.inputs]\nu = "reserve_V"\n'
+    manoeuvre = read_campaign(write(toml, move=columns), plants={"servo": plant}).records[0].manoeuvre
+    np.testing.assert_array_equal(manoeuvre.inputs["u"], columns["reserve_V"])
+    np.testing.assert_allclose(manoeuvre.inputs["table_angle"], columns["table_deg"] * DEGREE)
+    np.testing.assert_array_equal(manoeuvre.inputs["wind"], 0.0)
+
+
+def test_hold_of_the_record_wins(write, axis_columns):
+    toml = AXIS.format('hold = "zero"') + HOLDOUT + 'hold = "linear"\n'
+    records = read_campaign(write(toml, move=axis_columns, hold=axis_columns)).records
+    assert [r.manoeuvre.hold for r in records] == ["zero", "linear"]
+    assert isinstance(records[0].manoeuvre, Manoeuvre)
+
+
+@pytest.mark.parametrize(("more", "change", "fragments"), [
+    ("restart_s = 9.0\n", {}, ["restart_s is 9", "5.501"]),
+    ("restart_s = 0.01\n", {}, ["restart_s is 0.01", "10 samples", "20"]),
+    ("[records.constants]\ngravity_moment = 1.0\n", {"position_m": None}, ["move.csv", "gravity_moment", "position_m"]),
+    ("[records.constants]\nstart_speed = 1.0\n", {}, ["start_speed", "first samples"]),
+    ("[records.constants]\ngian = 1.0\n", {}, ["'gian'", "did you mean 'gain'"]),
+    ("gyro_range = 1.0\n", {}, ["'gyro_range'", "unknown"]),
+    ("supply_V = 1.0\n", {}, ["'supply_V'", "unknown"]),
+    ("[records.inputs]\nU = 'drive_V'\n", {}, ["'U'", "no input", "driven_axis"]),
+    ("[records.inputs]\nu = 'drive_v'\n", {}, ["'drive_v'", "move.csv", "did you mean 'drive_V'"]),
+    ("", {"drive_V": None}, ["move.csv, line 1", "input 'u'", "drive_N_m"]),
+    ("", {"drive_V": None, "drive_kN": 1.0}, ["move.csv, line 1", "'drive_kN'", "unknown unit", "drive_N"]),
+    ("", {"drive_N": 1.0}, ["drive_V and drive_N", "move.csv, line 1"]),
+    ("", {"drive_V": 0.0}, ["drive", "0 throughout"]),
+])  # fmt: skip
+def test_refused(write_axis, axis_columns, more, change, fragments):
+    columns = dict(axis_columns)
+    for name, value in change.items():
+        if value is None:
+            del columns[name]
+        else:
+            columns[name] = np.full(5501, value)
+    with pytest.raises(ArmidError) as refusal:
+        read_campaign(write_axis(more, columns))
+    for fragment in fragments:
+        assert fragment in str(refusal.value)
+
+
+def test_two_positions_are_refused(write_axis, axis_columns):
+    columns = {"time_s": axis_columns["time_s"], "angular_velocity_rad_s": axis_columns["velocity_m_s"],
+               "drive_V": axis_columns["drive_V"], "angle_deg": axis_columns["position_m"],
+               "angle_rad": axis_columns["position_m"]}  # fmt: skip
+    with pytest.raises(ArmidError, match="angle_rad and angle_deg"):
+        read_campaign(write_axis(columns=columns))
+
+
+def test_a_gyro_range_does_not_fit_a_linear_speed(write_axis):
+    with pytest.raises(ArmidError, match=r"gyro_range_deg_s.*m/s"):
+        read_campaign(write_axis(toml=AXIS.format("gyro_range_deg_s = 200")))

@@ -1,0 +1,178 @@
+"""What a campaign that can be used reads as."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Parameter
+from armid.record import Override, read_campaign
+
+DEGREE = np.pi / 180
+REPOSITORY = Path(__file__).parents[2]
+ARM = """\
+name = "c00"
+plant = "shell_transfer_arm"
+effects = ["coulomb"]
+gyro_range_deg_s = 200
+{top}
+[constants]
+K_p = 250.0
+R = 0.5
+
+[[records]]
+file = "lower.csv"
+role = "train"
+start_angle_deg = -48.0
+target_angle_deg = 22.0
+shell = true
+{lower}
+
+[[records]]
+file = "empty.csv"
+role = "holdout"
+start_angle_deg = -40
+target_angle_deg = 18
+shell = false
+supply_V = 25
+repeat_of = "lower.csv"
+{empty}
+"""
+
+
+def arm(top="", lower="", empty=""):
+    return ARM.format(top=top, lower=lower, empty=empty)
+
+
+@pytest.fixture
+def write_two(write, arm_columns):
+    """Return a function that writes a campaign of two arm records."""
+    return lambda **parts: write(arm(**parts), lower=arm_columns, empty=arm_columns)
+
+
+def test_folder_and_file_read_alike(write_two):
+    folder = write_two()
+    by_folder, by_file = read_campaign(folder), read_campaign(str(folder / "campaign.toml"))
+    assert by_folder.name == by_file.name == "c00"
+    assert by_folder.folder == by_file.folder == folder
+    assert by_folder.plant is PLANTS["shell_transfer_arm"]
+    assert by_folder.effects == ("coulomb",)
+    assert by_folder.unit == "rad/s"
+    assert by_folder.gyro_range == pytest.approx(200 * DEGREE)
+    assert [r.file for r in by_folder.train] == ["lower.csv"]
+    assert [r.file for r in by_folder.holdout] == ["empty.csv"]
+    assert by_folder.holdout[0].repeat_of == "lower.csv"
+
+
+def test_samples_before_zero_are_rest(write_two, arm_columns):
+    record = read_campaign(write_two()).train[0]
+    speed = arm_columns["angular_velocity_deg_s"] * DEGREE
+    np.testing.assert_array_equal(record.rest, speed[:100])
+    np.testing.assert_array_equal(record.measured, speed[100:])
+    assert record.manoeuvre.start_time == 0.0
+    assert record.manoeuvre.interval == 0.001
+    assert record.manoeuvre.n_samples == record.n_samples == 1201
+    assert record.duration == pytest.approx(1.2)
+    np.testing.assert_allclose(record.times, arm_columns["time_s"][100:], atol=1e-15)
+    assert record.noise.source == "rest"
+    assert record.noise.n_samples == 100
+    assert record.noise.rms == pytest.approx(0.3 * DEGREE, rel=0.3)
+    assert record.noise.mean == pytest.approx(np.mean(speed[:100]))
+    assert len(record.pieces) == 1
+    assert record.pieces[0].window == slice(0, 1201)
+
+
+def test_constants_are_laid_over_each_other(write_two):
+    campaign = read_campaign(write_two(empty="[records.constants]\nR = 0.6\nU = 24.0"))
+    first, second = campaign.records
+    assert first.constants["K_p"] == second.constants["K_p"] == 250.0
+    assert (first.constants["R"], second.constants["R"]) == (0.5, 0.6)
+    assert "U" not in first.constants
+    assert second.constants["U"] == 24.0
+    assert (first.constants["shell"], second.constants["shell"]) == (1.0, 0.0)
+    assert second.constants["theta_C"] == pytest.approx(-40 * DEGREE)
+    assert first.pieces[0].manoeuvre.constants == first.constants
+
+
+def test_a_required_key_may_be_a_constant(write, arm_columns):
+    folder = write('name="a"\nplant="shell_transfer_arm"\n[constants]\ntheta_C = -0.8\ntheta_D = 0.3\n[[records]]\n'
+                   'file="lower.csv"\nrole="train"\n')  # fmt: skip
+    assert read_campaign(folder).records[0].constants == {"theta_C": -0.8, "theta_D": 0.3}
+
+
+@pytest.mark.parametrize("text", [
+    "[parameters.p0]\nlow = 2.9e6\nhigh = 3.2e6\n[parameters.'coulomb.width']\nfixed = 0.01",
+    "[parameters]\np0 = {low = 2.9e6, high = 3.2e6}\n[parameters.coulomb.width]\nfixed = 0.01",
+    "[parameters.p0]\nlow = 2.9e6\nhigh = 3.2e6\n[parameters.coulomb]\nwidth = {fixed = 0.01}",
+])  # fmt: skip
+def test_parameters_by_either_spelling(write_two, text):
+    campaign = read_campaign(write_two(top=text))
+    assert campaign.parameters == {"p0": Override(low=2.9e6, high=3.2e6), "coulomb.width": Override(fixed=0.01)}
+
+
+def test_one_bound_is_enough(write_two):
+    assert read_campaign(write_two(top="[parameters.n]\nhigh = 1.45")).parameters == {"n": Override(high=1.45)}
+
+
+def test_own_plants_and_effects_can_be_named(write_two):
+    hum = Effect("hum", (Parameter("size", "effort", 0.0, 0.1, null=0.0),), {"torque": lambda size: size})
+    folder = write_two(top="[parameters.hum.size]\nhigh = 4.0")
+    with pytest.raises(ArmidError, match=r"hum\.size"):
+        read_campaign(folder)
+    assert read_campaign(folder, effects={**EFFECTS, "hum": hum}).parameters["hum.size"].high == 4.0
+    with pytest.raises(ArmidError, match="shell_transfer_arm"):
+        read_campaign(folder, plants={"driven_axis": PLANTS["driven_axis"]})
+
+
+def test_further_columns_are_kept_on_the_grid(write, arm_columns):
+    columns = {**arm_columns, "current_A": arm_columns["time_s"] * 10}
+    record = read_campaign(write(lower=columns)).records[0]
+    assert list(record.columns) == ["current_A"]
+    np.testing.assert_array_equal(record.columns["current_A"], columns["current_A"][100:])
+
+
+@pytest.mark.parametrize("encode", [
+    lambda text: b"\xef\xbb\xbf" + text,
+    lambda text: text.replace(b"\n", b"\r\n"),
+    lambda text: text.replace(b"\n", b"\n\n"),
+    lambda text: text.replace(b"time_s,angular_velocity_deg_s", b'"time_s", "angular_velocity_deg_s"'),
+    lambda text: text.replace(b",", b" , ")[:-1],
+])  # fmt: skip
+def test_spellings_of_csv(write, encode):
+    folder = write()
+    plain = read_campaign(folder).records[0].measured
+    file = folder / "lower.csv"
+    file.write_bytes(encode(file.read_bytes()))
+    np.testing.assert_array_equal(read_campaign(folder).records[0].measured, plain)
+
+
+def test_rad_per_second_needs_no_factor(write, arm_columns):
+    speed = arm_columns["angular_velocity_deg_s"] * DEGREE
+    folder = write(lower={"time_s": arm_columns["time_s"], "angular_velocity_rad_s": speed})
+    np.testing.assert_array_equal(read_campaign(folder).records[0].measured, speed[100:])
+
+
+def test_a_record_may_lie_deeper_or_be_linked_inside(write):
+    folder = write()
+    (folder / "deep").mkdir()
+    (folder / "lower.csv").rename(folder / "deep" / "one.csv")
+    os.symlink(folder / "deep" / "one.csv", folder / "lower.csv")
+    assert read_campaign(folder).records[0].n_samples == 1201
+
+
+def test_a_faint_signal_below_the_gyro_range_is_not_saturated(write_two, arm_columns):
+    # four samples in a row at the range are a peak, five would be a cut
+    speed = arm_columns["angular_velocity_deg_s"].copy()
+    speed[700:704] = 200.0
+    folder = write_two()
+    (folder / "lower.csv").write_text("time_s,angular_velocity_deg_s\n" + "\n".join(
+        f"{t!r},{v!r}" for t, v in zip(arm_columns["time_s"].tolist(), speed.tolist(), strict=True)))  # fmt: skip
+    assert read_campaign(folder).records[0].n_samples == 1201
+
+
+def test_the_committed_campaign_reads():
+    folder = REPOSITORY / "studies" / "campaigns" / "paper_arm"
+    if not folder.is_dir():
+        pytest.skip(f"{folder.name} is not there: this checkout comes without studies")
+    assert read_campaign(folder).train

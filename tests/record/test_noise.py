@@ -1,0 +1,87 @@
+"""Noise with a known answer."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from armid.record.noise import difference_rms, noise_of, quantisation_step, smallest_step
+
+INTERVAL = 0.001
+MOTION = np.sin(3 * np.arange(2000) * INTERVAL) * 2.5
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(7)
+
+
+def test_white_rest(rng):
+    noise = noise_of(0.02 + rng.normal(0, 0.005, 20_000), MOTION, INTERVAL)
+    assert noise.source == "rest"
+    assert noise.n_samples == 20_000
+    assert noise.mean == pytest.approx(0.02, abs=2e-4)
+    assert noise.rms == pytest.approx(0.005, rel=0.03)
+    assert noise.effective_fraction > 0.95
+    assert noise.correlation_time_s < 0.2 * INTERVAL
+
+
+def test_short_white_rest_stays_white(rng):
+    fractions = [noise_of(rng.normal(0, 1, 100), MOTION, INTERVAL).effective_fraction for _ in range(200)]
+    assert np.median(fractions) == 1.0
+
+
+@pytest.mark.parametrize("time_constant", [0.002, 0.01])
+def test_coloured_rest(rng, time_constant):
+    phi = np.exp(-INTERVAL / time_constant)
+    rest = lfilter([0.005 * np.sqrt(1 - phi**2)], [1, -phi], rng.normal(size=100_000))
+    noise = noise_of(rest, MOTION, INTERVAL)
+    assert noise.rms == pytest.approx(0.005, rel=0.05)
+    assert noise.correlation_time_s == pytest.approx(time_constant, rel=0.1)
+    assert noise.effective_fraction == pytest.approx((1 - phi) / (1 + phi), rel=0.1)
+
+
+def test_alternating_rest_is_not_better_than_white(rng):
+    rest = np.diff(rng.normal(0, 1, 20_001))
+    assert noise_of(rest, MOTION, INTERVAL).effective_fraction == 1.0
+
+
+@pytest.mark.parametrize("level", [0.0, 0.1])
+def test_a_silent_rest_is_noise_free(level):
+    noise = noise_of(np.full(100, level), MOTION, INTERVAL)
+    assert (noise.rms, noise.correlation_time_s, noise.effective_fraction) == (0.0, 0.0, 1.0)
+    assert noise.mean == pytest.approx(level)
+
+
+def test_a_silent_rest_of_a_coarse_signal_has_the_noise_of_its_steps():
+    noise = noise_of(np.zeros(100), np.round(MOTION, 2), INTERVAL)
+    assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
+
+
+@pytest.mark.parametrize("n_rest", [0, 1, 49])
+def test_few_rest_samples_leave_the_differences(rng, n_rest):
+    noise = noise_of(np.zeros(n_rest), MOTION + rng.normal(0, 0.005, MOTION.size), INTERVAL)
+    assert noise.source == "differences"
+    assert noise.mean is None
+    assert noise.n_samples == MOTION.size
+    assert noise.rms == pytest.approx(0.005, rel=0.1)
+
+
+def test_differences_keep_transients_out(rng):
+    jerky = MOTION + np.where(np.arange(2000) % 400 < 60, np.sin(np.arange(2000)), 0.0)
+    assert difference_rms(jerky + rng.normal(0, 0.005, 2000)) == pytest.approx(0.005, rel=0.3)
+
+
+def test_differences_of_a_smooth_motion_vanish():
+    assert difference_rms(MOTION) < 1e-12
+
+
+def test_differences_of_a_coarse_signal_have_its_steps():
+    coarse = np.round(MOTION / 0.05) * 0.05
+    assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
+
+
+def test_steps(rng):
+    assert quantisation_step(np.round(MOTION, 2)) == pytest.approx(0.01)
+    assert quantisation_step(MOTION) == 0.0
+    assert quantisation_step(rng.normal(size=500)) == 0.0
+    assert quantisation_step(np.ones(10)) == smallest_step(np.ones(10)) == 0.0

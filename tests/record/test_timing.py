@@ -1,0 +1,118 @@
+"""Even grids out of uneven times."""
+
+import numpy as np
+import pytest
+
+from armid.model import ArmidError
+from armid.record import IrregularSamplingWarning, read_campaign
+from armid.record.timing import onto_grid, timing_of
+
+
+def motion(times):
+    return np.where(times > 0, np.sin(3 * times) ** 2, 0.0)
+
+
+def read(write, times, **more):
+    columns = {"time_s": times, "angular_velocity_rad_s": motion(times), **more}
+    return read_campaign(write(lower=columns)).records[0]
+
+
+@pytest.mark.parametrize("times", [
+    np.arange(-100, 1000) / 1000,
+    np.round(np.arange(-100, 1000) / 300, 3),  # rounded to 1 ms, up to 15 % of an interval off
+    np.round(np.arange(-100, 1000) / 800, 4),
+    np.arange(-100, 1000) / 1024 + np.random.default_rng(1).normal(0, 1e-7, 1100) * (np.arange(-100, 1000) != 0),
+])  # fmt: skip
+def test_rounded_times_are_even(write, times):
+    record = read(write, times)
+    assert record.irregularity is None
+    np.testing.assert_array_equal(record.measured, motion(times)[100:])
+    np.testing.assert_allclose(record.times, times[100:], atol=0.0005)
+
+
+def test_the_interval_is_the_slope_not_the_rounded_median(write):
+    assert read(write, np.round(np.arange(0, 3000) / 300, 3)).manoeuvre.interval == pytest.approx(1 / 300, rel=2e-6)
+
+
+def test_slow_drift_is_resampled_without_a_word(write):
+    index = np.arange(2000)
+    record = read(write, index / 1000 * (1 + 1e-7 * index))
+    assert record.irregularity is None
+    np.testing.assert_allclose(record.measured, motion(record.times), atol=2e-6)
+
+
+def test_a_grid_that_misses_zero_is_shifted_onto_it(write):
+    times = (np.arange(-100, 1000) + 0.4) / 1000
+    record = read(write, times)
+    assert record.irregularity is None
+    assert record.times[0] == 0.0
+    assert record.manoeuvre.interval == pytest.approx(0.001)
+    assert record.rest.size == 100
+    assert record.pieces[0].window == slice(0, record.measured.size)
+    np.testing.assert_allclose(record.measured, motion(record.times), atol=1e-5)
+
+
+def test_a_lost_first_sample_does_not_count(write):
+    record = read(write, np.arange(1, 1000) / 1000)
+    assert record.times[0] == 0.0
+    assert record.pieces[0].window == slice(1, 1000)
+    np.testing.assert_allclose(record.measured[1:], motion(np.arange(1, 1000) / 1000), atol=1e-12)
+
+
+def test_a_gap_in_the_rest_does_not_matter(write):
+    times = np.concatenate([np.arange(-200, -100) / 100, np.arange(1000) / 1000])
+    record = read(write, times)
+    assert record.irregularity is None
+    assert record.rest.size == 100
+
+
+def test_irregular_times_are_resampled_with_a_warning(write):
+    rng = np.random.default_rng(2)
+    times = np.sort(np.arange(1200) / 1000 + rng.uniform(-0.0002, 0.0002, 1200) * (np.arange(1200) > 0))
+    times = np.delete(times, slice(600, 609))
+    with pytest.warns(IrregularSamplingWarning) as caught:
+        record = read(write, times, drive_V=times)
+    message = str(caught[0].message)
+    assert len(caught) == 1
+    for fragment in ("lower.csv", "% of 1190 intervals", "at t = 0.599", "a large gap", "resampled"):
+        assert fragment in message
+    assert record.irregularity.share > 0.5
+    assert 9 < record.irregularity.largest_gap < 11
+    np.testing.assert_allclose(np.diff(record.times), record.manoeuvre.interval)
+    np.testing.assert_allclose(record.measured, motion(record.times), atol=3e-4)
+    np.testing.assert_allclose(record.columns["drive_V"], record.times, atol=1e-9)
+
+
+def test_a_missing_sample_is_irregular(write):
+    with pytest.warns(IrregularSamplingWarning, match="largest is 2 times"):
+        record = read(write, np.delete(np.arange(-100, 1000) / 1000, 500))
+    assert record.measured.size == 1000
+
+
+def test_a_held_input_is_not_smeared():
+    times = np.array([0.0, 0.1, 0.2, 0.35, 0.4] + [0.5 + 0.1 * i for i in range(20)])
+    with pytest.warns(IrregularSamplingWarning):
+        timing = timing_of(times, False, "x.csv")
+    values = np.where(times < 0.35, 0.0, 1.0)
+    held = onto_grid(values, times, timing, "zero")
+    assert set(held) == {0.0, 1.0}
+    np.testing.assert_array_equal(held[:5], [0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(("times", "found"), [
+    (np.arange(1000, 2000) / 1000, "first sample is at 1 s"),
+    (np.arange(-1000, 0) / 1000, "0 samples after t = 0"),
+    (np.arange(-1000, 19) / 1000, "19 samples after t = 0"),
+    (np.arange(25) * 1e-10, "apart"),
+    (np.concatenate([np.arange(100) / 1000, [1e9]]), "unmeasured"),
+    (np.arange(19) / 1000, "19 samples"),
+])  # fmt: skip
+def test_refused(write, times, found):
+    columns = {"time_s": times, "angular_velocity_rad_s": np.cos(np.arange(times.size))}
+    folder = write(lower=columns)
+    with pytest.raises(ArmidError, match=found):
+        read_campaign(folder)
+
+
+def test_twenty_samples_are_enough(write):
+    assert read(write, np.arange(20) / 100).n_samples == 20
