@@ -1,0 +1,13 @@
+"""What a user's own plant, effect, fitness or identifier has to keep."""
+
+from armid.contract.check import check_thing
+from armid.contract.effect import check_effect
+from armid.contract.finding import Finding
+from armid.contract.fitness import check_fitness
+from armid.contract.identifier import check_identifier
+from armid.contract.plant import check_plant
+from armid.contract.reference import simulate_plainly
+
+__all__ = [
+    "Finding", "check_effect", "check_fitness", "check_identifier", "check_plant", "check_thing", "simulate_plainly",
+]  # fmt: skip
