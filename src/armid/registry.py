@@ -5,12 +5,14 @@ import inspect
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from traceback import walk_tb
 from typing import Any
 
 from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Plant, nearest
 
+PLUGIN_PREFIX = "armid_plugin_"
 KINDS = ("plants", "effects", "fitness", "identifiers")
 
 
@@ -42,8 +44,8 @@ class Registry:
 
         Raises ArmidError when the name is taken: a user's own must not stand silently in for ours.
         """
-        known = {"plants": self.plants, "effects": self.effects, "fitness": self.own_fitness,
-                 "identifiers": self.own_identifiers}[kind]  # fmt: skip
+        known: dict[str, Any] = {"plants": self.plants, "effects": self.effects, "fitness": self.own_fitness,
+                 "identifiers": self.own_identifiers}[kind]  # type: ignore[assignment]  # fmt: skip
         builtin = getattr(self, kind)
         if name in builtin:
             raise ArmidError(f"{kind}: '{name}' is there already, give yours another name")
@@ -59,12 +61,28 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     installed = entry_points()
     for kind in KINDS:
         for point in installed.select(group=f"armid.{kind}"):
-            thing = point.load()
+            thing = loaded(point, kind)
             registry.add(kind, thing.name if kind in ("plants", "effects") else point.name, thing)
     for plugin in plugins:
         kind, name, thing = load_plugin(plugin)
         registry.add(kind, name, thing)
     return registry
+
+
+def loaded(point: EntryPoint, kind: str) -> Any:
+    """Return the object of an installed package's entry point.
+
+    Raises ArmidError when the package cannot be loaded or the object is of another kind.
+    """
+    where = f"entry point '{point.name}' ({point.value}) of armid.{kind}"
+    try:
+        thing = point.load()
+    except Exception as error:
+        raise ArmidError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
+    found = kind_of(thing, where)
+    if found != kind:
+        raise ArmidError(f"{where} belongs to {found}: armid.{found} is expected")
+    return thing
 
 
 def load_plugin(plugin: str) -> tuple[str, str, Any]:
@@ -83,13 +101,13 @@ def load_plugin(plugin: str) -> tuple[str, str, Any]:
         names = [n for n in vars(module) if not n.startswith("_")]
         raise ArmidError(f"plug-in '{plugin}': {file.name} has no '{attribute}', {nearest(attribute, names)}")
     thing = getattr(module, attribute)
-    kind = kind_of(thing, plugin)
+    kind = kind_of(thing, f"plug-in '{plugin}'")
     return kind, getattr(thing, "name", attribute) if kind in ("plants", "effects") else attribute, thing
 
 
 def load_file(file: Path) -> Any:
     """Run a Python file as a module of its own name; its folder is searched for what it imports."""
-    name = f"armid_plugin_{file.stem}"
+    name = f"{PLUGIN_PREFIX}{file.stem}"
     if name in sys.modules and Path(str(sys.modules[name].__file__)) == file.resolve():
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, file.resolve())
@@ -102,7 +120,7 @@ def load_file(file: Path) -> Any:
         sys.path.append(folder)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[name]
         if isinstance(error, ArmidError):
             raise
@@ -110,7 +128,14 @@ def load_file(file: Path) -> Any:
     return module
 
 
-def kind_of(thing: Any, plugin: str) -> str:
+def place_in_plugin(error: BaseException) -> str | None:
+    """Return file and line of the user's plug-in in which an error arose, None when no plug-in was running."""
+    frames = [(f, line) for f, line in walk_tb(error.__traceback__)
+              if str(f.f_globals.get("__name__")).startswith(PLUGIN_PREFIX)]  # fmt: skip
+    return f"{frames[-1][0].f_code.co_filename}, line {frames[-1][1]}" if frames else None
+
+
+def kind_of(thing: Any, where: str) -> str:
     """Tell what a user's object is.
 
     Raises ArmidError for an object that is neither plant, effect, fitness nor identifier.
@@ -126,6 +151,6 @@ def kind_of(thing: Any, plugin: str) -> str:
     if hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing):
         return "identifiers"
     raise ArmidError(
-        f"plug-in '{plugin}' is a {type(thing).__name__}: a Plant, an Effect, a fitness function "
+        f"{where} is of type {type(thing).__name__}: a Plant, an Effect, a fitness function "
         "(measured, simulated) or an algorithm of pymoo is expected"
     )

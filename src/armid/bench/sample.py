@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-import armid
 from armid.bench.task import PLANT, arm_task
 from armid.record import write_campaign
 
@@ -36,6 +35,6 @@ def write_sample(folder: Path, n_samples: int = 701, seed: int = 2) -> Path:
 
 def child_environment() -> dict[str, str]:
     """Return the environment of a child process that finds this very package, installed or not."""
-    home = str(Path(armid.__file__).resolve().parents[1])
+    home = str(Path(__file__).resolve().parents[2])
     paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armid.cli.new_files import NewFiles, refuse_unwritable
 from armid.cli.options import (
     accuracy_of,
     accuracy_option,
@@ -39,7 +40,8 @@ SIMILARITIES = ("similarity", "numerical_similarity")
               help="Simulations: one candidate through all train records counts as one.")
 @click.option("--target", type=float,
               help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.")
-@click.option("--seed", default=1, show_default=True, help="Seed of everything random; the same gives the same result.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0),
+              help="Seed of everything random; the same gives the same result.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for result.json and the figures.")
 @accuracy_option
 @plugin_option
@@ -53,7 +55,8 @@ def identify_command(
     The result is judged on train and holdout. Prints parameters with 95 % intervals (from sensitivities and measured
     noise), warnings in words, and errors.
     """
-    from armid.identification import identify as run  # noqa: PLC0415 - pymoo takes time to import
+    from armid.identification import INTERRUPTED  # noqa: PLC0415 - pymoo takes time to import
+    from armid.identification import identify as run  # noqa: PLC0415
     from armid.problem import space_of  # noqa: PLC0415
     from armid.record import read_campaign  # noqa: PLC0415
     from armid.registry import load_registry  # noqa: PLC0415
@@ -67,11 +70,15 @@ def identify_command(
     distance: Any = chosen(fitness, registry.fitness, "fitness")
     searcher: Any = chosen(identifier, registry.identifiers, "identifier")
     goal = 1.0 - target if target is not None and fitness in SIMILARITIES else target
+    if out is not None:
+        refuse_unwritable(out)
     with Progress(budget) as progress:
         found = run(read, model, space, distance, searcher, budget, seed, goal, accuracy_of(accuracy), progress.update)
     report(found)
     if out is not None:
         write(found, out)
+    if found.stopped == INTERRUPTED:
+        sys.exit(130)
 
 
 def report(found: "Identification") -> None:
@@ -91,7 +98,6 @@ def report(found: "Identification") -> None:
 
 def write(found: "Identification", out: Path) -> None:
     """Write result.json and the figures, all or none."""
-    from armid.cli.simulate import NewFiles  # noqa: PLC0415
     from armid.identification.figures import convergence_figure, fit_figure  # noqa: PLC0415
     from armid.identification.result import result_of  # noqa: PLC0415
 
@@ -100,7 +106,7 @@ def write(found: "Identification", out: Path) -> None:
         fit_figure(found, files.path("fit.png"))
         if len(found.trace[0]):
             convergence_figure(found, files.path("convergence.png"))
-    print(f"wrote result.json, fit.png and convergence.png to {out}")
+    print(f"wrote {', '.join(files.names)} to {out}")
 
 
 class Progress:
@@ -117,17 +123,19 @@ class Progress:
 
             self.bar = Progress(
                 TextColumn("{task.completed:.0f}/{task.total:.0f} simulations"), BarColumn(),
-                TextColumn("{task.speed:.0f}/s"), TimeRemainingColumn(), TextColumn("best {task.fields[best]:.6g}"),
-                console=Console(stderr=True),
+                TextColumn("{task.fields[rate]:.0f}/s"), TimeRemainingColumn(),
+                TextColumn("best {task.fields[best]:.6g}"), console=Console(stderr=True),
             )  # fmt: skip
-            self.task = self.bar.add_task("", total=self.budget, best=float("inf"))
+            self.task = self.bar.add_task("", total=self.budget, best=float("inf"), rate=0.0)
             self.bar.start()
         return self
 
     def update(self, meter: Any) -> None:
         """Move the bar."""
         if self.bar is not None:
-            self.bar.update(self.task, completed=meter.used, best=meter.best_f)
+            # rich does not know a speed until it has seen two steps
+            rate = self.bar.tasks[0].speed or 0.0
+            self.bar.update(self.task, completed=meter.used, best=meter.best_f, rate=rate)
 
     def __exit__(self, *_: object) -> None:
         if self.bar is not None:

@@ -13,6 +13,7 @@ from armid.cli.importing import import_group
 from armid.cli.listing import list_command
 from armid.cli.simulate import simulate_command
 from armid.model import ArmidError
+from armid.registry import place_in_plugin
 
 BAD_INPUT, INTERRUPTED = 2, 130
 
@@ -55,6 +56,14 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(1)
     except OSError as error:
         stop(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}", BAD_INPUT)
+    except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            # that is how Ctrl-C comes out of a compiled function
+            stop("interrupted", INTERRUPTED)
+        place = place_in_plugin(error)
+        if place is None:
+            raise
+        stop(f"plug-in {place}, fails: {type(error).__name__}: {error}", BAD_INPUT)
     sys.exit(code if isinstance(code, int) else 0)
 
 

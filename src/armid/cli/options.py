@@ -35,8 +35,8 @@ def number(text: str, option: str) -> float:
         raise ArmidError(f"{option}: '{text}' is no number") from error
 
 
-def assignments(texts: Iterable[str], option: str) -> dict[str, str]:
-    """Return NAME -> text of options of the form NAME=TEXT.
+def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> dict[str, str]:
+    """Return NAME -> text of options of the form NAME=TEXT; `form` is how messages write it.
 
     Raises ArmidError for another form and for a name given twice.
     """
@@ -44,7 +44,7 @@ def assignments(texts: Iterable[str], option: str) -> dict[str, str]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals or not name or not value:
-            raise ArmidError(f"{option} '{text}' is not of the form NAME=VALUE")
+            raise ArmidError(f"{option} '{text}' is not of the form {form}")
         if name in found:
             raise ArmidError(f"{option}: '{name}' is given twice")
         found[name] = value
@@ -66,7 +66,8 @@ def interval(text: str, option: str) -> tuple[float, float]:
 
 def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float]]:
     """Return NAME -> (low, high)."""
-    return {name: interval(value, f"{option} {name}") for name, value in assignments(texts, option).items()}
+    found = assignments(texts, option, "NAME=LOW:HIGH")
+    return {name: interval(value, f"{option} {name}") for name, value in found.items()}
 
 
 def chosen(name: str, known: dict[str, object], what: str) -> object:

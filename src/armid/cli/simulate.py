@@ -1,13 +1,12 @@
 """`armid simulate`: what a model does in each record of a campaign."""
 
-import os
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.cli.new_files import NewFiles
 from armid.cli.options import (
     accuracy_of,
     accuracy_option,
@@ -67,17 +66,19 @@ def candidate_of(model: Model, campaign: Campaign, given: dict[str, float]) -> A
     values = []
     for name, p in model.parameters.items():
         choices = (given.get(name), campaign.parameters.get(name, Override()).fixed, p.nominal, p.null, p.fixed)
-        value = next((v for v in choices if v is not None), None)
-        if value is None:
+        known = [v for v in choices if v is not None]
+        if not known:
             raise ArmidError(f"parameter '{name}' has no nominal value: --set {name}=VALUE is expected ({p.unit})")
-        values.append(value)
+        values.append(known[0])
     return np.array(values)
 
 
 def simulated_table(record: Record, model: Model, candidate: Array, accuracy: str | None) -> dict[str, Array]:
-    """Return header -> values of one record, over its whole length."""
+    """Return header -> values of one record, over its whole length from t = 0 on."""
     parts = [simulated_piece(p, record, model, candidate, accuracy) for p in record.whole_pieces]
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    shown = table["time_s"] > -1e-3 * record.manoeuvre.interval
+    return {name: values[shown] for name, values in table.items()}
 
 
 def simulated_piece(
@@ -101,32 +102,3 @@ def simulated_piece(
     if any("output" in e.adds for e in model.effects):
         table[model.states[speed].column] = run.states[speed][0]
     return table
-
-
-class NewFiles:
-    """Write files beside a folder and move them in when all are there, so that nothing half-written is found."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def __enter__(self) -> "NewFiles":
-        if self.folder.exists() and not self.folder.is_dir():
-            raise ArmidError(f"--out {self.folder} is a file: a folder is expected")
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._beside = TemporaryDirectory(dir=self.folder, prefix=".armid-")
-        self._names: list[str] = []
-        return self
-
-    def path(self, name: str) -> Path:
-        """Return where to write a file for now."""
-        self._names.append(name)
-        path = Path(self._beside.name) / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        if kind is None:
-            for name in self._names:
-                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                os.replace(Path(self._beside.name) / name, self.folder / name)
-        self._beside.cleanup()

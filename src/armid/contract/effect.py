@@ -40,12 +40,14 @@ def documented(effect: Effect) -> Finding:
     """Tell whether every function of the effect says what it is."""
     functions = [*effect.adds.values()]
     silent = [f.__name__ for f in functions if not (f.__doc__ or "").strip()]
-    return Finding("documented", not silent, f"no docstring: {', '.join(silent)}" if silent else "every port has a docstring")
+    text = f"no docstring: {', '.join(silent)}" if silent else "every port has a docstring"
+    return Finding("documented", not silent, text)
 
 
 def values_of(model: Model, share: float, effect: Effect | None = None) -> Array:
-    """Return a candidate: nominal or mid-range values, the effect's at a share of the way from null to its upper bound."""
-    own = set() if effect is None else {f"{effect.name}.{p.name}" for p in effect.parameters if p.null is not None}
+    """Return a candidate: nominal or middle values, the effect's at a share of the way from null to the upper bound."""
+    mine = () if effect is None else effect.parameters
+    own = {f"{effect.name}.{p.name}" for p in mine if effect is not None and p.null is not None}
     return np.array([
         away(p, share) if name in own else middle(p) for name, p in model.parameters.items()
     ])  # fmt: skip
@@ -93,8 +95,8 @@ def on_arrays(effect: Effect, model: Model) -> Finding:
         value = function(**{a: np.full(5, 0.3) for a, _ in node.arguments})
         if np.shape(value) not in ((5,), ()):
             bad.append(port)
-    return Finding(f"arrays on {model.plant.name}", not bad,
-                   f"wrong shape at {', '.join(bad)}" if bad else "the plain functions keep the shape of arrays")  # fmt: skip
+    text = f"wrong shape at {', '.join(bad)}" if bad else "the plain functions keep the shape of arrays"
+    return Finding(f"arrays on {model.plant.name}", not bad, text)
 
 
 def finite(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Finding:
@@ -106,7 +108,8 @@ def finite(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Finding
     for m in manoeuvres:
         spread = probes(low, high, 16)
         failed += int(simulate(model, m, spread, calibrate(model, m, spread, spans=False).schedule).failed.sum())
-    return Finding(f"finite on {model.plant.name}", failed == 0, f"{failed} of {16 * len(manoeuvres)} candidates diverge")
+    text = f"{failed} of {16 * len(manoeuvres)} candidates diverge"
+    return Finding(f"finite on {model.plant.name}", failed == 0, text)
 
 
 def agrees(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Finding:

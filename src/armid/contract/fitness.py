@@ -19,8 +19,8 @@ def check_fitness(fitness: Fitness) -> list[Finding]:
     return [
         Finding("one value per candidate", values.shape == (4,), f"shape {values.shape} for 4 candidates"),
         Finding("finite", bool(np.isfinite(values).all()), f"values {np.array2string(values, precision=3)}"),
-        Finding("least at a perfect match", int(np.argmin(values)) == 0, f"{values[0]:.3g} at the measured series itself"),
-        Finding("a failed candidate is worst", bool(failed[-1] > values.max()), f"{failed[-1]:.3g} for a row of NaN"),
+        Finding("least at a perfect match", int(np.argmin(values)) == 0, f"{values[0]:.3g} at the measured series"),
+        Finding("a failed candidate is worst", bool(failed[-1] > values.max()), f"{failed[-1]:.3g} for a NaN row"),
         Finding("others untouched", bool(np.array_equal(failed[:-1], values)), "a failed neighbour changes nothing"),
         Finding("leaves its arguments alone", bool(np.array_equal(before, simulated)), "the arrays are as they were"),
         Finding("deterministic", bool(np.array_equal(values, again)), "a second call gives the same values"),

@@ -46,7 +46,8 @@ def run(identifier: Identifier, seed: int, holes: bool) -> tuple[Meter, Trial]:
 
 def check_identifier(identifier: Identifier) -> list[Finding]:
     """Try an identifier on a trial problem, with and without failing simulations."""
-    (meter, problem), (again, _), (holed, _) = run(identifier, 1, False), run(identifier, 1, False), run(identifier, 1, True)
+    meter, problem = run(identifier, 1, False)
+    again, holed = run(identifier, 1, False)[0], run(identifier, 1, True)[0]
     log, repeat = meter.log(), again.log()
     same = log.X.shape == repeat.X.shape and bool(np.array_equal(log.X, repeat.X) and np.array_equal(log.F, repeat.F))
     return [

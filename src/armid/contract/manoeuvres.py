@@ -8,7 +8,7 @@ N_SAMPLES, INTERVAL = 401, 2e-3
 
 
 def trial_manoeuvres(plant: Plant) -> list[Manoeuvre]:
-    """Return two manoeuvres of a plant: as declared and against it, inputs a sine and a sawtooth of the effort scale."""
+    """Return two manoeuvres of a plant: there and back; inputs are a sine and a sawtooth of the effort scale."""
     times = INTERVAL * np.arange(N_SAMPLES)
     shapes = (np.sin(9.0 * times), 2.0 * ((1.3 * times) % 1.0) - 1.0)
     return [

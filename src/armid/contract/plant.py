@@ -34,10 +34,10 @@ def check_one(plant: Plant) -> list[Finding]:
         spread = probes(low, high, 16)
         failed = int(simulate(model, m, spread, calibrate(model, m, spread, spans=False).schedule).failed.sum())
         run = simulate(model, m, x, calibrate(model, m, x[np.newaxis], FINE).schedule)
-        error = float(np.max(np.abs(run.output[0] - simulate_plainly(model, m, x))))
+        off = float(np.max(np.abs(run.output[0] - simulate_plainly(model, m, x))))
         findings += [
             Finding(f"finite, {where}, {i + 1}", failed == 0, f"{failed} of 16 candidates over the box diverge"),
-            Finding(f"compiled, {where}, {i + 1}", error <= REFERENCE_TOLERANCE * plant.scales.speed,
-                    f"the compiled plant is within {error:.2g} of its plain functions under scipy"),
+            Finding(f"compiled, {where}, {i + 1}", off <= REFERENCE_TOLERANCE * plant.scales.speed,
+                    f"the compiled plant is within {off:.2g} of its plain functions under scipy"),
         ]  # fmt: skip
     return findings

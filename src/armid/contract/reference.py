@@ -51,7 +51,8 @@ class PlainModel:
 
     def moment(self, time: float, states: Array, closed: tuple[float, ...]) -> dict[str, Any]:
         """Return what moves, by key, at one time."""
-        values: dict[str, Any] = dict(zip(self.states, states, strict=True)) | dict(zip(self.latches, closed, strict=True))
+        values: dict[str, Any] = dict(zip(self.states, states, strict=True))
+        values |= dict(zip(self.latches, closed, strict=True))
         return values | {"time": time} | {name: self.input_at(name, time) for name in self.inputs}
 
     def input_at(self, name: str, time: float) -> float:
@@ -63,7 +64,8 @@ class PlainModel:
 
     def rates(self, time: float, states: Array, closed: tuple[float, ...]) -> Array:
         """Return the time derivatives."""
-        return np.array(self.evaluate([f"rate__{s}" for s in self.states], self.moment(time, states, closed)), dtype=float)
+        keys = [f"rate__{s}" for s in self.states]
+        return np.array(self.evaluate(keys, self.moment(time, states, closed)), dtype=float)
 
     def guard(self, key: str, closed: tuple[float, ...]) -> Callable[[float, Array], float]:
         """Return a guard as a function of time and states."""

@@ -91,15 +91,16 @@ def convergence_figure(found: Identification, path: Path) -> None:
     evaluations, values = found.trace
     x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
     figure, axis = plt.subplots(figsize=(6.8, 4.2), layout="constrained")
-    axis.step(x, 1.0 - y if similarity else y, where="post", color=RESIDUAL, lw=1.8)
+    unit, factor = SHOWN[found.campaign.unit] if found.fitness.unit == "signal" else ("", 1.0)
+    shown = 1.0 - y if similarity else y * factor
+    axis.step(x, shown, where="post", color=RESIDUAL, lw=1.8)
     if not similarity and np.min(y) > 0.0:
         axis.set_yscale("log")
-    unit = f" [{found.campaign.unit}]" if found.fitness.unit == "signal" else ""
-    axis.set_ylabel("similarity degree of the best" if similarity else f"best {found.fitness.name}{unit}")
+    named = f"{found.fitness.name} [{unit}]" if unit else found.fitness.name
+    axis.set_ylabel("similarity degree of the best" if similarity else f"best {named}")
     axis.set_xlabel("simulations")
-    final = 1.0 - found.value if similarity else found.value
-    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {final:.6g}"
-    axis.set_title(text, fontsize="medium")
+    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {shown[-1]:.6g} {unit}"
+    axis.set_title(text.rstrip(), fontsize="medium")
     axis.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=130)
     plt.close(figure)

@@ -5,11 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 
 from armid.fitness import Fitness
 from armid.identifiability import Information, information_at
 from armid.identification.errors import Errors, campaign_errors
+from armid.identification.interrupt import ctrl_c_waits, is_interrupt
 from armid.identifiers import Identifier
 from armid.model import ArmidError, Model
 from armid.problem import IdentificationProblem, Meter, MeterTermination, Replay, Space, replays
@@ -18,6 +20,7 @@ from armid.record import Campaign
 Array = NDArray[np.float64]
 # A parameter this close to its bound, as a share of the range, is held by the bound and not by the records.
 AT_BOUND = 1e-4
+INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +74,12 @@ def identify(
 
     budget: simulations, one candidate through all train records counts as one. target: fitness at which to stop (the
     paper's step 7). progress: called with the meter after each generation. Holdout records are simulated once, after
-    the search.
+    the search. Ctrl-C ends the search and not the run: the best candidate so far is judged, `stopped` is "interrupted".
 
-    Raises ArmidError when nothing can be searched or every candidate diverged.
+    Raises ArmidError for a negative seed and when every candidate diverged.
     """
+    if seed < 0:
+        raise ArmidError(f"the seed is {seed}, a whole number of at least 0 is expected")
     train = replays(campaign.train, model, space, accuracy)
     meter = Meter(budget, target)
     if space.free.any():
@@ -103,11 +108,26 @@ def search(
     seed: int,
     progress: Callable[[Meter], None] | None,
 ) -> str:
-    """Run the identifier until the meter stops it or it stops itself; say which."""
+    """Run the identifier until the meter, the user or it itself stops it; say which."""
     algorithm = identifier.build(meter.budget)
-    # A given None would be called.
-    told = {"callback": lambda _: progress(meter)} if progress else {}
-    minimize(problem, algorithm, MeterTermination(meter), seed=seed, copy_algorithm=False, **told)
+    with ctrl_c_waits() as interrupted:
+
+        def after_generation(running: Algorithm) -> None:
+            if progress is not None:
+                progress(meter)
+            if interrupted():
+                running.termination.terminate()
+                running.termination.update(running)
+
+        told = {"seed": seed, "callback": after_generation, "copy_algorithm": False}
+        try:
+            minimize(problem, algorithm, MeterTermination(meter), **told)
+        except (KeyboardInterrupt, SystemError) as error:
+            if meter.best_x is None or not is_interrupt(error):
+                raise
+            return INTERRUPTED
     if meter.reached:
         return "target reached"
+    if interrupted():
+        return INTERRUPTED
     return "budget used" if meter.exhausted else f"{identifier.name} stopped by itself"

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from armid.identification.errors import Errors
+from armid.identification.errors import Errors, record_errors
 from armid.identification.identify import Identification
+from armid.problem import Replay
 
 PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 
@@ -17,13 +18,14 @@ def result_of(found: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
     names = found.information.names
     correlation = found.information.correlation
+    replays = (*found.train_replays, *found.holdout_replays)
     return {
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
         "effects": [e.name for e in found.model.effects],
         "parameters": {name: entry(found, i) for i, name in enumerate(found.space.names)},
         "error": {"train": errors(found.train), "holdout": errors(found.holdout)},
-        "error_by_record": {r.record.file: r.record.role for r in (*found.train_replays, *found.holdout_replays)},
+        "error_by_record": {r.record.file: by_record(found, r) for r in replays},
         "correlation": {
             a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)
         },
@@ -38,7 +40,7 @@ def result_of(found: Identification) -> dict[str, Any]:
         "seed": found.seed,
         "noise": {
             r.record.file: {"rms": r.record.noise.rms, "mean": r.record.noise.mean, "source": r.record.noise.source}
-            for r in (*found.train_replays, *found.holdout_replays)
+            for r in replays
         },
         "engine_error": max(r.engine_error for r in found.train_replays),
         "model": str(found.model),
@@ -47,7 +49,7 @@ def result_of(found: Identification) -> dict[str, Any]:
 
 
 def entry(found: Identification, i: int) -> dict[str, Any]:
-    """Return value, interval, bounds and flag of one parameter; a fixed one has no interval."""
+    """Return value, interval, bounds and flag of one parameter; a fixed one has neither interval nor bounds."""
     space, free = found.space, bool(found.space.free[i])
     half = found.information.half_width[found.information.names.index(space.names[i])] if free else 0.0
     value = float(found.candidate[i])
@@ -59,8 +61,12 @@ def entry(found: Identification, i: int) -> dict[str, Any]:
         "bound_low": float(space.low[i]) if free else None,
         "bound_high": float(space.high[i]) if free else None,
         "bound_active": bool(found.at_bound[i]),
-        "fixed": not free,
     }
+
+
+def by_record(found: Identification, replay: Replay) -> dict[str, Any]:
+    """Return role and errors of one record."""
+    return {"role": replay.record.role, **(errors(record_errors(replay, found.candidate)) or {})}
 
 
 def errors(found: Errors | None) -> dict[str, float | None] | None:

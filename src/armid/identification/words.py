@@ -96,6 +96,6 @@ def noise_remarks(found: Identification) -> list[str]:
         if level.from_residual:
             times = level.rms / replay.record.noise.rms if replay.record.noise.rms else np.inf
             said.append(f"{replay.record.file}: the residual is {times:.3g} times the noise, so the model lacks "
-                        "something; the intervals are widened to the residual and its correlation in time, and hold only as far "
-                        "as what is lacking averages out.")  # fmt: skip
+                        "something; the intervals are widened to the residual and its correlation in time, and hold "
+                        "only as far as what is lacking averages out.")  # fmt: skip
     return said

@@ -8,6 +8,8 @@ from armid.model.errors import ArmidError
 from armid.model.parameter import Parameter, check_name
 
 Equation = Callable[..., Any]
+# How the nodes of a composed model begin: an effect of this name could not be told from them.
+RESERVED = ("rate", "initial", "guard")
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,12 @@ class Effect:
 
     def __post_init__(self) -> None:
         check_name(self.name, "effect")
+        if self.name in RESERVED:
+            raise ArmidError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED)} are taken")
         if not self.adds:
             raise ArmidError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
         names = [p.name for p in self.parameters] + [s.name for s in self.states]
+        names += [g.name for g in self.guards]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ArmidError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")

@@ -1,10 +1,12 @@
 """Equations as text: what `print(model)` shows."""
 
 import ast
+import copy
 import inspect
-import textwrap
 
+from armid.model.definition import definition_of
 from armid.model.effect import Effect, Equation
+from armid.model.errors import ArmidError
 from armid.model.graph import Graph, Node
 from armid.model.plant import Plant
 
@@ -24,17 +26,30 @@ class Rename(ast.NodeTransformer):
         return self.generic_visit(node)
 
 
+class Insert(ast.NodeTransformer):
+    """Put expressions in the place of names."""
+
+    def __init__(self, known: dict[str, ast.expr]) -> None:
+        self.known = known
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return copy.deepcopy(self.known.get(node.id, node))
+
+
 def returned_expression(function: Equation) -> ast.expr | None:
-    """Return the expression of a function whose body is one `return`, else None."""
+    """Return the expression of a function with its earlier assignments put in; None when it branches or loops."""
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-    except (OSError, SyntaxError, TypeError):
+        body = definition_of(function).body
+    except ArmidError:
         return None
-    definition = tree.body[0]
-    if not isinstance(definition, ast.FunctionDef):
-        return None
-    body = [s for s in definition.body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
-    return body[0].value if len(body) == 1 and isinstance(body[0], ast.Return) else None
+    known: dict[str, ast.expr] = {}
+    for statement in body:
+        if isinstance(statement, ast.Return) and statement.value is not None:
+            return Insert(known).visit(statement.value)  # type: ignore[no-any-return]
+        if not (isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name)):
+            return None
+        known[statement.targets[0].id] = Insert(known).visit(statement.value)
+    return None
 
 
 def shown(key: str) -> str:
@@ -67,7 +82,8 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
         f"    {shown(n.key.removeprefix('initial__'))} = {right_hand_side(n).replace('initial.', '')}"
         for n in graph.of_kind("initial")
     ]
-    latches = {g.name for g in plant.guards if g.latch} | {f"{e.name}__{g.name}" for e in effects for g in e.guards if g.latch}
+    latches = {g.name for g in plant.guards if g.latch}
+    latches |= {f"{e.name}__{g.name}" for e in effects for g in e.guards if g.latch}
     for guard in guards:
         name = guard.key.removeprefix("guard__")
         what = "switches once to 1 when" if name in latches else "kink where"

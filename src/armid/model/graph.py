@@ -131,8 +131,9 @@ def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:
     graph.order(n.key for n in graph.nodes.values())
     for node in graph.of_kind("initial"):
         if not all(graph.is_static(k) or graph.nodes[k].kind == "initial" for k in node.needs):
-            raise ArmidError(f"the initial value of '{node.key.removeprefix('initial__').replace('__', '.')}' "
-                             "depends on what moves: parameters, constants and initial states are expected")  # fmt: skip
+            state = node.key.removeprefix("initial__").replace("__", ".")
+            raise ArmidError(f"the initial value of '{state}' depends on what moves: parameters, constants and initial "
+                             "states are expected")  # fmt: skip
     return graph
 
 

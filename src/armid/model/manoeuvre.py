@@ -26,7 +26,7 @@ class Manoeuvre:
 
     def times(self) -> NDArray[np.float64]:
         """Return the sample times [s], shape (n_samples,)."""
-        return self.start_time + self.interval * np.arange(self.n_samples)
+        return self.start_time + self.interval * np.arange(self.n_samples, dtype=np.float64)
 
     def shortened(self, n_samples: int) -> "Manoeuvre":
         """Return the manoeuvre cut after its first samples."""

@@ -9,9 +9,11 @@ from armid.model.errors import ArmidError
 def check_name(name: str, what: str) -> None:
     """Refuse a name that equations could not use.
 
-    Raises ArmidError for a name that is not a plain Python identifier.
+    Raises ArmidError for a name that is not a plain Python identifier, and for `time`, which is the time.
     """
-    if not name.isidentifier() or keyword.iskeyword(name) or "__" in name:
+    if name == "time":
+        raise ArmidError(f"{what} 'time' cannot have this name: in the equations, time is the time [s]")
+    if not name.isidentifier() or keyword.iskeyword(name) or "__" in name or name != name.strip("_"):
         raise ArmidError(f"{what} '{name}' is no usable name: letters, digits and single underscores are expected")
 
 
@@ -20,8 +22,8 @@ class Parameter:
     """Declare one unknown.
 
     name: as the equations spell it.
-    unit: a physical unit, or a product of the plant's scales `effort`, `speed`, `inertia` (effort over speed, times 1 s) such as
-        `effort/speed`; then `low`, `high`, `null`, `fixed` and `nominal` are multiples of that scale.
+    unit: a physical unit, or a product of the plant's scales `effort`, `speed`, `inertia` (effort over speed, times
+        1 s) such as `effort/speed`; then `low`, `high`, `null`, `fixed` and `nominal` are multiples of that scale.
     low, high: bounds of the search, SI (or multiples of the scale).
     null: the value at which an effect vanishes (None for a parameter of a plant or of an effect's shape).
     fixed: the value at which it stays unless someone frees it (None: it is free).

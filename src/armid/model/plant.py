@@ -89,15 +89,24 @@ class Plant:
 
     def __post_init__(self) -> None:
         check_name(self.name, "plant")
-        declared = [
-            *(p.name for p in self.parameters), *(s.name for s in self.states), *(c.name for c in self.constants),
-            *(i.name for i in self.inputs), *self.quantities, *self.ports, *(g.name for g in self.guards if g.latch),
-        ]  # fmt: skip
-        twice = sorted({n for n in declared if declared.count(n) > 1})
+        for name in (*self.quantities, *self.ports, *self.aliases):
+            check_name(name, "quantity, port or alias")
+        twice = sorted({n for n in self.declared if self.declared.count(n) > 1})
         if twice:
             raise ArmidError(f"plant '{self.name}' declares '{twice[0]}' twice: each name once is expected")
-        if self.output not in declared:
-            raise ArmidError(f"plant '{self.name}' records '{self.output}': {nearest(self.output, declared)}")
+        uses = [("records", self.output), *((f"has the alias '{a}' for", n) for a, n in self.aliases.items())]
+        for use, name in uses:
+            if name not in self.declared:
+                raise ArmidError(f"plant '{self.name}' {use} '{name}': {nearest(name, self.declared)}")
+
+    @property
+    def declared(self) -> list[str]:
+        """Every name that the equations may use."""
+        return [
+            *(p.name for p in self.parameters), *(s.name for s in self.states), *(c.name for c in self.constants),
+            *(i.name for i in self.inputs), *self.quantities, *self.ports, *(g.name for g in self.guards if g.latch),
+            *self.aliases,
+        ]  # fmt: skip
 
     def for_unit(self, unit: str) -> "Plant":
         """Return the sibling whose recorded signal has the unit.

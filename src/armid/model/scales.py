@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from typing import Any
 
 from armid.model.errors import ArmidError, nearest
 from armid.model.parameter import Parameter
@@ -70,5 +71,5 @@ def resolve(parameter: Parameter, scales: Scales) -> Parameter:
     for word, power in powers.items():
         size *= sizes.get(word, 1.0) ** power
     values = {name: getattr(parameter, name) for name in ("low", "high", "null", "fixed", "nominal")}
-    scaled = {name: None if value is None else value * size for name, value in values.items()}
+    scaled: dict[str, Any] = {name: None if value is None else value * size for name, value in values.items()}
     return replace(parameter, unit=physical_unit(powers, scales), **scaled)

@@ -16,6 +16,8 @@ ALLOWED = {STANDARD: 5e-6, FINE: 1e-7}
 LASTING, PASSING = 1.5e-8, 0.1
 SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 MARGIN = 0.5
+# How many candidates must still be before their switch for a long step to count as tried.
+N_WITNESSES = 8
 N_PROBES = 48
 
 
@@ -54,11 +56,14 @@ def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:
     return float(np.max(np.abs(a.output[good] - b.output[good])[after], initial=0.0))
 
 
-def calibrate(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str = STANDARD) -> Calibration:
+def calibrate(
+    model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str = STANDARD, spans: bool = True
+) -> Calibration:
     """Choose the coarsest schedule whose error on the candidates stays within half of what is allowed.
 
     The error of n steps between samples is estimated from the difference to 2n steps: fourth order, 16/15 of it.
-    candidates: shape (n_candidates, n_parameters), usually `probes` of the bounds.
+    candidates: shape (n_candidates, n_parameters), usually `probes` of the bounds. spans: look for steps over several
+    samples too, which pays when many populations follow.
 
     Raises ArmidError for an unknown accuracy.
     """
@@ -76,7 +81,8 @@ def calibrate(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: s
         if error <= MARGIN * allowed:
             break
     schedule = Schedule(n, weights=switch_weights(candidates, run(n)))
-    schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
+    if spans:
+        schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
     return Calibration(schedule, error, bool(error <= allowed))
 
 
@@ -97,14 +103,17 @@ def switch_weights(candidates: Array, run: Simulation) -> Array | None:
 def long_steps(
     model: Model, manoeuvre: Manoeuvre, candidates: Array, schedule: Schedule, run: Simulation, allowed: float
 ) -> NDArray[np.int64] | None:
-    """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may."""
+    """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may.
+
+    Where next to all candidates have switched, nothing can be tried: the steps stay as they are.
+    """
     if not model.latches or model.plant.inputs or manoeuvre.n_samples < 2 * LONGEST:
         return None
     lasting = LASTING * model.plant.scales.speed
     plan = np.ones(manoeuvre.n_samples - 1, dtype=np.int64)
-    start, last = 0, manoeuvre.n_samples - 1
+    start, last = 0, witnessed(run, manoeuvre)
     for span in (2, 4, 8):
-        for first in range(start + 10 - start % 10, last, 10 if start < 200 else 40):
+        for first in range(start + 10 - start % 10, last - span, 10 if start < 200 else 40):
             longer = plan.copy()
             longer[first:] = span
             tried = simulate(model, manoeuvre, candidates, replace(schedule, plan=longer))
@@ -115,3 +124,10 @@ def long_steps(
         else:
             break
     return plan if plan.max() > 1 else None
+
+
+def witnessed(run: Simulation, manoeuvre: Manoeuvre) -> int:
+    """Return the last sample at which enough candidates are still before their first switch."""
+    switched = np.min(list(run.switch_times.values()), axis=0) - manoeuvre.start_time
+    samples = np.where(np.isfinite(switched), switched / manoeuvre.interval, manoeuvre.n_samples - 1)
+    return int(np.sort(samples)[-min(N_WITNESSES, len(samples))])

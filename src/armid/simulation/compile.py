@@ -16,12 +16,15 @@ import numba
 import numpy as np
 
 from armid.model import ArmidError, Model
-from armid.simulation import lane_math, lane_numpy, lanes
+from armid.simulation import lane_math, lane_numpy
 from armid.simulation.generate import generate_module
+from armid.simulation.lanes import bits, functions, memory, operators, vector
+from armid.simulation.loading import load_lightly
 
-
+COMPILED_FROM = (bits, functions, memory, operators, vector, lane_math, lane_numpy)
 # One register of AVX-512, two of AVX2. Measured on the arm: 16 lanes are slower, because their values no longer fit.
 LANE_WIDTH = 8
+Kernel = Callable[..., Any]
 
 
 def cache_folder() -> Path:
@@ -36,7 +39,7 @@ def cache_folder() -> Path:
 def module_name(text: str) -> str:
     """Return a name that changes with the text and with everything it is compiled from."""
     digest = hashlib.sha256(text.encode())
-    for module in (lanes, lane_math, lane_numpy):
+    for module in COMPILED_FROM:
         digest.update(Path(str(module.__file__)).read_bytes())
     for version in (numba.__version__, llvmlite.__version__, np.__version__, sys.version):
         digest.update(version.encode())
@@ -65,21 +68,23 @@ def load_module(text: str) -> ModuleType:
         raise ArmidError(f"the cache folder {folder} cannot be written ({error.strerror}): set ARMID_CACHE to a "
                          "folder that can") from error  # fmt: skip
     spec = importlib.util.spec_from_file_location(name, folder / f"{name}.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
 
-KERNELS: WeakKeyDictionary[Model, tuple[Callable[..., Any], int]] = WeakKeyDictionary()
+KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
 
 
-def compile_model(model: Model) -> tuple[Callable[..., Any], int]:
-    """Return the compiled `simulate` of a model and its lane width; the same model is looked up, not made again.
+def compile_model(model: Model) -> tuple[Kernel, int]:
+    """Return `simulate` of a model, compiled at its first call, and its lane width; a known model is looked up.
 
-    Raises ArmidError when an equation cannot be compiled, naming it.
+    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
     """
     if model not in KERNELS:
-        KERNELS[model] = (load_module(generate_module(model, LANE_WIDTH)).simulate, LANE_WIDTH)
+        kernel = load_module(generate_module(model, LANE_WIDTH)).simulate
+        KERNELS[model] = (load_lightly(kernel), LANE_WIDTH)
     return KERNELS[model]

@@ -6,9 +6,12 @@ changes its sign inside a step, the step is cut there: a quadratic through the g
 not depend on its neighbours.
 """
 
+import ast
+from collections.abc import Iterable
+
 from armid.model import Model
-from armid.simulation.source import SourceText
-from armid.simulation.template import module_text
+from armid.simulation.source import SourceText, local_name
+from armid.simulation.template import Parts, module_text
 
 INDENT = "    "
 
@@ -24,39 +27,39 @@ def variable(key: str) -> str:
 
 
 class Emitter:
-    """Write the parts of one model's module; public lists hold local names, private ones keys of the graph."""
+    """Write the parts of one model's module; `parts` holds local names, private lists hold keys of the graph."""
 
     def __init__(self, model: Model) -> None:
         self.model, self.graph = model, model.graph
         self.sources = SourceText()
         self.called: set[str] = set()
-        self.states = [variable(k) for k in model.states]
-        self.latches = [variable(k) for k in model.latches]
-        self.inputs = [variable(i.name) for i in model.plant.inputs]
-        self.parameters = [variable(k) for k in model.parameters]
-        self.constants = [variable(k) for k in model.constants]
-        keys = [k.replace(".", "__") for k in model.states]
-        latch_keys = [k.replace(".", "__") for k in model.latches]
-        self._rates, self._initials = [f"rate__{k}" for k in keys], [f"initial__{k}" for k in keys]
-        kinks = [n.key for n in self.graph.of_kind("guard") if n.key.removeprefix("guard__") not in latch_keys]
-        self._guards = [*(f"guard__{k}" for k in latch_keys), *kinks]
-        self.latch_guards = [variable(k) for k in self._guards[: len(latch_keys)]]
-        self.guards = [variable(k) for k in kinks]
+        states, latches = ([k.replace(".", "__") for k in keys] for keys in (model.states, model.latches))
+        self._rates, self._initials = [f"rate__{k}" for k in states], [f"initial__{k}" for k in states]
+        self._latch_guards = [f"guard__{k}" for k in latches]
+        self._kinks = [n.key for n in self.graph.of_kind("guard") if n.key not in self._latch_guards]
+        self._guards = [*self._latch_guards, *self._kinks]
         self._output = model.plant.output
         self._fixed = self._fixed_keys([*self._rates, *self._guards, self._output])
-        self.fixed = [variable(k) for k in self._fixed]
+        self.parts = self._parts()
 
-    @property
-    def guards_use_inputs(self) -> bool:
-        """Tell whether a guard may jump with an input, or with time, at a sample."""
-        return self._uses(self._guards, [i.name for i in self.model.plant.inputs])
+    def _parts(self) -> Parts:
+        """Return the local names."""
+        inputs = [i.name for i in self.model.plant.inputs]
+        lists: dict[str, Iterable[str]] = {
+            "parameters": self.model.parameters, "constants": self.model.constants, "fixed": self._fixed,
+            "states": self.model.states, "inputs": inputs, "latches": self.model.latches,
+            "latch_guards": self._latch_guards, "guards": self._kinks,
+        }  # fmt: skip
+        names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
+        # Only an input may jump at a sample: a guard that depends on it is then evaluated anew.
+        return Parts(**names, guards_use_inputs=self._uses(self._guards, inputs))
 
     def _uses(self, keys: list[str], wanted: list[str]) -> bool:
         return any(k in wanted or self._uses(list(self.graph.nodes[k].needs), wanted) for k in keys)
 
     def _fixed_keys(self, moving: list[str]) -> list[str]:
-        """Keys that do not move, which the moving equations use."""
-        needed = {k for n in self.graph.order(moving) if not self.graph.is_static(n.key) for k in n.needs}
+        """Keys that do not move, which the moving equations use, or which stand where something may move."""
+        needed = {k for n in self.graph.order(moving) if not self.graph.is_static(n.key) for k in n.needs} | {*moving}
         return [k for k in self.graph.nodes if k in needed and self.graph.is_static(k) and self._valued(k)]
 
     def _valued(self, key: str) -> bool:
@@ -76,9 +79,9 @@ class Emitter:
         assert node.function is not None
         name = f"f__{key}"
         self.called.add(name)
-        if name not in self.sources.texts:
+        if name not in self.sources.definitions:
             self.sources.add(name, node.function)
-        return f"{name}({', '.join(f'{argument}={variable(bound)}' for argument, bound in node.arguments)})"
+        return f"{name}({', '.join(f'{local_name(argument)}={variable(bound)}' for argument, bound in node.arguments)})"
 
     def function(self, name: str, arguments: list[str], lines: list[str], result: list[str]) -> str:
         """Return a compiled function that evaluates lines and returns a tuple."""
@@ -87,35 +90,36 @@ class Emitter:
 
     def equations(self) -> str:
         """Return every function that evaluates the composed equations."""
-        moving = [variable("time"), *self.latches, *self.states, *self.inputs, *self.fixed]
-        given = [*self.parameters, *self.constants]
+        parts = self.parts
+        moving = [variable("time"), *parts.latches, *parts.states, *parts.inputs, *parts.fixed]
+        given = [*parts.parameters, *parts.constants]
         starts, rates, guards = ([variable(k) for k in keys] for keys in (self._initials, self._rates, self._guards))
-        parts = [
-            self.function("fixed_values", given, self.assignments(self._fixed, True), [f"1.0 * {k}" for k in self.fixed]),
+        fixed = [f"1.0 * {k}" for k in parts.fixed]
+        texts = [
+            self.function("fixed_values", given, self.assignments(self._fixed, True), fixed),
             self.function("start_values", given, self.assignments(self._initials, True), starts),
             self.function("rates", moving, self.assignments(self._rates, False), rates),
             self.function("guards", moving, self.assignments(self._guards, False), guards),
             self.function("recorded", moving, self.assignments([self._output], False), [variable(self._output)]),
         ]
-        return self.function_texts() + "\n\n".join(parts)
+        return self.function_texts() + "\n\n".join(texts)
 
     def function_texts(self) -> str:
         """Return the plain functions of plant and effects, those with control flow wrapped lane by lane."""
         texts = []
-        for name, text in self.sources.texts.items():
+        for name, definition in self.sources.definitions.items():
             if name in self.sources.by_lane & self.called:
-                texts.append(by_lane(name, text))
+                texts.append(by_lane(name, definition))
             else:
-                texts.append(f"@compiled\n{text}\n")
+                texts.append(f"@compiled\n{ast.unparse(definition)}\n")
         return "\n\n".join(texts) + "\n\n\n"
 
 
-def by_lane(name: str, text: str) -> str:
+def by_lane(name: str, definition: ast.FunctionDef) -> str:
     """Return a function with control flow, called once for each lane."""
-    arguments = text[text.index("(") + 1 : text.index(")")]
-    names = [a.split("=")[0].strip() for a in arguments.split(",") if a.strip()]
-    lanes = ", ".join(f"lane({a}, i)" for a in names)
-    scalar = text.replace(f"def {name}(", f"def {name}__scalar(", 1)
+    arguments = ast.unparse(definition.args)
+    lanes = ", ".join(f"lane({a.arg}, i)" for a in definition.args.args)
+    scalar = ast.unparse(definition).replace(f"def {name}(", f"def {name}__scalar(", 1)
     return (
         f"@compiled\n{scalar}\n\n@compiled\ndef {name}({arguments}):\n"
         f"    result = splat(0.0)\n    for i in range(WIDTH):\n"
@@ -127,4 +131,4 @@ def generate_module(model: Model, width: int) -> str:
     """Return the self-contained text of the module that simulates a model, `width` candidates side by side."""
     emitter = Emitter(model)
     equations = emitter.equations()
-    return module_text(emitter, equations, width)
+    return module_text(emitter.parts, equations, width)

@@ -17,6 +17,7 @@ from armid.simulation.lanes import (
     fused,
     lane,
     mantissa_of,
+    n_lanes,
     nearest,
     select,
     two_to_the,
@@ -26,14 +27,17 @@ from armid.simulation.lanes import (
 compiled = numba.njit(error_model="numpy")
 
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
-# pi in three parts whose products with a few thousand half-turns are exact.
-PI_A, PI_B, PI_C = 3.14159265160560607910, 1.98418715485759733e-09, 1.14423774522196636802e-17
+SMALLEST, LARGEST = 2.2250738585072014e-308, 1.7976931348623157e308
+# Angles beyond are reduced one by one.
+FAR = 1e5
+# pi in three parts: k PI_A is taken off x with one rounding, which is none, and PI_B and PI_C are what PI_A lacks.
+PI_A, PI_B, PI_C = 3.141592653589793, 1.2246467991473532e-16, -2.9947698097183397e-33
 
 
 @compiled
-def lanes_exp(x):  # type: ignore[no-untyped-def]
-    """Return e**x: x = k ln 2 + r, Taylor series of r, times 2**k."""
-    bounded = select(x, 709.0, 709.0, select(-x, 708.0, -708.0, x))
+def lanes_exp(x):
+    """Return e**x: x = k ln 2 + r, Taylor series of r, times 2**k; 0 below the normal numbers."""
+    bounded = select(x, 709.79, 709.79, select(-x, 708.0, -708.0, x))
     k = nearest(bounded * 1.4426950408889634)
     r = fused(k, -LN2_LOW, fused(k, -LN2_HIGH, bounded))
     p = r * 1.6059043836821613e-10 + 2.08767569878681e-09
@@ -48,13 +52,13 @@ def lanes_exp(x):  # type: ignore[no-untyped-def]
     p = p * r + 0.16666666666666666
     p = p * r + 0.5
     p = (p * r + 1.0) * r + 1.0
-    result = p * two_to_the(k)
-    return select(x, 709.0, select(x, 709.78, np.inf, result * (1.0 + (x - 709.0))), select(-x, 708.0, 0.0, result))
+    result = p * two_to_the(k - 1.0) * 2.0
+    return select(x, 709.782712893384, np.inf, select(-x, 708.0, 0.0, result))
 
 
 @compiled
-def lanes_log(x):  # type: ignore[no-untyped-def]
-    """Return the natural logarithm: x = m 2**e, series of (m - 1)/(m + 1)."""
+def lanes_log(x):
+    """Return the natural logarithm: x = m 2**e, series of (m - 1)/(m + 1); -inf below the normal numbers."""
     m, e = mantissa_of(x), exponent_of(x)
     large = select(m, 1.4142135623730951, 1.0, 0.0)
     m = m * (1.0 - 0.5 * large)
@@ -72,11 +76,11 @@ def lanes_log(x):  # type: ignore[no-untyped-def]
     p = p * s + 0.6666666666666666
     result = fused(e, LN2_HIGH, fused(f, 2.0, fused(f * s, p, e * LN2_LOW)))
     below = select(-x, 0.0, np.nan, select(x, -1.0, -np.inf, x))
-    return select(x, 1.7e308, x, select(x, 0.0, result, below))
+    return select(x, LARGEST, x, select(x, SMALLEST, result, below))
 
 
 @compiled
-def sine_of_reduced(r):  # type: ignore[no-untyped-def]
+def sine_of_reduced(r):
     """Return sin r for abs(r) <= pi/2 (Taylor)."""
     s = r * r
     p = s * 1.9572941063391263e-20 - 8.22063524662433e-18
@@ -92,30 +96,54 @@ def sine_of_reduced(r):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def alternate(k):  # type: ignore[no-untyped-def]
+def alternate(k):
     """Return +1 for even and -1 for odd whole k."""
     return 1.0 - 2.0 * (k - 2.0 * floor_of(k * 0.5))
 
 
 @compiled
-def lanes_sin(x):  # type: ignore[no-untyped-def]
-    """Return sin x, x reduced by multiples of pi."""
-    k = nearest(x * 0.3183098861837907)
-    r = fused(k, -PI_C, fused(k, -PI_B, fused(k, -PI_A, x)))
-    return alternate(k) * sine_of_reduced(r)
+def sines_of_far(x, result):
+    """Return the result with the sine of every angle beyond FAR put in."""
+    for i in range(n_lanes(x)):
+        if abs(lane(x, i)) > FAR:
+            result = with_lane(result, i, math.sin(lane(x, i)))
+    return result
 
 
 @compiled
-def lanes_cos(x):  # type: ignore[no-untyped-def]
+def cosines_of_far(x, result):
+    """Return the result with the cosine of every angle beyond FAR put in."""
+    for i in range(n_lanes(x)):
+        if abs(lane(x, i)) > FAR:
+            result = with_lane(result, i, math.cos(lane(x, i)))
+    return result
+
+
+@compiled
+def lanes_sin(x):
+    """Return sin x, x reduced by multiples of pi."""
+    k = nearest(x * 0.3183098861837907)
+    r = fused(k, -PI_C, fused(k, -PI_B, fused(k, -PI_A, x)))
+    result = alternate(k) * sine_of_reduced(r)
+    if any_above(fabs(x), FAR):
+        result = sines_of_far(x, result)
+    return result
+
+
+@compiled
+def lanes_cos(x):
     """Return cos x as the sine of an argument shifted by pi/2."""
     k = nearest(x * 0.3183098861837907 - 0.5)
     half = k + 0.5
     r = fused(half, -PI_C, fused(half, -PI_B, fused(half, -PI_A, x)))
-    return -alternate(k) * sine_of_reduced(r)
+    result = -alternate(k) * sine_of_reduced(r)
+    if any_above(fabs(x), FAR):
+        result = cosines_of_far(x, result)
+    return result
 
 
 @compiled
-def lanes_arctan(x):  # type: ignore[no-untyped-def]
+def lanes_arctan(x):
     """Return arctan x (rational form of the Cephes library after two reductions)."""
     t = fabs(x)
     # A zero denominator in the branch not taken must not raise a NaN in the branch taken, and does not: select.
@@ -136,7 +164,7 @@ def lanes_arctan(x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def lanes_tanh(x):  # type: ignore[no-untyped-def]
+def lanes_tanh(x):
     """Return tanh x from e**(-2 abs(x)); a series near 0 keeps the relative accuracy."""
     t = lanes_exp(-2.0 * fabs(x))
     far = (1.0 - t) / (1.0 + t)
@@ -147,17 +175,17 @@ def lanes_tanh(x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def lanes_sign(x):  # type: ignore[no-untyped-def]
+def lanes_sign(x):
     """Return -1, 0 or 1; NaN stays NaN."""
     return select(x, 0.0, 1.0, select(-x, 0.0, -1.0, x * 0.0))
 
 
 @compiled
-def lanes_power(a, b, width):  # type: ignore[no-untyped-def]
-    """Return a**b: exp(b log a) where a > 0, the scalar function in the other lanes."""
+def lanes_power(a, b):
+    """Return a**b: exp(b log a) where a > 0 and that is a number, the scalar function in the other lanes."""
     result = lanes_exp(b * lanes_log(a))
-    if any_above(0.5 - select(a, 0.0, 1.0, 0.0), 0.0):
-        for i in range(width):
-            if not lane(a, i) > 0.0:
+    if any_above(select(a, SMALLEST, result != result, 1.0), 0.5):
+        for i in range(n_lanes(result)):
+            if not (lane(a, i) > SMALLEST and lane(result, i) == lane(result, i)):
                 result = with_lane(result, i, math.pow(lane(a, i), lane(b, i)))
     return result

@@ -2,16 +2,21 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armid.model import ArmidError, Manoeuvre, Model
-from armid.simulation.compile import compile_model
+from armid.simulation.compile import Kernel, compile_model
+from armid.simulation.refusal import UNCOMPILABLE, refusal
 
 Array = NDArray[np.float64]
 DIVERGED = 1e3
 LONGEST = 8
+# Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
+SHARES = 8
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,24 @@ def arranged(candidates: Array, width: int, weights: Array | None) -> tuple[Arra
     return rows, places
 
 
+def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_groups: int, threads: int) -> None:
+    """Fill the results group by group; threads take neighbouring groups.
+
+    Raises ArmidError when an equation cannot be compiled, which shows at the first call.
+    """
+    edges = np.linspace(0, n_groups, min(SHARES * threads, n_groups) + 1).astype(int)
+    try:
+        if threads < 2 or n_groups < 2:
+            kernel(*given, 0, n_groups, *results)
+            return
+        with ThreadPoolExecutor(threads) as pool:
+            parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in pairwise(edges)]
+            for part in parts:
+                part.result()
+    except UNCOMPILABLE as error:
+        raise refusal(error) from error
+
+
 def simulate(
     model: Model, manoeuvre: Manoeuvre, population: ArrayLike, schedule: Schedule = Schedule(), threads: int = 1,
     states: bool = False,
@@ -102,7 +125,7 @@ def simulate(
     schedule: how finely time is cut; threads: candidates are shared among so many threads, the result is the same bit
     for bit; states: keep the states too (then no step spans several samples).
 
-    Raises ArmidError for a wrong shape, an unknown constant or a missing input.
+    Raises ArmidError for a wrong shape, an unknown constant, a missing input, and an equation that cannot be compiled.
     """
     candidates = as_population(model, population)
     kernel, width = compile_model(model)
@@ -119,16 +142,7 @@ def simulate(
         float(manoeuvre.start_time), DIVERGED * model.plant.scales.speed,
         places,
     )  # fmt: skip
-    results = (output, switches.ravel(), trace)
-    n_groups = rows.shape[1] // width
-    if threads < 2 or n_groups < 2:
-        kernel(*given, 0, n_groups, *results)
-    else:
-        edges = np.linspace(0, n_groups, min(threads, n_groups) + 1).astype(int)
-        with ThreadPoolExecutor(len(edges) - 1) as pool:
-            parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in zip(edges, edges[1:], strict=False)]
-            for part in parts:
-                part.result()
+    run(kernel, given, (output, switches.ravel(), trace), rows.shape[1] // width, threads)
     kept = dict(zip(model.states, trace, strict=True)) if states else {}
     inverse = np.argsort(places[:n], kind="stable")
     times = {name: row[inverse] for name, row in zip(model.latches, switches, strict=True)}

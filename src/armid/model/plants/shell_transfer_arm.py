@@ -220,7 +220,7 @@ shell_transfer_arm = Plant(
             piston_moment, balance_torque, direction, damping, demand, voltage, field_flux, back_emf, motor_torque,
             drive_ratio, drive_effort, recorded_speed,
         )
-    },  # fmt: skip
+    },
     constants=(
         Constant("I01", 2.0e-3, "kg m2", ESTIMATE), Constant("I23", 4.0e-3, "kg m2", ESTIMATE),
         Constant("I45", 1.2e-2, "kg m2", ESTIMATE), Constant("I6_loaded", 64.0, "kg m2", ESTIMATE),
@@ -261,4 +261,4 @@ shell_transfer_arm = Plant(
     output="recorded_speed",
     output_unit="rad/s",
     scales=Scales(effort=1000.0, speed=2.0, effort_unit="N m", length_unit="rad"),
-)  # fmt: skip
+)
