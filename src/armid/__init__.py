@@ -21,6 +21,7 @@ WHERE = {
     "armid.registry": ("Registry", "load_registry"),
 }  # fmt: skip
 HOME = {name: module for module, names in WHERE.items() for name in names}
+__all__ = sorted(HOME)  # noqa: PLE0605 - the names stand above
 
 
 def __getattr__(name: str) -> Any:

@@ -62,7 +62,7 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     for kind in KINDS:
         for point in installed.select(group=f"armid.{kind}"):
             thing = loaded(point, kind)
-            registry.add(kind, thing.name if kind in ("plants", "effects") else point.name, thing)
+            registry.add(kind, name_of(thing, point.name), thing)
     for plugin in plugins:
         kind, name, thing = load_plugin(plugin)
         registry.add(kind, name, thing)
@@ -101,8 +101,7 @@ def load_plugin(plugin: str) -> tuple[str, str, Any]:
         names = [n for n in vars(module) if not n.startswith("_")]
         raise ArmidError(f"plug-in '{plugin}': {file.name} has no '{attribute}', {nearest(attribute, names)}")
     thing = getattr(module, attribute)
-    kind = kind_of(thing, f"plug-in '{plugin}'")
-    return kind, getattr(thing, "name", attribute) if kind in ("plants", "effects") else attribute, thing
+    return kind_of(thing, f"plug-in '{plugin}'"), name_of(thing, attribute), thing
 
 
 def load_file(file: Path) -> Any:
@@ -126,6 +125,12 @@ def load_file(file: Path) -> Any:
             raise
         raise ArmidError(f"plug-in {file} fails when it is read: {type(error).__name__}: {error}") from error
     return module
+
+
+def name_of(thing: Any, found_under: str) -> str:
+    """Return the name that an object declares, else (a function, a class) the one that it was found under."""
+    name = None if inspect.isclass(thing) else getattr(thing, "name", None)
+    return name if isinstance(name, str) else found_under
 
 
 def place_in_plugin(error: BaseException) -> str | None:

@@ -70,7 +70,17 @@ def remarks(found: Identification) -> list[str]:
     said += [f"{name} is not determined by these records." for name in lost]
     if found.n_failed:
         said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
-    return said + noise_remarks(found)
+    return said + engine_remarks(found) + noise_remarks(found)
+
+
+def engine_remarks(found: Identification) -> list[str]:
+    """Return a sentence for each record on which the engine is less accurate than it promises."""
+    name = SHOWN[found.campaign.unit][0]
+    return [
+        f"{r.record.file}: the engine is off by up to {shown(r.engine_error, found.campaign.unit)[0]:.2g} {name} even at "
+        "its finest steps: the equations are stiff there, or switch somewhere without a guard."
+        for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)
+    ]  # fmt: skip
 
 
 def bound_remark(name: str) -> str:

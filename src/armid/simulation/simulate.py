@@ -24,7 +24,8 @@ class Schedule:
     """Say how finely time is cut; the result of a candidate depends on it, never on the other candidates.
 
     substeps: integration steps between samples.
-    refinement: times finer for `fresh_samples` samples from a one-way switch on, where the motion is fastest.
+    refinement: times finer for `fresh_samples` samples from a one-way switch on, where the motion is fastest; what is
+        refined follows the switch without a jump.
     plan: for each sample, how many sample intervals one step may span while no switch has happened (at most 8), shape
         (n_samples - 1,); None: one.
     weights: weights of the parameters in the expected time of the switch, shape (n_parameters,); candidates that switch
@@ -32,8 +33,8 @@ class Schedule:
     """
 
     substeps: int = 1
-    refinement: int = 4
-    fresh_samples: int = 4
+    refinement: int = 8
+    fresh_samples: int = 8
     plan: NDArray[np.int64] | None = None
     weights: Array | None = None
 
