@@ -1,5 +1,6 @@
 """`armid simulate`: what a model does in each record of a campaign."""
 
+import warnings
 from pathlib import Path
 
 import click
@@ -91,6 +92,9 @@ def simulated_piece(
     run = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
     if run.failed[0]:
         raise ArmidError(f"record '{record.file}': the simulation diverges with these parameters")
+    if not calibration.reached:
+        off = f"the engine is off by up to {calibration.error:.2g} {model.plant.output_unit} even at its finest steps"
+        warnings.warn(f"{record.file}: {off}: with these parameters the equations are stiff", stacklevel=2)
     speed = model.plant.aliases.get("omega", "omega")
     table = {"time_s": piece.manoeuvre.times()}
     for name, state in model.states.items():

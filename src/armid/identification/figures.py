@@ -1,6 +1,7 @@
 """Figures of one identification: the fit (as the paper's Fig. 10) and the convergence (as Fig. 11)."""
 
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from armid.problem import Replay
 # Okabe-Ito: told apart by colour-blind readers.
 MEASURED, SIMULATED, RESIDUAL = "#000000", "#D55E00", "#0072B2"
 MOST_RECORDS = 8
+# Letters of a title that fit above one column.
+LINE = 60
 
 
 def style() -> Any:
@@ -43,8 +46,9 @@ def fit_figure(found: Identification, path: Path) -> None:
     for unused in axes.T.reshape(columns, rows, 2).transpose(1, 0, 2).reshape(-1, 2)[len(shown) :]:
         for axis in unused:
             axis.set_visible(False)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False)
-    figure.suptitle(title(found, len(shown), len(replays)), fontsize="large", x=0.02, ha="left")
+    figure.align_ylabels()
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+    figure.suptitle(fill(title(found, len(shown), len(replays)), LINE * columns), fontsize="large")
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
@@ -95,7 +99,7 @@ def convergence_figure(found: Identification, path: Path) -> None:
     shown = 1.0 - y if similarity else y * factor
     axis.step(x, shown, where="post", color=RESIDUAL, lw=1.8)
     if not similarity and np.min(y) > 0.0:
-        axis.set_yscale("log")
+        set_log_scale(axis)
     named = f"{found.fitness.name} [{unit}]" if unit else found.fitness.name
     axis.set_ylabel("similarity degree of the best" if similarity else f"best {named}")
     axis.set_xlabel("simulations")
@@ -104,3 +108,13 @@ def convergence_figure(found: Identification, path: Path) -> None:
     axis.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=130)
     plt.close(figure)
+
+
+def set_log_scale(axis: Any) -> None:
+    """Make the upright axis logarithmic with plain numbers at 1, 2, 5."""
+    from matplotlib.ticker import LogLocator, StrMethodFormatter  # noqa: PLC0415 - takes time to import
+
+    axis.set_yscale("log")
+    axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+    axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))

@@ -4,9 +4,11 @@ import numpy as np
 from rich.table import Table
 
 from armid.identifiability import collinear
-from armid.identification.errors import Errors
+from armid.identification.errors import Errors, record_errors
 from armid.identification.identify import Identification
 
+# S2 below the first with S1 above the second: landmarks that do not match, not signals that differ.
+SHAPE_FALLS, NUMBERS_AGREE = 0.9, 0.95
 # Units as people read them: SI unit -> (unit on screen, factor).
 SHOWN = {"Pa": ("MPa", 1e-6), "rad/s": ("deg/s", 180.0 / np.pi), "m/s": ("mm/s", 1e3)}
 
@@ -70,15 +72,29 @@ def remarks(found: Identification) -> list[str]:
     said += [f"{name} is not determined by these records." for name in lost]
     if found.n_failed:
         said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
-    return said + engine_remarks(found) + noise_remarks(found)
+    return said + shape_remarks(found) + engine_remarks(found) + noise_remarks(found)
+
+
+def shape_remarks(found: Identification) -> list[str]:
+    """Return a sentence for each record on which S2 falls though S1 says that the signals agree.
+
+    S2 pairs few intervals between landmarks; one landmark that is only noise, near an end, can unpair them all.
+    """
+    said = []
+    for replay in (*found.train_replays, *found.holdout_replays):
+        e = record_errors(replay, found.candidate)
+        if e.s2 < SHAPE_FALLS and e.s1 > NUMBERS_AGREE:
+            said.append(f"{replay.record.file}: S2 is {e.s2:.3f} though S1 is {e.s1:.3f}: the shape similarity pairs "
+                        "a few intervals by order, and a landmark of noise unpairs them; look at S1 and RMSE.")
+    return said
 
 
 def engine_remarks(found: Identification) -> list[str]:
     """Return a sentence for each record on which the engine is less accurate than it promises."""
-    name = SHOWN[found.campaign.unit][0]
+    name, factor = SHOWN[found.campaign.unit]
     return [
-        f"{r.record.file}: the engine is off by up to {shown(r.engine_error, found.campaign.unit)[0]:.2g} {name} even at "
-        "its finest steps: the equations are stiff there, or switch somewhere without a guard."
+        f"{r.record.file}: the engine is off by up to {factor * r.engine_error:.2g} {name} even at its "
+        "finest steps: the equations are stiff there, or switch somewhere without a guard."
         for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)
     ]  # fmt: skip
 

@@ -1,0 +1,135 @@
+"""Commands run in this process, and files that plug-ins are read from."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from armid.cli.main import main
+
+PLUGINS = '''\
+"""Things of a user."""
+
+import numpy as np
+from pymoo.algorithms.soo.nonconvex.de import DE
+
+from armid import Effect, Parameter
+
+LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
+
+
+def drag(omega, c):
+    """Drag [N m]."""
+    return -c * omega * abs(omega)
+
+
+def lost(omega, c, omga):
+    """Ask for what is not there."""
+    return c * omga
+
+
+quadratic_drag = Effect("quadratic_drag", LEVEL, {"torque": drag})
+unknown_name = Effect("unknown_name", LEVEL, {"torque": lost})
+unknown_port = Effect("unknown_port", LEVEL, {"torqe": drag})
+coulomb = Effect("coulomb", LEVEL, {"torque": drag})
+number = 3
+
+
+def largest_miss(measured, simulated):
+    """Largest deviation."""
+    return np.abs(simulated - measured).max(axis=1)
+
+
+def rmse(measured, simulated):
+    """Stand in for ours."""
+    return largest_miss(measured, simulated)
+
+
+def misspelt(measured, simulated, nois):
+    """Ask for a misspelt quantity."""
+    return nois
+
+
+def one_number(measured, simulated):
+    """Return one number for all."""
+    return 1.0
+
+
+def raising(measured, simulated):
+    """Fail in the search."""
+    raise ZeroDivisionError("nothing to divide by")
+
+
+def diverging(measured, simulated):
+    """Call every candidate lost."""
+    return np.full(len(simulated), np.nan)
+
+
+def de(budget):
+    """Search by differential evolution."""
+    return DE(pop_size=20)
+
+
+def no_algorithm(budget):
+    """Return no algorithm."""
+    return budget
+'''
+
+
+@dataclass(frozen=True)
+class Ran:
+    """Hold what a command left: exit code, output, error output."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
+    """Return a function that runs a command in this process."""
+
+    def ran(*arguments: object) -> Ran:
+        with pytest.raises(SystemExit) as left:
+            main([str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return Ran(int(left.value.code or 0), captured.out, captured.err)
+
+    return ran
+
+
+@pytest.fixture
+def refused(run: Callable[..., Ran]) -> Callable[..., str]:
+    """Return a function that runs a command that has to be refused, and returns its one sentence."""
+
+    def sentence(*arguments: object) -> str:
+        ran = run(*arguments)
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err.startswith("armid: ")
+        assert ran.err.count("\n") == 1
+        return ran.err
+
+    return sentence
+
+
+@pytest.fixture(scope="session")
+def mine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of plug-ins."""
+    file = tmp_path_factory.mktemp("plugins") / "mine.py"
+    file.write_text(PLUGINS, encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="session")
+def other_process(root: Path) -> Callable[..., "subprocess.CompletedProcess[str]"]:
+    """Return a function that runs a command in a process of its own."""
+
+    def ran(*arguments: object, **options: object) -> "subprocess.CompletedProcess[str]":
+        command = [sys.executable, "-m", "armid", *map(str, arguments)]
+        return subprocess.run(command, check=False, capture_output=True, text=True, cwd=root, env=os.environ, **options)
+
+    return ran

@@ -1,0 +1,110 @@
+"""Ctrl-C ends a search; what was found so far is judged, printed and written. A terminal sees a bar."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from armid.fitness import FITNESS
+from armid.identification import identify
+from armid.identifiers import IDENTIFIERS
+
+pty = pytest.importorskip("pty")
+
+
+def read_until(terminal, word, seconds=60.0):
+    """Return what a terminal showed until a word came."""
+    shown, end = b"", time.monotonic() + seconds
+    while word not in shown:
+        assert time.monotonic() < end, shown
+        shown += os.read(terminal, 4096)
+    return shown
+
+
+def test_ctrl_c_loses_nothing(paper_arm_folder, tmp_path):
+    terminal, theirs = pty.openpty()
+    command = [sys.executable, "-m", "armid", "identify", str(paper_arm_folder), "--budget", "100000000",
+               "--window", "0:0.7", "--out", str(tmp_path / "out")]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
+        os.close(theirs)
+        shown = read_until(terminal, b"best 0.0")
+        process.send_signal(signal.SIGINT)
+        text, _ = process.communicate(timeout=60)
+    os.close(terminal)
+    assert b"/100000000 simulations" in shown
+    assert process.returncode == 130
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["stopped"] == "interrupted"
+    assert 0 < result["used"] < 100_000_000
+    assert result["error"]["train"]["s"] > 0.9
+    assert sorted(os.listdir(tmp_path / "out")) == ["convergence.png", "fit.png", "result.json"]
+    assert f"{result['used']} of 100000000 simulations used, interrupted; seed 1." in text
+
+
+def test_ctrl_c_before_the_first_candidate_is_only_an_end(run, paper_arm_folder, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("armid.problem.problem.fitness_of", interrupted)
+    ran = run("identify", paper_arm_folder, "--budget", "80", "--out", tmp_path / "out")
+    assert (ran.code, ran.out, ran.err.strip()) == (130, "", "armid: interrupted")
+    assert not (tmp_path / "out").exists()
+
+
+def interrupted_after(times, presses=1):
+    """Return what is told of progress: it presses Ctrl-C after so many generations."""
+    left = [times]
+
+    def press(_):
+        left[0] -= 1
+        if left[0] == 0:
+            for _ in range(presses):
+                signal.raise_signal(signal.SIGINT)
+
+    return press
+
+
+@pytest.fixture
+def keyboard():
+    """Ctrl-C as Python handles it by itself, whatever the runner of the tests made of it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("keyboard")
+@pytest.mark.parametrize("presses", [1, 2])
+def test_an_interrupted_search_returns_its_best(lowering, arm, arm_space, presses):
+    press = interrupted_after(3, presses)
+    stopped = identify(lowering, arm, arm_space, FITNESS["rmse"], IDENTIFIERS["pso"], budget=8000, progress=press)
+    assert stopped.stopped == "interrupted"
+    assert stopped.used == 240
+    assert stopped.value == stopped.train.rmse == stopped.trace[1][-1]
+    assert stopped.holdout is not None
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_interrupt_out_of_compiled_code_is_one(run, paper_arm_folder, monkeypatch):
+    def wrapped(*_, **__):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("armid.problem.problem.fitness_of", wrapped)
+    ran = run("identify", paper_arm_folder, "--budget", "80")
+    assert (ran.code, ran.err.strip()) == (130, "armid: interrupted")
+
+
+def test_a_search_in_another_thread_leaves_signals_alone(lowering, arm, arm_space):
+    with ThreadPoolExecutor(1) as pool:
+        told = (lowering, arm, arm_space, FITNESS["rmse"], IDENTIFIERS["pso"], 80)
+        assert pool.submit(identify, *told).result().stopped == "budget used"
+
+
+def test_no_bar_without_a_terminal(other_process, paper_arm_folder):
+    ran = other_process("identify", paper_arm_folder, "--budget", 80, "--window", "0:0.3")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert "\x1b" not in ran.stdout

@@ -1,0 +1,185 @@
+"""`armid simulate`."""
+
+import csv
+import re
+import shutil
+import warnings
+
+import numpy as np
+import pytest
+
+from armid.record import read_campaign
+
+RECORD = """\
+name = "reference"
+plant = "shell_transfer_arm"
+[[records]]
+file = "{file}"
+role = "train"
+start_angle_deg = {start_angle_deg}
+target_angle_deg = {target_angle_deg}
+shell = {shell}
+supply_V = {supply_V}
+"""
+HEADER = "time_s,angle_rad,angular_velocity_rad_s,current_A"
+# Its own file is off by 6.8e-7 rad/s: three independent integrations agree with each other and not with it.
+FINE = {"trajectory_05.csv": 1e-6}
+
+
+def table(path):
+    """Return header and columns of a CSV file."""
+    return path.read_text().split("\n", 1)[0], np.genfromtxt(path, delimiter=",", skip_header=1, unpack=True)
+
+
+@pytest.fixture(scope="module")
+def references(root, tmp_path_factory):
+    """Each reference trajectory as a campaign of one record, with the options that set its parameters."""
+    with (root / "tests" / "reference" / "index.csv").open() as index:
+        rows = list(csv.DictReader(index))
+    made = {}
+    for row in rows:
+        folder = tmp_path_factory.mktemp("reference")
+        shutil.copy(root / "tests" / "reference" / row["file"], folder)
+        toml = RECORD.format_map({**row, "shell": str(row["shell"] == "1").lower()})
+        (folder / "campaign.toml").write_text(toml)
+        values = {"p0": float(row["p0_MPa"]) * 1e6, **{name: row[name] for name in ("k", "eta3", "n")}}
+        made[row["file"]] = folder, [word for name, value in values.items() for word in ("--set", f"{name}={value}")]
+    return made
+
+
+@pytest.mark.parametrize("number", range(14))
+@pytest.mark.parametrize(("accuracy", "allowed"), [("standard", 1e-5), ("fine", 2e-7), ("auto", 2e-7)])
+def test_agrees_with_the_reference_trajectories(run, references, tmp_path, number, accuracy, allowed):
+    file = f"trajectory_{number:02d}.csv"
+    folder, settings = references[file]
+    ran = run("simulate", folder, *settings, "--accuracy", accuracy, "--out", tmp_path)
+    assert (ran.code, ran.err) == (0, "")
+    header, simulated = table(tmp_path / file)
+    _, reference = table(folder / file)
+    assert header == HEADER
+    np.testing.assert_allclose(simulated[0], reference[0], atol=1e-12)
+    assert np.max(np.abs(simulated[2] - reference[2])) <= (max(allowed, FINE.get(file, 0.0)))
+    assert np.max(np.abs(simulated[1] - reference[1])) <= max(allowed, FINE.get(file, 0.0))
+
+
+def test_one_file_for_each_record_and_the_values_that_were_taken(run, paper_arm, paper_arm_folder, tmp_path):
+    ran = run("simulate", paper_arm_folder / "campaign.toml", "--set", "n=1.3", "--out", tmp_path / "new" / "folder")
+    assert ran.code == 0
+    files = sorted(p.name for p in (tmp_path / "new" / "folder").iterdir())
+    assert files == sorted(r.file for r in paper_arm.records)
+    assert "p0 = 3050000 Pa\nk = 1 1\neta3 = 0.55 1\nn = 1.3 1\nwrote 7 files to" in ran.out
+    _, (times, *_, current) = table(tmp_path / "new" / "folder" / "raise.csv")
+    np.testing.assert_allclose(times, np.arange(1201) / 1000, atol=1e-12)
+    assert current[0] == 0.0
+
+
+def test_effects_and_their_parameters(run, paper_arm_folder, tmp_path):
+    bare, null, rubbing = (tmp_path / name for name in ("bare", "null", "rubbing"))
+    run("simulate", paper_arm_folder, "--out", bare)
+    run("simulate", paper_arm_folder, "--effects", "coulomb", "--out", null)
+    ran = run("simulate", paper_arm_folder, "--effects", "coulomb", "--set", "coulomb.level=40", "--out", rubbing)
+    assert "coulomb.level = 40 N m\ncoulomb.width = 0.01 rad/s\n" in ran.out
+    speeds = [table(folder / "lower.csv")[1][2] for folder in (bare, null, rubbing)]
+    np.testing.assert_allclose(speeds[1], speeds[0], atol=1e-5)
+    assert np.max(np.abs(speeds[2] - speeds[0])) > 0.01
+
+
+def test_what_a_campaign_fixes_is_taken_unless_it_is_set(run, paper_arm_folder, tmp_path):
+    folder = tmp_path / "campaign"
+    shutil.copytree(paper_arm_folder, folder)
+    with (folder / "campaign.toml").open("a") as toml:
+        toml.write("[parameters.n]\nfixed = 1.2\n[parameters.k]\nfixed = 0.9\n")
+    assert "k = 0.8 1\neta3 = 0.55 1\nn = 1.2 1" in run("simulate", folder, "--set", "k=0.8", "--out", tmp_path).out
+
+
+def test_an_axis_from_its_first_sample_shown_from_zero_on(run, write_axis, axis_speed, tmp_path):
+    folder = write_axis(tmp_path / "axis", more='[parameters.mass]\nfixed = 2.0\n')
+    early = folder / "move.csv"
+    rows = early.read_text().split()
+    shifted = [f"{float(row.split(',')[0]) - 0.5!r},{row.split(',', 1)[1]}" for row in rows[1:]]
+    early.write_text("\n".join([rows[0], *shifted]) + "\n")
+    settings = ["--effects", "viscous", "--set", "viscous.slope=5"]
+    assert run("simulate", folder, *settings, "--out", tmp_path).code == 0
+    header, (times, position, speed) = table(tmp_path / "move.csv")
+    assert header == "time_s,position_m,velocity_m_s"
+    np.testing.assert_allclose(times, np.arange(301) / 200, atol=1e-12)
+    np.testing.assert_allclose(speed, axis_speed(times + 0.5), atol=3e-4)
+    assert (np.diff(position) > 0).all()
+
+
+def test_an_axis_without_a_value_for_its_mass(refused, write_axis, tmp_path):
+    sentence = refused("simulate", write_axis(tmp_path / "axis"), "--out", tmp_path / "out")
+    assert "parameter 'mass' has no nominal value: --set mass=VALUE is expected (kg)" in sentence
+
+
+@pytest.mark.parametrize("folder_is_there", [True, False])
+def test_nothing_half_written_stays(run, paper_arm_folder, tmp_path, monkeypatch, folder_is_there):
+    from armid.cli import simulate
+    from armid.record import write_table
+
+    def failing(path, columns):
+        if path.name == "raise.csv":
+            raise OSError(28, "No space left on device", str(path))
+        write_table(path, columns)
+
+    out = tmp_path / "out"
+    if folder_is_there:
+        out.mkdir()
+        (out / "lower.csv").write_text("of yesterday\n")
+    monkeypatch.setattr(simulate, "write_table", failing)
+    ran = run("simulate", paper_arm_folder, "--out", out)
+    assert ran.code == 2
+    assert "raise.csv cannot be used: No space left on device" in ran.err
+    if folder_is_there:
+        assert [(p.name, p.read_text()) for p in out.iterdir()] == [("lower.csv", "of yesterday\n")]
+    else:
+        assert not out.exists()
+
+
+def test_a_diverging_simulation_leaves_nothing(refused, paper_arm_folder, tmp_path):
+    sentence = refused("simulate", paper_arm_folder, "--set", "p0=1e15", "--out", tmp_path / "out")
+    assert "record 'lower.csv': the simulation diverges with these parameters" in sentence
+    assert not (tmp_path / "out").exists()
+
+
+def test_steps_that_are_too_long_are_told(run, paper_arm_folder, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        ran = run("simulate", paper_arm_folder, "--set", "p0=1e12", "--out", tmp_path / "out")
+    assert re.match(r"armid: warning: lower\.csv: the engine is off by up to \S+ rad/s even at its finest ", ran.err)
+
+
+def test_what_it_writes_is_a_campaign_s_record(run, paper_arm_folder, tmp_path):
+    folder = tmp_path / "campaign"
+    shutil.copytree(paper_arm_folder, folder)
+    run("simulate", folder, "--out", folder)
+    record = read_campaign(folder).records[0]
+    assert record.is_noise_free
+    assert list(record.columns) == ["angle_rad", "current_A"]
+
+
+@pytest.mark.parametrize(("options", "fragments"), [
+    (["--set", "p0"], ["--set 'p0'", "NAME=VALUE"]),
+    (["--set", "p0=much"], ["--set p0", "'much' is no number"]),
+    (["--set", "p0=nan"], ["--set p0", "nan was found", "finite"]),
+    (["--set", "eta=0.5"], ["--set", "'eta'", "did you mean 'eta3'"]),
+    (["--set", "k=1", "--set", "k=1"], ["--set", "'k' is given twice"]),
+    (["--effects", "colomb"], ["effect 'colomb'", "did you mean 'coulomb'"]),
+    (["--effects", "viscous,viscous"], ["'viscous'", "already"]),
+    (["--accuracy", "high"], ["--accuracy 'high'", "standard, fine, auto"]),
+])  # fmt: skip
+def test_bad_options(refused, paper_arm_folder, tmp_path, options, fragments):
+    sentence = refused("simulate", paper_arm_folder, "--out", tmp_path / "out", *options)
+    for fragment in fragments:
+        assert fragment in sentence
+    assert not (tmp_path / "out").exists()
+
+
+def test_out_is_needed_and_must_be_a_folder(refused, paper_arm_folder, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "Missing option '--out'" in refused("simulate", paper_arm_folder)
+    assert "file is a file: a folder is expected" in refused("simulate", paper_arm_folder, "--out", tmp_path / "file")
+    beneath = refused("simulate", paper_arm_folder, "--out", tmp_path / "file" / "out")
+    assert "file/out cannot be used: Not a directory" in beneath
+    (tmp_path / "out" / "lower.csv").mkdir(parents=True)
+    assert "holds a folder lower.csv" in refused("simulate", paper_arm_folder, "--out", tmp_path / "out")

@@ -1,0 +1,135 @@
+"""What several folders of tests share: the committed campaign, small campaigns of an axis, the test stand."""
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from armid.model import EFFECTS, Model
+from armid.problem import Replay, Space, replays, space_of
+from armid.record import Campaign, read_campaign, write_table
+
+ROOT = Path(__file__).parents[1]
+Array = NDArray[np.float64]
+AXIS_TOML = """\
+name = "axis"
+plant = "driven_axis"
+[[records]]
+file = "move.csv"
+role = "train"
+"""
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The repository's root."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def paper_arm_folder() -> Path:
+    """Folder of the committed synthetic campaign."""
+    return ROOT / "studies" / "campaigns" / "paper_arm"
+
+
+@pytest.fixture(scope="session")
+def paper_arm(paper_arm_folder: Path) -> Campaign:
+    """The committed synthetic campaign: lower (three times), raise, short; empty and low voltage held out."""
+    return read_campaign(paper_arm_folder)
+
+
+@pytest.fixture(scope="session")
+def arm(paper_arm: Campaign) -> Model:
+    """The declared arm."""
+    return Model(paper_arm.plant)
+
+
+@pytest.fixture(scope="session")
+def arm_space(arm: Model) -> Space:
+    """Its box as declared."""
+    return space_of(arm)
+
+
+@pytest.fixture(scope="session")
+def lowering(paper_arm: Campaign) -> Campaign:
+    """One lowering to train on, cut at 0.7 s, and one to hold out."""
+    train, holdout = paper_arm.train[0], paper_arm.holdout[1]
+    return replace(paper_arm, records=(train, holdout)).with_window(0.0, 0.7)
+
+
+@pytest.fixture(scope="session")
+def lowering_replays(lowering: Campaign, arm: Model, arm_space: Space) -> tuple[Replay, ...]:
+    """The lowering ready to be simulated."""
+    return replays(lowering.train, arm, arm_space)
+
+
+def step_response(times: Array, mass: float = 2.0, slope: float = 5.0, drive: float = 8.0) -> Array:
+    """Return the speed of an axis with viscous friction under a constant drive from rest, F/c (1 - exp(-c t/m))."""
+    return drive / slope * (1.0 - np.exp(-slope * times / mass))
+
+
+@pytest.fixture(scope="session")
+def axis_speed() -> Callable[..., Array]:
+    """The closed form `step_response`."""
+    return step_response
+
+
+@pytest.fixture(scope="session")
+def axis_model(write_axis: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """An axis with viscous friction, scaled as the step response of the defaults asks for."""
+    return Model(read_campaign(write_axis(tmp_path_factory.mktemp("axis"))).plant) + EFFECTS["viscous"]
+
+
+@pytest.fixture(scope="session")
+def write_axis() -> Callable[..., Path]:
+    """Return a function that writes a campaign of an axis, driven by a constant 8 N from rest for 2 s at 200 Hz.
+
+    folder: where; velocity: what is recorded [m/s], (401,), None: the step response without noise; more: text for
+    campaign.toml; others: further records, file -> velocity.
+    """
+
+    def write(
+        folder: Path, velocity: Array | None = None, more: str = "", others: Mapping[str, Array] | None = None
+    ) -> Path:
+        times = np.arange(401) / 200.0
+        recorded = {"move.csv": step_response(times) if velocity is None else velocity, **(others or {})}
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "campaign.toml").write_text(AXIS_TOML + more, encoding="utf-8")
+        for file, speed in recorded.items():
+            write_table(folder / file, {"time_s": times, "velocity_m_s": speed, "drive_N": np.full(401, 8.0)})
+        return folder
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def stand(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Return a function that makes a campaign with studies/test_stand.py; the same options are made once."""
+    made: dict[tuple[str, ...], Path] = {}
+
+    def campaign(*options: str) -> Path:
+        if options not in made:
+            folder = tmp_path_factory.mktemp("stand") / "made"
+            with importable(ROOT / "studies"):
+                from stand.command import main
+
+                assert main([str(folder), *options]) == 0
+            made[options] = folder
+        return made[options]
+
+    return campaign
+
+
+@contextmanager
+def importable(folder: Path) -> Iterator[None]:
+    """Search a folder for modules for a while."""
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))

@@ -1,0 +1,53 @@
+"""Quick identifications, and the measured sets that may lie beside the repository."""
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armid.fitness import FITNESS
+from armid.identification import Identification, identify
+from armid.identifiers import IDENTIFIERS
+from armid.model import Model
+from armid.problem import Space, space_of
+from armid.record import Campaign
+
+
+@pytest.fixture(scope="session")
+def found() -> Callable[..., Identification]:
+    """Return a function that identifies a campaign, with little if nothing else is said."""
+
+    def run(
+        campaign: Campaign, model: Model | None = None, space: Space | None = None, fitness: str = "similarity",
+        **more: Any,
+    ) -> Identification:  # fmt: skip
+        composed = model or Model(campaign.plant)
+        told = {"budget": 160, **more}
+        return identify(campaign, composed, space or space_of(composed), FITNESS[fitness], IDENTIFIERS["pso"], **told)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def lowering_found(found: Callable[..., Identification], lowering: Campaign) -> Identification:
+    """The lowering, identified in 160 simulations and judged on the holdout."""
+    return found(lowering)
+
+
+@pytest.fixture(scope="session")
+def many_records(paper_arm: Campaign) -> Campaign:
+    """Twice the records of the committed campaign: 14."""
+    again = [replace(r, file=f"again_{r.file}") for r in paper_arm.records]
+    return replace(paper_arm, records=(*paper_arm.records, *again)).with_window(0.0, 0.7)
+
+
+@pytest.fixture(scope="session")
+def measured(root: Path) -> Path:
+    """Folder of the measured sets; they may not be passed on, so many machines do not have them."""
+    folder = Path(os.environ.get("ARMID_MEASURED", root.parent / "shared" / "data"))
+    if not (folder / "emps" / "DATA_EMPS.mat").is_file():
+        pytest.skip("the measured set EMPS is not there: ARMID_MEASURED names the folder that holds emps/DATA_EMPS.mat")
+    return folder

@@ -1,0 +1,134 @@
+"""One run: what it finds, what it must not see, how it ends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
+
+from armid.fitness import FITNESS, Fitness
+from armid.identification import identify
+from armid.identifiers import IDENTIFIERS
+from armid.model import EFFECTS, ArmidError, Model
+from armid.problem import space_of
+from armid.record import read_campaign
+
+CLEAN = ("--noise-deg-s", "0", "--quantisation-deg-s", "0", "--repeats", "1", "--holdout", "empty")
+TRUTH = np.array([3.2e6, 0.95, 0.60, 1.20])
+OPTIONS = ("--p0", "3.2e6", "--k", "0.95", "--eta3", "0.60", "--n", "1.20")
+AXIS = {"mass": (0.5, 5.0), "viscous.slope": (0.0, 20.0)}
+# Mean absolute relative errors of the paper's Table I.
+PAPER = np.array([0.00487, 0.00421, 0.00171, 0.00899])
+
+
+def test_recovers_the_truth_of_an_independent_stand(stand, found):
+    campaign = read_campaign(stand(*CLEAN, *OPTIONS, "--manoeuvres", "lower,raise,short,empty"))
+    result = found(campaign, budget=12_000, fitness="rmse")
+    np.testing.assert_allclose(result.candidate, TRUTH, rtol=1e-4)
+    assert result.train.rmse < 2e-5
+    assert result.holdout.rmse < 5e-5
+    assert result.holdout.s > 0.9999
+
+
+def test_finds_on_one_stroke_what_the_paper_found(stand, found):
+    """Five swarms, similarity degree, 12,000 simulations each; some swarms stop in the valley, so the median counts."""
+    campaign = read_campaign(stand(*CLEAN, *OPTIONS, "--manoeuvres", "lower,empty")).with_window(0.0, 0.7)
+    errors = [np.abs(found(campaign, budget=12_000, seed=s).candidate / TRUTH - 1.0) for s in range(1, 6)]
+    assert (np.median(errors, axis=0) <= PAPER).all()
+
+
+def test_noise_leaves_the_truth_inside_the_intervals(found, paper_arm):
+    result = found(paper_arm, budget=12_000, fitness="rmse")
+    misses = np.abs(result.candidate - [3.05e6, 1.0, 0.55, 1.4])
+    # twice the half-width: four parameters at once
+    assert (misses < 2 * result.information.half_width).all()
+    assert result.train.chi2_per_sample == pytest.approx(1.0, abs=0.1)
+    assert not result.at_bound.any()
+
+
+def test_the_holdout_never_enters(found, lowering):
+    def with_other_holdout(record):
+        rng = np.random.default_rng(1)
+        pieces = [replace(p, measured=rng.normal(size=p.measured.size).cumsum()) for p in record.pieces]
+        return replace(record, pieces=tuple(pieces), measured=-5.0 * record.measured)
+
+    other = replace(lowering, records=(lowering.records[0], with_other_holdout(lowering.records[1])))
+    without = replace(lowering, records=lowering.records[:1])
+    results = [found(c, budget=400) for c in (lowering, other, without)]
+    for result in results[1:]:
+        np.testing.assert_array_equal(result.candidate, results[0].candidate)
+        np.testing.assert_array_equal(result.information.deviation, results[0].information.deviation)
+        assert result.train == results[0].train
+    assert results[1].holdout.rmse > 100 * results[0].holdout.rmse
+    assert results[2].holdout is None
+
+
+def test_the_same_seed_gives_the_same_bits(found, lowering):
+    first, again, other = (found(lowering, seed=s) for s in (5, 5, 6))
+    np.testing.assert_array_equal(first.candidate, again.candidate)
+    assert (first.train, first.holdout) == (again.train, again.holdout)
+    assert not np.array_equal(first.candidate, other.candidate)
+
+
+def test_the_budget_is_used_exactly_and_the_trace_falls(lowering_found):
+    assert (lowering_found.used, lowering_found.budget, lowering_found.stopped) == (160, 160, "budget used")
+    evaluations, values = lowering_found.trace
+    assert (np.diff(evaluations) > 0).all()
+    assert (np.diff(values) < 0).all()
+    assert values[-1] == lowering_found.value == pytest.approx(1.0 - lowering_found.train.s, abs=1e-12)
+
+
+def test_stops_at_the_target(found, lowering):
+    result = found(lowering, budget=8000, target=0.05)
+    assert result.stopped == "target reached"
+    assert result.value <= 0.05
+    assert result.used < 8000
+
+
+def test_an_identifier_may_stop_by_itself(lowering, arm, arm_space):
+    short = replace(IDENTIFIERS["pso"], name="short", build=lambda _: CMAES(restarts=0, maxiter=5))
+    result = identify(lowering, arm, arm_space, FITNESS["nrmse"], short, budget=5000)
+    assert result.stopped == "short stopped by itself"
+    assert 0 < result.used < 5000
+
+
+def test_nothing_free_is_only_judged(found, lowering, arm, arm_space):
+    space = arm_space
+    for name, value in zip(space.names, (3.05e6, 1.0, 0.55, 1.4)):
+        space = space.with_fixed(name, value)
+    result = found(lowering, arm, space)
+    assert (result.used, result.stopped, result.information.names) == (0, "no parameter is free", ())
+    assert result.train.rmse == pytest.approx(0.0044, rel=0.1)
+    assert not result.at_bound.any()
+
+
+def test_all_diverge(lowering, arm, arm_space):
+    lost = Fitness("lost", lambda measured, simulated: np.full(len(simulated), np.inf))
+    with pytest.raises(ArmidError, match="all 160 candidates diverged: narrower bounds"):
+        identify(lowering, arm, arm_space, lost, IDENTIFIERS["pso"], budget=160)
+
+
+def test_some_diverge(lowering, arm, arm_space):
+    some = Fitness("some", lambda measured, simulated: np.where(np.arange(len(simulated)) % 4, 1.0, np.nan))
+    result = identify(lowering, arm, arm_space, some, IDENTIFIERS["pso"], budget=160)
+    assert (result.used, result.n_failed) == (160, 40)
+
+
+def test_a_negative_seed_is_refused(found, lowering):
+    with pytest.raises(ArmidError, match="the seed is -3"):
+        found(lowering, seed=-3)
+
+
+@pytest.mark.parametrize(("bounds", "at"), [((3.2e6, 3.5e6), True), ((2.6e6, 2.9e6), True), ((2.6e6, 3.5e6), False)])
+def test_an_active_bound_is_told(found, lowering, arm, bounds, at):
+    space = space_of(arm, bounds={"p0": bounds}, fixed={"k": 1.0, "eta3": 0.55, "n": 1.4})
+    result = found(lowering, arm, space, budget=400)
+    assert result.at_bound.tolist() == [at, False, False, False]
+
+
+def test_an_axis(found, write_axis, tmp_path):
+    read = read_campaign(write_axis(tmp_path))
+    model = Model(read.plant) + EFFECTS["viscous"]
+    result = found(read, model, space_of(model, bounds=AXIS), budget=4000, fitness="rmse")
+    np.testing.assert_allclose(result.candidate, [2.0, 5.0], rtol=1e-3)
+    assert result.holdout is None

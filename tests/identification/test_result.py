@@ -1,0 +1,128 @@
+"""The result as numbers for other programs, and as words for people."""
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from armid.identification import record_errors
+from armid.identification.result import result_of
+from armid.identification.words import error_table, parameter_table, remarks
+from armid.problem import space_of
+
+PARAMETER = {"value", "unit", "low", "high", "bound_low", "bound_high", "bound_active"}
+ERROR = {"rmse", "nrmse", "chi2_per_sample", "s", "s1", "s2"}
+NEEDED = {"parameters", "error", "correlation", "unit", "budget", "used", "seed", "versions"}
+
+
+@pytest.fixture(scope="module")
+def partly_fixed(found, lowering, arm):
+    """The lowering with k fixed, coarse but enough to look at."""
+    return found(lowering, arm, space_of(arm, fixed={"k": 1.0}))
+
+
+def words(table):
+    """Return a table as text."""
+    text = io.StringIO()
+    Console(width=120, file=text).print(table)
+    return text.getvalue()
+
+
+def test_has_the_declared_keys(lowering_found):
+    result = result_of(lowering_found)
+    assert set(result) >= NEEDED
+    assert set(result["error"]) == {"train", "holdout"}
+    assert set(result["error"]["train"]) == set(result["error"]["holdout"]) == ERROR
+    assert list(result["parameters"]) == ["p0", "k", "eta3", "n"]
+    assert all(set(p) == PARAMETER for p in result["parameters"].values())
+    assert set(result["versions"]) >= {"python", "armid", "numpy", "numba", "pymoo"}
+    assert result["used"] == result["budget"] == 160
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+
+
+def test_everything_is_si(lowering_found):
+    result = result_of(lowering_found)
+    assert result["unit"] == "rad/s"
+    assert [p["unit"] for p in result["parameters"].values()] == ["Pa", "1", "1", "1"]
+    p0 = result["parameters"]["p0"]
+    assert (p0["bound_low"], p0["bound_high"]) == (2.6e6, 3.5e6)
+    assert p0["value"] == lowering_found.candidate[0]
+    residual = lowering_found.train_replays[0].measured
+    residual = residual - lowering_found.train_replays[0].signal(lowering_found.candidate[np.newaxis])[0]
+    assert result["error"]["train"]["rmse"] == pytest.approx(np.sqrt(np.mean(residual**2)))
+    assert result["noise"]["lower.csv"]["rms"] == pytest.approx(np.radians(0.2145), rel=0.01)
+
+
+def test_intervals_and_correlations_are_those_of_the_information(lowering_found):
+    result, information = result_of(lowering_found), lowering_found.information
+    for i, (name, p) in enumerate(result["parameters"].items()):
+        assert p["high"] - p["low"] == pytest.approx(2 * 1.959963985 * information.deviation[i])
+        assert p["low"] < p["value"] < p["high"]
+        assert result["correlation"][name][name] == pytest.approx(1.0)
+        assert result["correlation"][name]["n"] == pytest.approx(information.correlation[i, 3])
+
+
+def test_each_record_s_errors(lowering_found):
+    told = result_of(lowering_found)["error_by_record"]
+    assert {file: e["role"] for file, e in told.items()} == {"lower.csv": "train", "lower_low_voltage.csv": "holdout"}
+    holdout = record_errors(lowering_found.holdout_replays[0], lowering_found.candidate)
+    assert {k: v for k, v in told["lower_low_voltage.csv"].items() if k != "role"} == vars(holdout)
+
+
+def test_a_fixed_parameter_has_neither_interval_nor_bounds(partly_fixed):
+    result = result_of(partly_fixed)
+    nothing = dict.fromkeys(("low", "high", "bound_low", "bound_high"))
+    assert result["parameters"]["k"] == {"value": 1.0, "unit": "1", "bound_active": False, **nothing}
+    assert set(result["correlation"]) == {"p0", "eta3", "n"}
+    assert "fixed" in words(parameter_table(partly_fixed))
+
+
+def test_what_is_not_known_is_null(lowering_found):
+    lost = lowering_found.information.deviation.copy()
+    lost[1] = np.inf
+    unknown = np.where([[False], [True], [False], [False]], np.nan, lowering_found.information.correlation)
+    information = replace(lowering_found.information, deviation=lost, correlation=unknown)
+    worse = replace(lowering_found, information=information, holdout=None, value=np.inf)
+    result = result_of(worse)
+    assert (result["parameters"]["k"]["low"], result["parameters"]["k"]["high"]) == (None, None)
+    assert set(result["correlation"]["k"].values()) == {None}
+    assert result["error"]["holdout"] is None
+    assert result["fitness_value"] is None
+    assert "not determined" in words(parameter_table(worse))
+    assert "holdout: none" in words(error_table(worse))
+    assert "k is not determined by these records." in remarks(worse)
+
+
+def test_tables_are_in_units_that_people_read(lowering_found):
+    text = words(parameter_table(lowering_found)) + words(error_table(lowering_found))
+    p0 = lowering_found.candidate[0]
+    assert f"{p0 / 1e6:.6g}" in text
+    assert "MPa" in text
+    assert f"{np.degrees(lowering_found.train.rmse):.4g}" in text
+    assert "RMSE, deg/s" in text
+
+
+def test_remarks_name_bounds_pairs_divergence_and_noise(lowering_found):
+    at_its_bound = replace(lowering_found, candidate=lowering_found.space.low, n_failed=7)
+    said = "\n".join(remarks(at_its_bound))
+    for name in ("p0", "k", "eta3", "n"):
+        assert f"{name} sits on its bound" in said
+    assert "7 of 160 candidates diverged and were given a penalty." in said
+    assert "n and p0 can hardly be told apart on these records (correlation -0.9" in said
+    assert "lower.csv: noise 0.215 deg/s rms and mean -0.019 deg/s (shown, not subtracted) from 100 samples" in said
+
+
+def test_noise_from_differences_and_a_lacking_model_are_told(lowering_found):
+    replay = lowering_found.train_replays[0]
+    noise = replace(replay.record.noise, source="differences", mean=None, rms=1e-4)
+    level = replace(lowering_found.information.levels[0], rms=3e-2, from_residual=True)
+    told = replace(
+        lowering_found, train_replays=(replace(replay, record=replace(replay.record, noise=noise)),),
+        information=replace(lowering_found.information, levels=(level,)),
+    )  # fmt: skip
+    said = "\n".join(remarks(told))
+    assert "from high-frequency differences of the motion, as fewer than 50 samples were recorded at rest" in said
+    assert "the residual is 300 times the noise, so the model lacks something" in said

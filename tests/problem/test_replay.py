@@ -1,0 +1,75 @@
+"""Records and the model side by side."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armid.model import EFFECTS, ArmidError, Model
+from armid.problem import accuracy_for, replay_of, replays, space_of
+from armid.record import read_campaign
+from armid.simulation import Schedule, simulate
+
+TRUTH = np.array([[3.05e6, 1.0, 0.55, 1.4]])
+
+
+def test_signal_is_the_simulation_in_the_window(paper_arm, arm, arm_space):
+    record = paper_arm.with_window(0.2, 0.5).train[0]
+    replay = replay_of(record, arm, arm_space)
+    assert replay.measured.shape == replay.times.shape == (301,)
+    np.testing.assert_allclose(replay.times[[0, -1]], [0.2, 0.5])
+    np.testing.assert_array_equal(replay.measured, record.measured[200:501])
+    whole = simulate(arm, record.manoeuvre, TRUTH, Schedule(4)).output[0]
+    np.testing.assert_allclose(replay.signal(TRUTH)[0], whole[200:501], atol=1e-5)
+    assert 0.0 < replay.engine_error < 1e-5
+
+
+def test_pieces_stand_end_to_end(write_axis, axis_model, tmp_path):
+    campaign = read_campaign(write_axis(tmp_path, more="restart_s = 0.5\n"))
+    replay = replay_of(campaign.records[0], axis_model, space_of(axis_model))
+    assert len(replay.pieces) == 4
+    assert len({id(c) for c in replay.calibrations}) == 4
+    candidates = np.array([[2.0, 5.0], [3.0, 1.0]])
+    parts = [output for _, output in replay.outputs(candidates)]
+    np.testing.assert_array_equal(replay.signal(candidates), np.hstack(parts))
+    # a straight line through 20 ms is not quite the curved speed at a start
+    np.testing.assert_allclose(replay.signal(candidates)[0], replay.measured, atol=3e-4)
+
+
+def test_the_same_manoeuvre_is_calibrated_once(write_axis, axis_model, tmp_path):
+    record = read_campaign(write_axis(tmp_path, more="restart_s = 0.5\n")).records[0]
+    doubled = replace(record, pieces=(record.pieces[1], record.pieces[1], record.pieces[2]))
+    first, again, other = replay_of(doubled, axis_model, space_of(axis_model)).calibrations
+    assert first is again
+    assert other is not first
+
+
+def test_noise_decides_the_accuracy(paper_arm, arm, lowering):
+    record = lowering.train[0]
+    quiet = replace(record, noise=replace(record.noise, rms=1e-6))
+    assert accuracy_for(record, arm) == "standard"
+    assert accuracy_for(quiet, arm) == "fine"
+    assert accuracy_for(replace(record, noise=replace(record.noise, rms=0.0)), arm) == "fine"
+
+
+def test_a_given_accuracy_wins(lowering, arm, arm_space):
+    fine = replay_of(lowering.train[0], arm, arm_space, "fine")
+    assert fine.engine_error < 2e-7
+    with pytest.raises(ArmidError, match="'finest' is unknown: standard or fine"):
+        replay_of(lowering.train[0], arm, arm_space, "finest")
+
+
+def test_threads_change_no_bit(lowering, arm, arm_space, lowering_replays):
+    two = replays(lowering.train, arm, arm_space, threads=2)
+    candidates = arm_space.complete(np.random.default_rng(1).uniform(arm_space.low, arm_space.high, (70, 4)))
+    np.testing.assert_array_equal(two[0].signal(candidates), lowering_replays[0].signal(candidates))
+
+
+def test_effects_enter(lowering, arm, arm_space):
+    model = Model(arm.plant) + EFFECTS["coulomb"]
+    replay = replay_of(lowering.train[0], model, space_of(model))
+    still = np.array([[*TRUTH[0], 0.0, 0.01]])
+    rubbing = np.array([[*TRUTH[0], 60.0, 0.01]])
+    bare = replay_of(lowering.train[0], arm, arm_space).signal(TRUTH)
+    np.testing.assert_allclose(replay.signal(still), bare, atol=2e-5)
+    assert np.max(np.abs(replay.signal(rubbing) - replay.signal(still))) > 0.05

@@ -1,0 +1,67 @@
+"""Which parameters are searched, between which bounds."""
+
+import numpy as np
+import pytest
+
+from armid.model import EFFECTS, ArmidError
+from armid.problem import space_of
+from armid.record import Override
+
+
+def test_the_declared_box_of_the_arm(arm):
+    space = space_of(arm)
+    assert space.names == space.free_names == ("p0", "k", "eta3", "n")
+    assert space.units == ("Pa", "1", "1", "1")
+    np.testing.assert_array_equal(space.low, [2.6e6, 0.6, 0.45, 0.9])
+    np.testing.assert_array_equal(space.high, [3.5e6, 1.1, 0.70, 1.5])
+
+
+def test_a_fixed_parameter_of_an_effect_stays_unless_bounds_free_it(arm):
+    model = arm + EFFECTS["coulomb"]
+    assert space_of(model).free_names == ("p0", "k", "eta3", "n", "coulomb.level")
+    freed = space_of(model, bounds={"coulomb.width": (0.001, 0.1)})
+    assert freed.free_names == ("p0", "k", "eta3", "n", "coulomb.level", "coulomb.width")
+    assert freed.units[-2:] == ("N m", "rad/s")
+
+
+def test_what_the_caller_says_wins_over_the_campaign_and_that_over_the_declaration(arm):
+    overrides = {"p0": Override(low=2.8e6), "k": Override(fixed=0.9), "n": Override(fixed=1.2, low=1.0, high=1.3),
+                 "coulomb.level": Override(fixed=3.0)}  # fmt: skip
+    space = space_of(arm, overrides, bounds={"k": (0.5, 0.7)}, fixed={"eta3": 0.6})
+    assert space.free_names == ("p0", "k")
+    np.testing.assert_array_equal(space.low[:2], [2.8e6, 0.5])
+    np.testing.assert_array_equal(space.high[:2], [3.5e6, 0.7])
+    np.testing.assert_array_equal(space.fixed, [np.nan, np.nan, 0.6, 1.2])
+
+
+def test_bounds_and_fixed_values_by_name_leave_the_space_itself_alone(arm_space):
+    changed = arm_space.with_bounds("n", 1.0, 1.2).with_fixed("p0", 3e6)
+    assert changed.free_names == ("k", "eta3", "n")
+    assert changed.with_bounds("p0", 2e6, 3e6).free_names == arm_space.names
+    assert arm_space.high[3] == 1.5
+    assert arm_space.free.all()
+
+
+def test_complete_puts_the_fixed_values_in(arm_space):
+    space = arm_space.with_fixed("k", 1.0)
+    whole = space.complete(np.array([[3e6, 0.5, 1.4], [2.7e6, 0.6, 1.1]]))
+    np.testing.assert_array_equal(whole, [[3e6, 1.0, 0.5, 1.4], [2.7e6, 1.0, 0.6, 1.1]])
+
+
+@pytest.mark.parametrize(("asked", "fragments"), [
+    ({"bounds": {"p1": (1.0, 2.0)}}, ["'p1'", "known: p0, k, eta3, n"]),
+    ({"fixed": {"eta": 1.0}}, ["'eta'", "did you mean 'eta3'"]),
+    ({"fixed": {"coulomb.level": 1.0}}, ["'coulomb.level'", "not in the model"]),
+    ({"bounds": {"p0": (3.0, 2.0)}}, ["'p0'", "3 and 2", "low < high"]),
+    ({"bounds": {"p0": (3.0, 3.0)}}, ["low < high"]),
+    ({"bounds": {"p0": (np.nan, 3.0)}}, ["finite"]),
+    ({"bounds": {"p0": (0.0, np.inf)}}, ["finite"]),
+    ({"fixed": {"p0": np.nan}}, ["'p0'", "finite"]),
+    ({"fixed": {"p0": -np.inf}}, ["'p0'", "finite"]),
+    ({"bounds": {"p0": (1.0, 2.0)}, "fixed": {"p0": 1.0}}, ["'p0'", "both", "one of them"]),
+])  # fmt: skip
+def test_refused(arm, asked, fragments):
+    with pytest.raises(ArmidError) as refusal:
+        space_of(arm, **asked)
+    for fragment in fragments:
+        assert fragment in str(refusal.value)

@@ -1,0 +1,198 @@
+"""What there is to choose from: catalogues, entry points, files of a user."""
+
+import sys
+from dataclasses import replace
+from importlib.metadata import EntryPoint, EntryPoints
+
+import numpy as np
+import pytest
+from pymoo.algorithms.soo.nonconvex.de import DE
+
+from armid import registry
+from armid.fitness import Fitness
+from armid.identifiers import Identifier
+from armid.model import ArmidError, Effect, Model, Parameter
+from armid.model.plants.driven_axis import driven_axis
+from armid.record import read_campaign
+from armid.registry import Registry, load_plugin, load_registry, place_in_plugin
+
+LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
+OWN = '''\
+from dataclasses import replace
+
+from armid import Effect, Fitness, Identifier, Parameter
+from armid.model.plants.driven_axis import driven_axis
+from pymoo.algorithms.soo.nonconvex.de import DE
+
+import beside_it
+
+
+def drag(omega, c):
+    return -c * omega
+
+
+def largest(measured, simulated):
+    return abs(simulated - measured).max(axis=1)
+
+
+def search(budget):
+    return DE(pop_size=20)
+
+
+plant = replace(driven_axis, name="my_axis")
+effect = Effect("drag", (Parameter("c", "effort", 0.0, 0.5, null=0.0),), {"torque": drag})
+fitness = Fitness("my_fitness", largest, "samples")
+identifier = Identifier("my_search", search)
+coulomb = Effect("coulomb", (Parameter("c", "effort", 0.0, 0.5, null=0.0),), {"torque": drag})
+pso = search
+rmse = largest
+text = "none of ours"
+'''
+
+
+def torque(omega, c):
+    return -c * omega
+
+
+def worst(measured, simulated):
+    return np.abs(simulated - measured).max(axis=1)
+
+
+effect = Effect("damper", LEVEL, {"torque": torque})
+AXIS = replace(driven_axis, name="other_axis")
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "own.py").write_text(OWN)
+    (folder / "beside_it.py").write_text("there = True\n")
+    return folder / "own.py"
+
+
+@pytest.fixture
+def installed(monkeypatch):
+    """Return a function that makes entry points of a distribution: group, name, what it names in this file."""
+
+    def install(*points):
+        made = EntryPoints(EntryPoint(name, f"{__name__}:{thing}", f"armid.{kind}") for kind, name, thing in points)
+        monkeypatch.setattr(registry, "entry_points", lambda: made)
+
+    return install
+
+
+@pytest.mark.parametrize(("attribute", "kind", "name"), [
+    ("plant", "plants", "my_axis"), ("effect", "effects", "drag"), ("fitness", "fitness", "my_fitness"),
+    ("largest", "fitness", "largest"), ("identifier", "identifiers", "my_search"), ("search", "identifiers", "search"),
+    ("DE", "identifiers", "DE"),
+])  # fmt: skip
+def test_a_file_registers_all_four_kinds(own, attribute, kind, name):
+    assert load_plugin(f"{own}:{attribute}")[:2] == (kind, name)
+    assert getattr(load_registry([f"{own}:{attribute}"]), kind)[name].name == name
+
+
+def test_what_is_registered_is_ready_to_use(own):
+    loaded = load_registry(f"{own}:{name}" for name in ("effect", "largest", "search", "plant"))
+    assert isinstance(loaded.fitness["largest"], Fitness)
+    assert isinstance(loaded.identifiers["search"], Identifier)
+    assert isinstance(loaded.identifiers["search"].build(100), DE)
+    assert "drag.c" in (Model(loaded.plants["my_axis"]) + loaded.effects["drag"]).parameters
+
+
+def test_a_file_is_run_once_and_catalogues_stay_as_they_are(own):
+    assert load_plugin(f"{own}:effect")[2] is load_plugin(f"{own}:effect")[2]
+    load_registry([f"{own}:effect"])
+    assert "drag" not in Registry().effects
+
+
+@pytest.mark.parametrize(("attribute", "sentence"), [
+    ("coulomb", "effects: 'coulomb' is there already"), ("pso", "identifiers: 'pso' is there already"),
+    ("rmse", "fitness: 'rmse' is there already"),
+])  # fmt: skip
+def test_a_name_that_is_ours_is_refused(own, attribute, sentence):
+    with pytest.raises(ArmidError, match=sentence):
+        load_registry([f"{own}:{attribute}"])
+
+
+def test_a_name_of_two_plugins_is_refused(own):
+    with pytest.raises(ArmidError, match="effects: 'drag' is there already"):
+        load_registry([f"{own}:effect", f"{own}:effect"])
+
+
+@pytest.mark.parametrize(("plugin", "fragments"), [
+    ("own", ["'own'", "FILE.py:attribute"]), ("own.py", ["FILE.py:attribute"]), ("own.py:", ["FILE.py:attribute"]),
+    (":effect", ["FILE.py:attribute"]), ("missing.py:effect", ["there is no file missing.py"]),
+    ("{own}:efect", ["own.py has no 'efect'", "did you mean 'effect'"]), ("{own}:text", ["of type str", "Plant"]),
+    ("{own}:beside_it", ["of type module"]), ("README.md:effect", ["README.md is no Python file"]),
+])  # fmt: skip
+def test_a_plugin_that_is_none_is_refused(own, root, monkeypatch, plugin, fragments):
+    monkeypatch.chdir(root)
+    with pytest.raises(ArmidError) as refusal:
+        load_plugin(plugin.format(own=own))
+    for fragment in fragments:
+        assert fragment in str(refusal.value)
+
+
+@pytest.mark.parametrize(("text", "fragment"), [
+    ("raise RuntimeError('no luck')", "RuntimeError: no luck"), ("def broken(:", "SyntaxError"),
+    ("import not_there_at_all", "ModuleNotFoundError: No module named 'not_there_at_all'"),
+    ("raise SystemExit(0)", "SystemExit: 0"),
+    ("from armid import Parameter\nParameter('a b', '1', 0, 1)", "parameter 'a b' is no usable name"),
+])  # fmt: skip
+def test_a_file_that_fails_is_refused(tmp_path, text, fragment):
+    (tmp_path / "failing.py").write_text(text)
+    for _ in range(2):
+        with pytest.raises(ArmidError) as refusal:
+            load_plugin(f"{tmp_path / 'failing.py'}:thing")
+        assert fragment in str(refusal.value)
+    assert "armid_plugin_failing" not in sys.modules
+
+
+def test_the_place_of_an_error_in_a_plugin(tmp_path):
+    (tmp_path / "late.py").write_text("def failing(measured, simulated):\n    return measured / 'x'\n")
+    function = load_plugin(f"{tmp_path / 'late.py'}:failing")[2]
+    with pytest.raises(TypeError) as late:
+        function(1.0, 2.0)
+    assert place_in_plugin(late.value) == f"{tmp_path / 'late.py'}, line 2"
+    assert place_in_plugin(ValueError("ours")) is None
+
+
+def test_entry_points_of_installed_packages(installed):
+    installed(("effects", "any", "effect"), ("fitness", "worst_miss", "worst"), ("identifiers", "evolution", "DE"),
+              ("plants", "axis", "AXIS"))  # fmt: skip
+    loaded = load_registry()
+    assert loaded.effects["damper"] is effect
+    assert loaded.plants["other_axis"] is AXIS
+    assert loaded.fitness["worst_miss"].function is worst
+    assert isinstance(loaded.identifiers["evolution"].build(100), DE)
+
+
+@pytest.mark.parametrize(("point", "fragments"), [
+    (("effects", "any", "nothing"), ["'any'", "armid.effects", "cannot be loaded", "nothing"]),
+    (("effects", "any", "worst"), ["'any'", "belongs to fitness", "armid.fitness is expected"]),
+    (("plants", "any", "LEVEL"), ["'any'", "of type tuple"]),
+    (("identifiers", "pso", "DE"), ["identifiers: 'pso' is there already"]),
+])  # fmt: skip
+def test_a_bad_entry_point_is_refused(installed, point, fragments):
+    installed(point)
+    with pytest.raises(ArmidError) as refusal:
+        load_registry()
+    for fragment in fragments:
+        assert fragment in str(refusal.value)
+
+
+@pytest.mark.parametrize(("key", "value", "fragment"), [
+    ("plant", "own.py:plant", "plant 'own.py:plant' is unknown"),
+    ("effects", ["own.py:effect"], "effect 'own.py:effect' is unknown"),
+    ("plugin", ["own.py:effect"], "key 'plugin' is unknown"),
+])  # fmt: skip
+def test_a_campaign_file_loads_no_code(tmp_path, own, key, value, fragment):
+    marker = tmp_path / "ran"
+    (tmp_path / "own.py").write_text(f"open({str(marker)!r}, 'w').close()\n{own.read_text()}")
+    lines = {"name": "c", "plant": "shell_transfer_arm", key: value}
+    text = "\n".join(f"{name} = {value!r}" for name, value in lines.items())
+    (tmp_path / "campaign.toml").write_text(text + '\n[[records]]\nfile = "a.csv"\nrole = "train"\n')
+    with pytest.raises(ArmidError, match=fragment):
+        read_campaign(tmp_path)
+    assert not marker.exists()
+
