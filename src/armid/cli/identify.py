@@ -11,6 +11,7 @@ from armid.cli.new_files import NewFiles, refuse_unwritable
 from armid.cli.options import (
     accuracy_of,
     accuracy_option,
+    assignments,
     campaign_argument,
     chosen,
     effects_option,
@@ -19,6 +20,7 @@ from armid.cli.options import (
     model_of,
     numbers,
     plugin_option,
+    value_of,
 )
 
 if TYPE_CHECKING:
@@ -30,6 +32,8 @@ SIMILARITIES = ("similarity", "numerical_similarity")
 @click.command("identify")
 @campaign_argument
 @click.option("--identifier", default="pso", show_default=True, help="Who searches: see `armid list identifiers`.")
+@click.option("--option", "options", multiple=True, metavar="NAME=VALUE",
+              help="Option of the identifier, such as velocity_limit=0.2 of pso. Repeatable.")
 @click.option("--fitness", default="similarity", show_default=True, help="What is minimised: see `armid list fitness`.")
 @effects_option
 @click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
@@ -46,8 +50,8 @@ SIMILARITIES = ("similarity", "numerical_similarity")
 @accuracy_option
 @plugin_option
 def identify_command(
-    campaign: Path, identifier: str, fitness: str, effects: str, bounds: tuple[str, ...], fix: tuple[str, ...],
-    window: str, budget: int, target: float | None, seed: int, out: Path | None, accuracy: str,
+    campaign: Path, identifier: str, options: tuple[str, ...], fitness: str, effects: str, bounds: tuple[str, ...],
+    fix: tuple[str, ...], window: str, budget: int, target: float | None, seed: int, out: Path | None, accuracy: str,
     plugins: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Identify parameters from the train records.
@@ -69,6 +73,7 @@ def identify_command(
     space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
     distance: Any = chosen(fitness, registry.fitness, "fitness")
     searcher: Any = chosen(identifier, registry.identifiers, "identifier")
+    searcher = searcher.with_options({n: value_of(v) for n, v in assignments(options, "--option").items()})
     goal = 1.0 - target if target is not None and fitness in SIMILARITIES else target
     if out is not None:
         refuse_unwritable(out)

@@ -51,6 +51,16 @@ def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> 
     return found
 
 
+def value_of(text: str) -> float | int | str:
+    """Return a whole number, a number, or the word itself."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
 def numbers(texts: Iterable[str], option: str) -> dict[str, float]:
     """Return NAME -> number."""
     return {name: number(value, f"{option} {name}") for name, value in assignments(texts, option).items()}

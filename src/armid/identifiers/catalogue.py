@@ -1,8 +1,8 @@
 """The identifiers by name, and how a user's own becomes one."""
 
 import inspect
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,26 +16,43 @@ from armid.model.errors import ArmidError
 class Identifier:
     """Declare a method that finds parameters.
 
-    name: as studies spell it; build: budget in simulations -> a fresh algorithm of pymoo; note: what it is, in words.
+    name: as studies spell it; build: budget in simulations -> a fresh algorithm of pymoo, options by name if it has
+    any; note: what it is, in words.
     is_global: it searches the whole box; uses_gradient: it asks for derivatives; is_stochastic: a seed changes it.
     """
 
     name: str
-    build: Callable[[int], Algorithm]
+    build: Callable[..., Algorithm]
     note: str = ""
     is_global: bool = False
     uses_gradient: bool = False
     is_stochastic: bool = True
 
+    def with_options(self, options: Mapping[str, float | str]) -> "Identifier":
+        """Return the identifier with options of its own, such as `velocity_limit` of the swarm.
 
-def swarm(budget: int) -> PaperPSO:
+        Raises ArmidError when it takes none; an unknown name or a bad value is refused when it is built.
+        """
+        if options and not takes_options(self.build):
+            raise ArmidError(f"identifier '{self.name}' takes no options, '{next(iter(options))}' was given")
+        return replace(self, build=partial(self.build, **options)) if options else self
+
+
+def takes_options(build: Callable[..., Algorithm]) -> bool:
+    """Tell whether a factory takes keywords beside the budget."""
+    kinds = [p.kind for p in inspect.signature(build).parameters.values()]
+    return inspect.Parameter.VAR_KEYWORD in kinds or len(kinds) > 1
+
+
+def swarm(budget: int, **options: Any) -> PaperPSO:
     """Return the paper's swarm with its inertia schedule stretched over the budget.
 
-    budget: number of simulations; below 80 the swarm has that many particles. Raises ArmidError unless it is above 0.
+    budget: number of simulations; below 80 the swarm has that many particles. options: of PaperPSO.
+    Raises ArmidError unless the budget is above 0, and for an unknown option.
     """
     budget = checked_count("the budget", budget)
-    n_particles = min(80, budget)
-    return PaperPSO(n_particles=n_particles, n_iterations=-(-budget // n_particles))
+    n_particles = checked_count("n_particles", options.pop("n_particles", min(80, budget)))
+    return PaperPSO(**({"n_particles": n_particles, "n_iterations": -(-budget // n_particles)} | options))
 
 
 def as_identifier(name: str, obj: Any) -> Identifier:

@@ -61,7 +61,8 @@ def calibrate(
 ) -> Calibration:
     """Choose the coarsest schedule whose error on the candidates stays within half of what is allowed.
 
-    The error of n steps between samples is estimated from the difference to 2n steps: fourth order, 16/15 of it.
+    The error of n steps between samples is estimated from the difference to 2n steps: fourth order, 16/15 of it. Steps
+    at which a candidate fails that holds with the finest ones are too coarse, whatever the others do.
     candidates: shape (n_candidates, n_parameters), usually `probes` of the bounds. spans: look for steps over several
     samples too, which pays when many populations follow.
 
@@ -78,12 +79,19 @@ def calibrate(
     error = np.inf
     for n in SUBSTEPS:
         error = difference(run(n), run(2 * n)) * 16 / 15
+        if run(n).failed.any() and spared(run(n), run(SUBSTEPS[-1])):
+            error = np.inf
         if error <= MARGIN * allowed:
             break
     schedule = Schedule(n, weights=switch_weights(candidates, run(n)))
     if spans:
         schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
     return Calibration(schedule, error, bool(error <= allowed))
+
+
+def spared(coarse: Simulation, fine: Simulation) -> bool:
+    """Tell whether a candidate that fails with coarse steps holds with fine ones, or whether none holds at all."""
+    return bool((coarse.failed & ~fine.failed).any() or fine.failed.all())
 
 
 def switch_weights(candidates: Array, run: Simulation) -> Array | None:

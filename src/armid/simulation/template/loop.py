@@ -74,8 +74,8 @@ def simulate(population, n_padded, constants, inputs, interval, n_samples, subst
                         keep_states(trace, places, s + i + 1, {x_n})
                 {keep_calm}
                 {copy_out}
-            last = (buffered + span - 1) * WIDTH
-            alive = select(limit, abs(load(block, last)), alive, 0.0)
+            for i in range(buffered, buffered + span):
+                alive = select(limit, abs(load(block, i * WIDTH)), alive, 0.0)
             if any_above(1.0 - alive, 0.5):
                 for i in range(buffered, buffered + span):
                     store(block, i * WIDTH, select(alive, 0.5, load(block, i * WIDTH), np.nan))
