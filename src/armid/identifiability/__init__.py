@@ -1,5 +1,5 @@
 """How well records pin down parameters."""
 
-from armid.identifiability.information import Information, Level, collinear, information_at, sensitivities
+from armid.identifiability.information import MISFIT, Information, Level, collinear, information_at, sensitivities
 
-__all__ = ["Information", "Level", "collinear", "information_at", "sensitivities"]
+__all__ = ["MISFIT", "Information", "Level", "collinear", "information_at", "sensitivities"]

@@ -3,7 +3,7 @@
 import numpy as np
 from rich.table import Table
 
-from armid.identifiability import collinear
+from armid.identifiability import MISFIT, collinear
 from armid.identification.errors import Errors, record_errors
 from armid.identification.identify import Identification
 
@@ -76,14 +76,15 @@ def remarks(found: Identification) -> list[str]:
 
 
 def shape_remarks(found: Identification) -> list[str]:
-    """Return a sentence for each record on which S2 falls though S1 says that the signals agree.
+    """Return a sentence for each record on which S2 falls though the residual is no more than noise.
 
     S2 pairs few intervals between landmarks; one landmark that is only noise, near an end, can unpair them all.
     """
     said = []
     for replay in (*found.train_replays, *found.holdout_replays):
         e = record_errors(replay, found.candidate)
-        if e.s2 < SHAPE_FALLS and e.s1 > NUMBERS_AGREE:
+        only_noise = e.chi2_per_sample is not None and e.chi2_per_sample < MISFIT
+        if e.s2 < SHAPE_FALLS and e.s1 > NUMBERS_AGREE and only_noise:
             said.append(f"{replay.record.file}: S2 is {e.s2:.3f} though S1 is {e.s1:.3f}: the shape similarity pairs "
                         "a few intervals by order, and a landmark of noise unpairs them; look at S1 and RMSE.")
     return said
