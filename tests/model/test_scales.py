@@ -34,7 +34,7 @@ def test_physical_units_stay(unit):
 
 
 def test_misspelt_scale_is_refused():
-    with pytest.raises(ArmidError, match="'sped'.*'speed'"):
+    with pytest.raises(ArmidError, match=r"'sped'.*'speed'"):
         resolve(Parameter("c", "effort/sped", 0.0, 1.0), ARM)
 
 

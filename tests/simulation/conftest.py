@@ -1,0 +1,39 @@
+"""Models of the arm, and schedules calibrated once."""
+
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+from arm_cases import box_of, index_rows, manoeuvre_of
+
+from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
+from armid.simulation import Schedule, calibrate, probes
+
+
+@pytest.fixture(scope="session")
+def manoeuvres() -> dict[str, Manoeuvre]:
+    """The seven manoeuvres of the reference by name."""
+    return {row["manoeuvre"]: manoeuvre_of(row) for row in index_rows()}
+
+
+@pytest.fixture(scope="session")
+def arm() -> Model:
+    return Model(PLANTS["shell_transfer_arm"])
+
+
+@pytest.fixture(scope="session")
+def rubbing_arm(arm: Model) -> Model:
+    return arm + EFFECTS["coulomb"] + EFFECTS["viscous"]
+
+
+@pytest.fixture(scope="session")
+def schedule_for(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> Callable[[str, str], Schedule]:
+    """Schedule of the arm for a manoeuvre and an accuracy, on the box of Table I."""
+
+    @cache
+    def schedule(manoeuvre: str, accuracy: str) -> Schedule:
+        found = calibrate(arm, manoeuvres[manoeuvre], probes(*box_of(arm)), accuracy)
+        assert found.reached
+        return found.schedule
+
+    return schedule

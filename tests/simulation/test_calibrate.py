@@ -1,0 +1,93 @@
+"""How finely time is cut: as finely as the error asks for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_cases import box_of, drawn
+
+from armid.model import PLANTS, ArmidError, Manoeuvre, Model
+from armid.simulation import Schedule, calibrate, probes, simulate
+
+
+def test_probes_fill_the_box(arm: Model) -> None:
+    low, high = box_of(arm)
+    spread = (probes(low, high, 200) - low) / (high - low)
+    assert spread.shape == (200, 4)
+    assert np.all((spread > 0.0) & (spread < 1.0))
+    # every tenth of every side is visited about as often as it should
+    for side in spread.T:
+        assert np.histogram(side, 10, (0.0, 1.0))[0].min() >= 14
+
+
+def test_a_model_without_parameters_has_probes() -> None:
+    assert probes(np.empty(0), np.empty(0), 3).shape == (3, 0)
+
+
+def test_a_finer_accuracy_takes_more_steps(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    spread = probes(*box_of(arm))
+    standard, fine = (calibrate(arm, manoeuvres["lower"], spread, a) for a in ("standard", "fine"))
+    assert standard.schedule.substeps < fine.schedule.substeps
+    assert fine.error < standard.error
+    assert standard.reached
+    assert fine.reached
+
+
+def test_the_error_is_honest(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    """Within a factor of two of the difference to a much finer run."""
+    spread = probes(*box_of(arm))
+    found = calibrate(arm, manoeuvres["empty"], spread, "standard", spans=False)
+    run, finest = (simulate(arm, manoeuvres["empty"], spread, s).output for s in (found.schedule, Schedule(24)))
+    assert 0.5 <= found.error / np.abs(run - finest).max() <= 2.0
+
+
+def test_an_axis_with_hard_drive_needs_more_steps() -> None:
+    axis = Model(PLANTS["driven_axis"])
+    times = 0.01 * np.arange(300)
+    slow, fast = (
+        calibrate(axis, Manoeuvre(0.01, 300, {"gravity_moment": g}, {"u": np.sin(times)}), np.array([[1.0]]), "fine")
+        for g in (1.0, 400.0)
+    )
+    assert slow.schedule.substeps < fast.schedule.substeps
+
+
+def test_what_cannot_be_reached_is_said() -> None:
+    axis = Model(PLANTS["driven_axis"])
+    coarse = Manoeuvre(10.0, 30, {"gravity_moment": 4000.0}, {"u": np.sin(np.arange(30.0))})
+    assert not calibrate(axis, coarse, np.array([[1.0]]), "fine").reached
+
+
+def test_an_unknown_accuracy_is_refused(arm: Model) -> None:
+    with pytest.raises(ArmidError, match="accuracy 'finest' is unknown: standard or fine is expected"):
+        calibrate(arm, Manoeuvre(0.001, 60), drawn(arm, 1, 1), "finest")
+
+
+def test_long_steps_are_taken_where_candidates_could_try_them(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    spread = probes(*box_of(arm))
+    for name in ("lower", "raise_empty"):
+        found = calibrate(arm, manoeuvres[name], spread, "fine")
+        assert found.schedule.plan is not None
+        switched = simulate(arm, manoeuvres[name], spread, Schedule(2)).switch_times["closed"]
+        longest_from = int(np.argmax(found.schedule.plan == found.schedule.plan.max()))
+        assert np.count_nonzero(switched > 1e-3 * longest_from) >= 8
+
+
+def test_where_all_have_switched_no_step_is_long(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    assert calibrate(arm, manoeuvres["inside_E"], probes(*box_of(arm))).schedule.plan is None
+
+
+def test_long_steps_change_nothing_that_counts(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    population = drawn(arm, 200, 5)
+    schedule = calibrate(arm, manoeuvres["lower"], probes(*box_of(arm)), "fine").schedule
+    with_plan, without = (
+        simulate(arm, manoeuvres["lower"], population, s).output for s in (schedule, replace(schedule, plan=None))
+    )
+    assert 0.0 < np.abs(with_plan - without).max() <= 4e-8
+
+
+def test_weights_bring_like_switch_times_together(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    weights = calibrate(arm, manoeuvres["lower"], probes(*box_of(arm))).schedule.weights
+    assert weights is not None
+    population = drawn(arm, 300, 6)
+    times = simulate(arm, manoeuvres["lower"], population).switch_times["closed"]
+    assert np.corrcoef(population @ weights, times)[0, 1] > 0.95

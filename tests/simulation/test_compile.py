@@ -1,0 +1,147 @@
+"""Generated modules: named by their text, compiled once and for all, and made of packed instructions."""
+
+import importlib
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+import pytest
+
+from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Manoeuvre, Model, Parameter
+from armid.simulation import cache_folder, compile_model, simulate
+from armid.simulation.compile import load_module, module_name
+from armid.simulation.generate import generate_module
+
+SCRIPT = """
+import json
+import numpy as np
+from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
+from armid.simulation import compile_model, simulate
+model = Model(PLANTS["driven_axis"]) + EFFECTS["viscous"]
+found = simulate(model, Manoeuvre(0.01, 50, inputs={"u": np.ones(50)}), [[1.0, 0.5]])
+kernel, _ = compile_model(model)
+hits, misses = (sum(n.values()) for n in (kernel.stats.cache_hits, kernel.stats.cache_misses))
+print(json.dumps({"hits": hits, "misses": misses, "last": found.output[0, -1]}))
+"""
+
+
+def start(folder: Path) -> subprocess.Popen[str]:
+    """Simulate in a process of its own, with a cache folder."""
+    paths = [str(Path(__file__).parents[2] / "src"), os.environ.get("PYTHONPATH", "")]
+    told = os.environ | {"ARMID_CACHE": str(folder), "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
+    return subprocess.Popen([sys.executable, "-W", "error", "-c", SCRIPT], env=told, text=True, stdout=subprocess.PIPE)
+
+
+def result(process: subprocess.Popen[str]) -> dict[str, float]:
+    out, _ = process.communicate(timeout=300)
+    assert process.returncode == 0
+    return dict(json.loads(out))
+
+
+def listing(folder: Path) -> dict[str, tuple[int, int]]:
+    """Every file of compiled code with its size and time of change; Python's own bytecode is another matter."""
+    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*") if p.suffix in (".nbc", ".nbi")}
+
+
+def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "cache"
+    both = [start(folder), start(folder)]
+    first = [result(p) for p in both]
+    kept = listing(folder)
+    again = result(start(folder))
+    assert any(f["misses"] == 1 for f in first)
+    assert (again["hits"], again["misses"]) == (1, 0)
+    assert listing(folder) == kept
+    assert len(list(folder.glob("*.py"))) == 1
+    assert not list(folder.glob("*.part"))
+    assert {f["last"] for f in first} == {again["last"]}
+
+
+def effect_of(folder: Path, text: str) -> Effect:
+    """An effect whose equation is read from a file of that text."""
+    names: dict[str, object] = {}
+    file = folder / f"user_{abs(hash(text))}.py"
+    file.write_text(text, encoding="utf-8")
+    exec(compile(text, str(file), "exec"), names)
+    return Effect("own", (Parameter("level", "effort", 0, 1, null=0.0),), {"torque": names["torque"]})  # type: ignore[dict-item]
+
+
+def test_a_changed_equation_gives_another_module(tmp_path: Path) -> None:
+    texts = [
+        "def torque(omega, level):\n    return -level * omega\n",
+        "def torque(omega, level):\n    return -level * omega * 2\n",
+        "F = 4\ndef torque(omega, level):\n    return -level * omega * F\n",
+        "F = 3\ndef torque(omega, level):\n    return -level * omega * F\n",
+        "def f(x):\n    return x\ndef torque(omega, level):\n    return -level * f(omega)\n",
+        "def f(x):\n    return -x\ndef torque(omega, level):\n    return -level * f(omega)\n",
+    ]
+    models = [Model(PLANTS["driven_axis"]) + effect_of(tmp_path, t) for t in texts]
+    assert len({module_name(generate_module(m, 8)) for m in models}) == len(texts)
+
+
+def test_words_beside_the_equation_change_nothing(tmp_path: Path) -> None:
+    texts = [
+        "def torque(omega, level):\n    return -level * omega\n",
+        'def torque(omega: float, level: float) -> float:\n    """Say something."""\n    return -level*omega  # so\n',
+    ]
+    models = [Model(PLANTS["driven_axis"]) + effect_of(tmp_path, t) for t in texts]
+    assert len({module_name(generate_module(m, 8)) for m in models}) == 1
+
+
+def test_a_known_model_is_looked_up(arm: Model) -> None:
+    assert compile_model(arm)[0] is compile_model(arm)[0]
+    assert compile_model(arm)[0] is compile_model(Model(PLANTS["shell_transfer_arm"]))[0]
+
+
+def test_a_cache_folder_that_cannot_be_written_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocked = tmp_path / "a file"
+    blocked.write_text("")
+    monkeypatch.setenv("ARMID_CACHE", str(blocked / "cache"))
+    with pytest.raises(ArmidError, match=r"the cache folder .*cache cannot be written \(.+\): set ARMID_CACHE"):
+        load_module("x = 'never seen before'\n")
+
+
+def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
+    assert cache_folder() == tmp_path
+    monkeypatch.delenv("ARMID_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert cache_folder() == tmp_path / "xdg" / "armid"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    assert cache_folder() == tmp_path / "home" / ".cache" / "armid"
+
+
+def packed_and_scalar(model: Model, manoeuvre: Manoeuvre, monkeypatch: pytest.MonkeyPatch) -> tuple[int, int]:
+    """Numbers of packed and of scalar arithmetic instructions in the machine code of a model."""
+    features = llvm.get_host_cpu_features()
+    if not (features.get("avx2") or features.get("avx512f")):
+        pytest.skip("this processor has neither AVX2 nor AVX-512, whose instructions are looked for")
+    # A kernel that comes from the cache cannot show its instructions: it is compiled anew.
+    kernel, width = compile_model(model)
+    fresh = numba.njit(error_model="numpy", nogil=True)(kernel.py_func)
+    monkeypatch.setattr(importlib.import_module("armid.simulation.simulate"), "compile_model", lambda _: (fresh, width))
+    simulate(model, manoeuvre, [[0.5 * (p.low + p.high) for p in model.parameters.values()]])
+    text = "\n".join(fresh.inspect_asm().values())
+    arithmetic = r"\bv(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)"
+    return len(re.findall(arithmetic + r"pd\s.*[yz]mm", text)), len(re.findall(arithmetic + r"sd\s", text))
+
+
+def test_an_axis_runs_in_packed_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = Model(PLANTS["driven_axis"]) + EFFECTS["coulomb"]
+    packed, scalar = packed_and_scalar(model, Manoeuvre(0.01, 9, inputs={"u": np.ones(9)}), monkeypatch)
+    assert packed > 100
+    assert packed > 4 * scalar
+
+
+@pytest.mark.slow
+def test_the_arm_runs_in_packed_instructions(rubbing_arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    packed, scalar = packed_and_scalar(rubbing_arm, Manoeuvre(0.001, 9), monkeypatch)
+    assert packed > 500
+    assert packed > 10 * scalar

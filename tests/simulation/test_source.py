@@ -1,0 +1,176 @@
+"""A user's functions in the generated module: what can be written, and that it computes the same as in Python."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equations_of_a_user as user
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from armid.model import PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, Plant, Scales, State
+from armid.simulation import Schedule, Simulation, simulate
+from armid.simulation.source import SourceText
+
+ALL = [*user.VECTOR, *user.BY_LANE]
+LEVELS = np.array([0.0, 0.25, 0.6])
+N_SAMPLES = 97
+
+
+def one():
+    """Rate of a state that is the time."""
+    return 1.0
+
+
+def begin():
+    """Start before 0, so that the speed runs through it."""
+    return -0.5
+
+
+def recorded(output):
+    """What the effects add, and nothing else."""
+    return output
+
+
+ramp = Plant(
+    name="ramp",
+    parameters=(Parameter("unused", "1", 0.0, 1.0),),
+    states=(State("omega", "rad/s", one, begin),),
+    quantities={"recorded": recorded},
+    output="recorded",
+    output_unit="rad/s",
+    ports={"output": "rad/s"},
+    scales=Scales(effort=1.0, speed=1.0),
+)
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    return f"{function.__name__.strip('<>')}_{function.__code__.co_firstlineno}"
+
+
+@pytest.fixture(scope="module")
+def found() -> Simulation:
+    """The ramp with every equation as an effect; in each candidate one of them is not at its null, one level each."""
+    effects = tuple(
+        Effect(f"e{i}", (Parameter("level", "1", 0.0, 1.0, null=0.0),), {"output": f}) for i, f in enumerate(ALL)
+    )
+    population = np.zeros((len(ALL) * len(LEVELS), 1 + len(ALL)))
+    for i in range(len(ALL)):
+        population[i * len(LEVELS) : (i + 1) * len(LEVELS), 1 + i] = LEVELS
+    return simulate(Model(ramp, effects), Manoeuvre(1 / 64, N_SAMPLES), population, Schedule(), states=True)
+
+
+def rows_of(found: Simulation, function: Callable[..., Any]) -> NDArray[np.float64]:
+    """What the engine makes of an equation, (n_levels, n_samples)."""
+    i = ALL.index(function)
+    return found.output[i * len(LEVELS) : (i + 1) * len(LEVELS)]
+
+
+@pytest.mark.parametrize("function", ALL, ids=name_of)
+def test_computes_the_same_as_python(function: Callable[..., Any], found: Simulation) -> None:
+    speeds = found.states["omega"][0]
+    assert np.array_equal(speeds, -0.5 + np.arange(N_SAMPLES) / 64)
+    expected = [[float(function(float(w), float(level))) for w in speeds] for level in LEVELS]
+    np.testing.assert_allclose(rows_of(found, function), expected, rtol=1e-14, atol=1e-15)
+
+
+def test_statements_give_the_same_as_selections(found: Simulation) -> None:
+    assert np.array_equal(rows_of(found, user.branches), rows_of(found, user.branches_as_choice))
+
+
+@pytest.mark.parametrize("function", ALL, ids=name_of)
+def test_runs_lane_by_lane_only_where_it_must(function: Callable[..., Any]) -> None:
+    sources = SourceText()
+    sources.add("f__x", function)
+    assert ("f__x" in sources.by_lane) == (function in user.BY_LANE)
+
+
+ON_ARRAYS = [user.plain, user.with_helper, user.constants, user.several_lines, user.where_and_clip, user.defaults,
+             user.powers, user.closed_over, user.short, user.branches_as_choice]  # fmt: skip
+
+
+@pytest.mark.parametrize("function", ON_ARRAYS, ids=name_of)
+def test_the_same_source_runs_on_arrays(function: Callable[..., Any]) -> None:
+    speeds = np.linspace(-0.5, 1.0, 33)
+    expected = [float(function(float(w), 0.25)) for w in speeds]
+    np.testing.assert_allclose(function(speeds, 0.25), expected, rtol=1e-14, atol=1e-15)
+
+
+NAMES = ("h", "np", "math", "i", "lane", "k1_x", "result")
+
+
+def with_names_of_the_loop(h, np, math, i, lane, k1_x, result):
+    """Names that the generated module uses itself, and those of modules and builtins."""
+    if i > 100.0:
+        return 0.0
+    return h + 8 * np + math**2 + i + lane + k1_x + result
+
+
+def on_lanes(np, abs, span, x):
+    """The same without branches."""
+    return np**2 * (1.0 if abs > 0.0 else span) + x
+
+
+def falls(h):
+    """A guard, so that the part which cuts steps is there too."""
+    return h - 0.2
+
+
+def test_names_of_the_loop_numpy_and_builtins_can_be_used() -> None:
+    states = tuple(State(n, "1", one, one) for n in NAMES)
+    guards = (Guard("kink", falls), Guard("n", falls, latch=True))
+    parameters = (Parameter("x", "1", 0.0, 1.0, null=0.0), Parameter("time_of", "1", 0.0, 1.0))
+    odd = Effect("odd", parameters, {"output": with_names_of_the_loop}, states, guards)
+    few = tuple(State(n, "1", one, one) for n in ("np", "abs", "span"))
+    more = Effect("more", (Parameter("x", "1", 0.0, 1.0, null=0.0),), {"output": on_lanes}, few)
+    found = simulate(Model(ramp) + odd + more, Manoeuvre(1 / 64, 5), [[0.0, 0.0, 0.5, 0.25]], states=True)
+    now = 1.0 + np.arange(5) / 64
+    expected = (1 + 8 + 4) * now + now**2 + now**2 + 0.25
+    np.testing.assert_allclose(found.output[0], expected, rtol=1e-14)
+    assert set(found.states) == {"omega", *(f"odd.{n}" for n in NAMES), "more.np", "more.abs", "more.span"}
+
+
+def waits(clock):
+    """Distance to half a second."""
+    return 0.5 - clock
+
+
+def after(on, clock, level):
+    """Nothing before the switch, then in proportion to the time since."""
+    return level * on * (clock - 0.5)
+
+
+def test_an_effect_may_bring_its_own_clock_and_switch() -> None:
+    late = Effect("late", (Parameter("level", "1", 0.0, 1.0, null=0.0),), {"output": after},
+                  (State("clock", "s", one, zero),), (Guard("on", waits, latch=True),))  # fmt: skip
+    found = simulate(Model(ramp) + late, Manoeuvre(0.03, 41), [[0.0, 2.0]])
+    assert found.switch_times["late.on"][0] == pytest.approx(0.5, abs=1e-12)
+    times = 0.03 * np.arange(41)
+    np.testing.assert_allclose(found.output[0], 2.0 * np.maximum(times - 0.5, 0.0), atol=1e-12)
+
+
+def zero():
+    """Start at 0."""
+    return 0.0
+
+
+def of_constants(gain, gravity_moment):
+    """Selections among plain numbers, which numba alone refuses."""
+    low = np.where(gain > 1.0, 1.0, -1.0) + np.clip(gain, 3.0, 4.0) + np.minimum(gain, 7.0)
+    return low + (10.0 if gravity_moment == 0.0 and gain > 0 else 20.0) + max(gain, gravity_moment, 1.5)
+
+
+def test_selections_work_on_plain_numbers_too() -> None:
+    push = Effect("push", (Parameter("unused", "1", 0.0, 1.0, null=0.0),), {"torque": of_constants})
+    rest = Manoeuvre(0.01, 11, {"gain": 2.0}, {"u": np.zeros(11)})
+    found = simulate(Model(PLANTS["driven_axis"]) + push, rest, [[1.0, 0.0]])
+    np.testing.assert_allclose(found.output[0], (1.0 + 3.0 + 2.0 + 10.0 + 2.0) * 0.01 * np.arange(11), atol=1e-12)
+
+
+def test_the_same_equations_give_the_same_module() -> None:
+    """A module is named by its text: nothing that differs from run to run may get into it."""
+    from armid.simulation.generate import generate_module
+
+    texts = {generate_module(Model(ramp) + Effect("e", (Parameter("level", "1", 0.0, 1.0),), {"output": user.loop}), 8)
+             for _ in range(3)}  # fmt: skip
+    assert len(texts) == 1
