@@ -9,8 +9,9 @@ import pytest
 from rich.console import Console
 
 from armid.identification import record_errors
+from armid.identification.remarks import remarks
 from armid.identification.result import result_of
-from armid.identification.words import error_table, parameter_table, remarks
+from armid.identification.words import error_table, parameter_table
 from armid.problem import space_of
 
 PARAMETER = {"value", "unit", "low", "high", "bound_low", "bound_high", "bound_active"}
@@ -125,4 +126,19 @@ def test_noise_from_differences_and_a_lacking_model_are_told(lowering_found):
     )  # fmt: skip
     said = "\n".join(remarks(told))
     assert "from high-frequency differences of the motion, as fewer than 50 samples were recorded at rest" in said
-    assert "the residual is 300 times the noise, so the model lacks something" in said
+    assert "the residual is 300 times the noise: the model lacks something" in said
+
+
+def test_a_search_that_has_not_come_to_the_minimum_is_told(lowering_found):
+    far = replace(lowering_found.information, step=np.array([0.1, -40.0, 0.2, np.nan]))
+    near = replace(lowering_found.information, step=np.array([0.1, 1.0, 0.2, np.nan]))
+    assert any("has not come to the least-squares minimum" in text and "move k by 40" in text
+               for text in remarks(replace(lowering_found, information=far)))  # fmt: skip
+    assert not any("least-squares minimum" in text for text in remarks(replace(lowering_found, information=near)))
+
+
+def test_a_fit_that_does_not_carry_over_is_told(lowering_found):
+    train = replace(lowering_found.train, chi2_per_sample=1.1)
+    for chi2, told in ((6.6, True), (1.2, False)):
+        found = replace(lowering_found, train=train, holdout=replace(train, chi2_per_sample=chi2))
+        assert any("does not carry over" in text for text in remarks(found)) == told

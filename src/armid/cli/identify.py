@@ -90,7 +90,8 @@ def report(found: "Identification") -> None:
     """Print tables and remarks."""
     from rich.console import Console  # noqa: PLC0415 - takes time to import
 
-    from armid.identification.words import error_table, parameter_table, remarks  # noqa: PLC0415
+    from armid.identification.remarks import remarks  # noqa: PLC0415
+    from armid.identification.words import error_table, parameter_table  # noqa: PLC0415
 
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(parameter_table(found))

@@ -1,10 +1,11 @@
 """How well records pin down parameters: sensitivities, Fisher information, intervals, correlations."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.identifiability.start import start_scatter
 from armid.problem.replay import Replay
 from armid.problem.space import Space
 from armid.record.noise import correlation_sum
@@ -39,12 +40,15 @@ class Information:
 
     deviation: standard deviation of each, SI, infinite where the records do not determine it, shape (n_free,).
     correlation: of the estimates, shape (n_free, n_free), NaN where not determined.
+    levels: of the records. step: how far a least-squares step inside the box would move each parameter, in standard
+    deviations, NaN where not determined: far above 1 where a search has not come to the minimum.
     """
 
     names: tuple[str, ...]
     deviation: Array
     correlation: Array
     levels: tuple[Level, ...] = ()
+    step: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def half_width(self) -> Array:
@@ -74,11 +78,19 @@ def level_of(replay: Replay, space: Space, x: Array) -> Level:
     be too narrow by orders of magnitude.
     """
     noise = replay.record.noise
-    residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
+    residual = residual_of(replay, space, x)
     rms = float(np.sqrt(np.mean(residual**2)))
-    if not np.isfinite(rms) or rms**2 <= MISFIT * noise.rms**2 or rms <= ENGINE_ERRORS * replay.engine_error:
+    # How well the noise itself is known: its mean square scatters by 2/n_eff.
+    doubt = 1.0 + 3.0 * np.sqrt(2.0 / (noise.n_samples * noise.effective_fraction))
+    noise_like = rms**2 <= MISFIT * doubt * noise.rms**2
+    if not np.isfinite(rms) or noise_like or rms <= ENGINE_ERRORS * replay.engine_error:
         return Level(noise.rms, noise.effective_fraction)
     return Level(rms, 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+
+
+def residual_of(replay: Replay, space: Space, x: Array) -> Array:
+    """Return measured minus simulated signal in the windows of a record [its unit]."""
+    return np.asarray(replay.measured - replay.signal(space.complete(x[np.newaxis]))[0])
 
 
 def information_at(replays: tuple[Replay, ...], space: Space, x: Array) -> Information:
@@ -86,24 +98,39 @@ def information_at(replays: tuple[Replay, ...], space: Space, x: Array) -> Infor
 
     Fisher information F = sum over records of f J^T J / level^2 with f the share of samples that are independent;
     covariance = F^-1 (the Cramer-Rao bound of an unbiased estimate). The level is the noise, or the residual where that
-    is far above it. A record without noise and without residual gives an interval of width 0.
+    is far above it. A record without noise and without residual gives an interval of width 0. Where records start from
+    a measured state, what its noise does to the estimate is added (see `start_scatter`).
     x: free parameters, SI, shape (n_free,).
     """
     span = space.high[space.free] - space.low[space.free]
     levels = tuple(level_of(r, space, x) for r in replays)
     noise_free = any(level.rms == 0.0 for level in levels)
-    total = np.zeros((len(x), len(x)))
+    total, started, slope = np.zeros((len(x), len(x))), np.zeros((len(x), len(x))), np.zeros(len(x))
     for replay, level in zip(replays, levels, strict=True):
         jacobian = sensitivities(replay, space, x)
         weight = 1.0 if noise_free else level.effective_fraction / level.rms**2
         total += weight * jacobian.T @ jacobian
+        slope += weight * jacobian.T @ residual_of(replay, space, x)
+        if not noise_free:
+            started += weight**2 * start_scatter(replay, space, x, jacobian)
     covariance = inverse(total)
+    determined = np.where(np.isfinite(covariance), covariance, 0.0)
+    step = step_inside(determined @ slope, x / span, space.low[space.free] / span, space.high[space.free] / span)
+    covariance = covariance + determined @ started @ determined
     deviation = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(deviation, deviation)
     correlation[~np.isfinite(correlation)] = np.nan
     known = np.isfinite(deviation)
-    return Information(space.free_names, np.where(known & noise_free, 0.0, deviation * span), correlation, levels)
+    with np.errstate(invalid="ignore"):
+        steps = np.zeros(len(x)) if noise_free else step / deviation
+    shown = np.where(known & noise_free, 0.0, deviation * span)
+    return Information(space.free_names, shown, correlation, levels, steps)
+
+
+def step_inside(step: Array, x: Array, low: Array, high: Array) -> Array:
+    """Return a step cut at the box; all in shares of the range."""
+    return np.asarray(np.clip(x + step, low, high) - x)
 
 
 def inverse(matrix: Array) -> Array:

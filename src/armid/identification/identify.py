@@ -85,7 +85,9 @@ def identify(
     if space.free.any():
         stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
         if meter.best_x is None:
-            raise ArmidError(f"all {meter.used} candidates diverged: narrower bounds or other constants are expected")
+            raise ArmidError(
+                f"none of {meter.used} candidates has a fitness: each diverged, or the fitness was no finite number"
+            )
         x = meter.best_x
     else:
         stopped, x = "no parameter is free", np.empty(0)
@@ -130,4 +132,6 @@ def search(
         return "target reached"
     if interrupted():
         return INTERRUPTED
-    return "budget used" if meter.exhausted else f"{identifier.name} stopped by itself"
+    if meter.exhausted:
+        return "budget used" if meter.target is None else "budget used, target not reached"
+    return f"{identifier.name} stopped by itself"
