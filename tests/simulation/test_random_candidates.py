@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from arm_cases import Array, drawn
+from arm_cases import Array, box_of, drawn
 from arm_stand import stand_speed
 
 from armid.model import Manoeuvre, Model
-from armid.simulation import Schedule, Simulation, simulate
+from armid.simulation import Schedule, Simulation, calibrate, probes, simulate
 
 ERROR = {"standard": 1e-5, "fine": 2e-7}
 N_CANDIDATES, SEED = 300, 20261121
@@ -51,3 +51,23 @@ def test_many_candidates_agree_with_a_finer_run(
         for accuracy, allowed in ERROR.items():
             found = simulate(arm, manoeuvre, candidates, schedule_for(name, accuracy))
             assert np.abs(found.output - finest.output).max() <= allowed, (name, accuracy)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [0.01, 0.001])
+def test_friction_agrees_with_the_test_stand(
+    width: float, rubbing_arm: Model, manoeuvres: dict[str, Manoeuvre]
+) -> None:
+    """However narrow the smoothing of the sign: the schedule follows."""
+    low, high = box_of(rubbing_arm)
+    low[5] = high[5] = width
+    candidates = low + (high - low) * np.random.default_rng(SEED).random((8, 7))
+    candidates[:, [4, 6]] *= 0.2
+    for name in ("lower", "raise"):
+        stood = [stand_speed(name, c[:4], coulomb=c[4], coulomb_width=c[5], viscous=c[6]) for c in candidates]
+        for accuracy, allowed in ERROR.items():
+            found = calibrate(rubbing_arm, manoeuvres[name], probes(low, high), accuracy)
+            assert found.reached
+            run = simulate(rubbing_arm, manoeuvres[name], candidates, found.schedule)
+            check(run, [s for s in stood if s is not None], allowed)
+        assert None not in stood

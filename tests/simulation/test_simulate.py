@@ -8,8 +8,8 @@ from armid.model import PLANTS, ArmidError, Manoeuvre, Model
 from armid.simulation import Schedule, simulate
 
 
-def test_shapes(rubbing_arm: Model) -> None:
-    found = simulate(rubbing_arm, Manoeuvre(0.001, 60), drawn(rubbing_arm, 11, 1), states=True)
+def test_shapes(arm: Model) -> None:
+    found = simulate(arm, Manoeuvre(0.001, 60), drawn(arm, 11, 1), states=True)
     assert found.output.shape == (11, 60)
     assert found.failed.shape == found.switch_times["closed"].shape == (11,)
     assert {s.shape for s in found.states.values()} == {(11, 60)}

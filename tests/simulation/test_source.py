@@ -116,6 +116,7 @@ def falls(h):
     return h - 0.2
 
 
+@pytest.mark.slow
 def test_names_of_the_loop_numpy_and_builtins_can_be_used() -> None:
     states = tuple(State(n, "1", one, one) for n in NAMES)
     guards = (Guard("kink", falls), Guard("n", falls, latch=True))

@@ -1,13 +1,18 @@
 """The contract of a plant."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from armid.contract.effect import REFERENCE_TOLERANCE, middle
+from armid.contract.candidates import nominal
+from armid.contract.effect_on_plant import agrees, deterministic, finite
 from armid.contract.finding import Finding
 from armid.contract.manoeuvres import trial_manoeuvres
-from armid.contract.reference import simulate_plainly
+from armid.contract.parameters import check_parameters, finding
 from armid.model import ArmidError, Model, Plant
-from armid.simulation import FINE, calibrate, probes, simulate
+from armid.simulation import simulate
+
+UNITS = ("rad/s", "m/s")
 
 
 def check_plant(plant: Plant) -> list[Finding]:
@@ -17,27 +22,47 @@ def check_plant(plant: Plant) -> list[Finding]:
 
 def check_one(plant: Plant) -> list[Finding]:
     """Try one plant."""
-    where = f"{plant.name} in {plant.output_unit}"
     try:
         model = Model(plant)
+        simulate(model, trial_manoeuvres(plant)[0].shortened(2), nominal(model))
     except ArmidError as error:
-        return [Finding(f"binds, {where}", False, str(error))]
-    findings = [
-        Finding(f"binds, {where}", True, f"{len(model.parameters)} parameters, {len(model.states)} states"),
-        Finding(f"unit, {where}", plant.output_unit in ("rad/s", "m/s"), f"records {plant.output_unit}"),
-        Finding(f"equations, {where}", bool(str(model)), "its equations can be printed"),
+        found = [Finding("binds", False, str(error))]
+    else:
+        found = [*declared(model), *moving(model)]
+    where = f"{plant.name} in {plant.output_unit}"
+    return [Finding(f"{f.name}, {where}", f.passed, f.sentence) for f in found]
+
+
+def declared(model: Model) -> list[Finding]:
+    """Check what can be told without moving."""
+    plant = model.plant
+    ports = ", ".join(plant.ports) or "none"
+    return [
+        Finding("binds", True, f"{len(model.parameters)} parameters, {len(model.states)} states; ports: {ports}"),
+        *check_parameters(plant.parameters),
+        Finding("unit", plant.output_unit in UNITS, f"records {plant.output_unit}, {' or '.join(UNITS)} is expected"),
+        Finding("printed", plant.output in str(model), "print(model) shows its equations"),
+        finding("guards", idle_guards(model), "nothing depends on guard {}, or it never moves",
+                f"all of {len(plant.guards)} guards are used"),
+    ]  # fmt: skip
+
+
+def idle_guards(model: Model) -> list[str]:
+    """Return switches that no equation asks for, and guards that cannot change."""
+    graph = model.graph
+    asked = {key for node in graph.nodes.values() for key in node.needs}
+    return [
+        g.name for g in model.plant.guards if graph.is_static(f"guard__{g.name}") or (g.latch and g.name not in asked)
     ]
-    low = np.array([p.low for p in model.parameters.values()])
-    high = np.array([p.high for p in model.parameters.values()])
-    x = np.array([middle(p) for p in model.parameters.values()])
-    for i, m in enumerate(trial_manoeuvres(plant)):
-        spread = probes(low, high, 16)
-        failed = int(simulate(model, m, spread, calibrate(model, m, spread, spans=False).schedule).failed.sum())
-        run = simulate(model, m, x, calibrate(model, m, x[np.newaxis], FINE).schedule)
-        off = float(np.max(np.abs(run.output[0] - simulate_plainly(model, m, x))))
-        findings += [
-            Finding(f"finite, {where}, {i + 1}", failed == 0, f"{failed} of 16 candidates over the box diverge"),
-            Finding(f"compiled, {where}, {i + 1}", off <= REFERENCE_TOLERANCE * plant.scales.speed,
-                    f"the compiled plant is within {off:.2g} of its plain functions under scipy"),
-        ]  # fmt: skip
-    return findings
+
+
+def moving(model: Model) -> list[Finding]:
+    """Check how the plant moves."""
+    manoeuvres, x = trial_manoeuvres(model.plant), nominal(model)
+    moved = [float(np.ptp(simulate(model, m, x).output)) for m in manoeuvres]
+    size = f"the signal runs over {', '.join(f'{v:.2g}' for v in moved)} {model.plant.output_unit}"
+    return [
+        Finding("moves", 0.0 not in moved, size), finite(model, manoeuvres),
+        deterministic(model, manoeuvres[0]),
+        *(replace(agrees(model, x, m), name=f"compiled (manoeuvre {i + 1})") for i, m in enumerate(manoeuvres)),
+    ]  # fmt: skip

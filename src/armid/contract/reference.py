@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from armid.model import Manoeuvre, Model
+from armid.model import ArmidError, Manoeuvre, Model
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-10
+# Evaluations of the equations; a usual motion takes some 10,000.
+MOST_RATES = 100_000
 
 
 class PlainModel:
@@ -33,6 +35,7 @@ class PlainModel:
         self.manoeuvre, self.inputs = manoeuvre, [i.name for i in model.plant.inputs]
         guards = [n.key for n in self.graph.of_kind("guard")]
         self.kinks = [g for g in guards if g.removeprefix("guard__") not in self.latches]
+        self.n_rates = 0
 
     def evaluate(self, keys: list[str], values: dict[str, Any]) -> list[Any]:
         """Return the values of some nodes."""
@@ -63,7 +66,14 @@ class PlainModel:
         return float(np.interp(place, np.arange(len(samples)), samples))
 
     def rates(self, time: float, states: Array, closed: tuple[float, ...]) -> Array:
-        """Return the time derivatives."""
+        """Return the time derivatives.
+
+        Raises ArmidError when they are asked for too often: the integrator does not get on.
+        """
+        self.n_rates += 1
+        if self.n_rates > MOST_RATES:
+            raise ArmidError(f"scipy does not get beyond {time:.3g} s: the equations are stiff there, or jump where no "
+                             "guard is declared")  # fmt: skip
         keys = [f"rate__{s}" for s in self.states]
         return np.array(self.evaluate(keys, self.moment(time, states, closed)), dtype=float)
 
@@ -80,6 +90,7 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
     """Return the recorded signal of one candidate, (n_samples,), error about 1e-9 of its size.
 
     DOP853, restarted at every kink and switch, and at every sample where inputs drive the machine.
+    Raises ArmidError when scipy does not get on.
     """
     plain = PlainModel(model, manoeuvre, candidate)
     times, states = manoeuvre.times(), plain.start()

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.model import ArmidError, Manoeuvre, Model
-from armid.simulation.simulate import LONGEST, Array, Schedule, Simulation, simulate
+from armid.simulation.simulate import Array, Schedule, Simulation, simulate
+from armid.simulation.template import LONGEST
 
 STANDARD, FINE = "standard", "fine"
 # Errors of the recorded signal that are allowed, as shares of the plant's speed scale (arm: 2 rad/s).

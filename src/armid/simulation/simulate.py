@@ -14,7 +14,6 @@ from armid.simulation.refusal import UNCOMPILABLE, refusal
 
 Array = NDArray[np.float64]
 DIVERGED = 1e3
-LONGEST = 8
 # Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
 SHARES = 8
 

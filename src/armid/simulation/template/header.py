@@ -1,5 +1,7 @@
 """The head of a generated module."""
 
+# Samples that are gathered before they are copied to the rows of the candidates; times that one step may be cut; sample
+# intervals that one step may span.
 BLOCK = 256
 MAX_CUTS = 8
 LONGEST = 8

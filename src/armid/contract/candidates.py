@@ -1,0 +1,44 @@
+"""Candidates on which contracts are tried."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.model import Effect, Model, Parameter
+from armid.simulation import probes
+
+Array = NDArray[np.float64]
+
+
+def nominal(model: Model) -> Array:
+    """Return nominal or middle values, effects at their null, (n_parameters,)."""
+    return np.array([middle(p) if p.null is None else p.null for p in model.parameters.values()])
+
+
+def middle(p: Parameter) -> float:
+    """Return the nominal value, else the fixed one, else the middle of the range."""
+    return next((v for v in (p.nominal, p.fixed) if v is not None), 0.5 * (p.low + p.high))
+
+
+def over_box(model: Model, n_candidates: int) -> Array:
+    """Return candidates spread over the bounds of all parameters, (n_candidates, n_parameters)."""
+    parameters = model.parameters.values()
+    low, high = (np.array([getattr(p, side) for p in parameters]) for side in ("low", "high"))
+    return probes(low, high, n_candidates)
+
+
+def at_null(model: Model, n_candidates: int) -> Array:
+    """Return candidates spread over the bounds, what has a null value at it, (n_candidates, n_parameters)."""
+    nulls = np.array([np.nan if p.null is None else p.null for p in model.parameters.values()])
+    return np.where(np.isnan(nulls), over_box(model, n_candidates), nulls)
+
+
+def away(model: Model, effect: Effect, share: float) -> Array:
+    """Return nominal values, those of an effect at a share of the way from null to its farther bound."""
+    values = dict(zip(model.parameters, nominal(model), strict=True))
+    for own in effect.parameters:
+        name = f"{effect.name}.{own.name}"
+        p = model.parameters[name]
+        if p.null is not None:
+            farther = p.high if p.high - p.null >= p.null - p.low else p.low
+            values[name] = p.null + share * (farther - p.null)
+    return np.array(list(values.values()))

@@ -1,0 +1,119 @@
+"""The part of an effect's contract that is kept on each plant."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.contract.candidates import at_null, away, nominal, over_box
+from armid.contract.finding import Finding
+from armid.contract.manoeuvres import trial_manoeuvres
+from armid.contract.parameters import finding
+from armid.contract.reference import simulate_plainly
+from armid.model import ArmidError, Effect, Manoeuvre, Model
+from armid.simulation import FINE, calibrate, simulate
+
+Array = NDArray[np.float64]
+# Shares of the plant's speed scale: at null, and against scipy.
+NULL_TOLERANCE, REFERENCE_TOLERANCE = 1e-12, 1e-5
+N_CANDIDATES, AWAY = 16, 0.3
+
+
+def check_on(effect: Effect, model: Model) -> list[Finding]:
+    """Try an effect on one plant, the model being that plant with the effect."""
+    where = f"on {model.plant.name} in {model.plant.output_unit}"
+    manoeuvres = trial_manoeuvres(model.plant)
+    try:
+        simulate(model, manoeuvres[0].shortened(2), nominal(model))
+    except ArmidError as error:
+        return [Finding(f"compiles {where}", False, str(error))]
+    found = [
+        shown(effect, model), null_law(effect, model, manoeuvres), acts(effect, model, manoeuvres),
+        finite(model, manoeuvres), deterministic(model, manoeuvres[0]), on_arrays(effect, model),
+        agrees(model, away(model, effect, AWAY), manoeuvres[0]),
+    ]  # fmt: skip
+    return [Finding(f"{f.name} {where}", f.passed, f.sentence) for f in found]
+
+
+def shown(effect: Effect, model: Model) -> Finding:
+    """Tell whether the printed equations show what the effect adds."""
+    text = str(model)
+    missing = [port for port in effect.adds if f"{effect.name}.{port} = " not in text]
+    return finding("printed", missing, "print(model) does not show port {}", "print(model) shows what it adds")
+
+
+def null_law(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Finding:
+    """Tell whether at null, whatever its other parameters are, the model moves as it does without the effect."""
+    bare = model - effect.name
+    own = [n in bare.parameters for n in model.parameters]
+    population = at_null(model, N_CANDIDATES)
+    difference = max(distance(bare, population[:, own], model, population, m) for m in manoeuvres)
+    kept = difference <= NULL_TOLERANCE * model.plant.scales.speed
+    return Finding("null law", kept, f"at null the signal differs by {difference:.2g} {model.plant.output_unit}")
+
+
+def acts(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Finding:
+    """Tell whether the effect moves the signal away from its null."""
+    still, moving = nominal(model)[np.newaxis], away(model, effect, AWAY)[np.newaxis]
+    moved = max(distance(model, still, model, moving, m) for m in manoeuvres)
+    text = f"at {AWAY:.0%} of its range it moves the signal by {moved:.2g} {model.plant.output_unit}"
+    return Finding("acts", 0.0 < moved < np.inf, text)
+
+
+def distance(one: Model, x: Array, other: Model, y: Array, manoeuvre: Manoeuvre) -> float:
+    """Return the largest difference of two models' signals on the same schedule, infinite where only one diverges."""
+    # The weights are those of one model's parameters, and change no result.
+    schedule = replace(calibrate(other, manoeuvre, y, spans=False).schedule, weights=None)
+    a, b = simulate(one, manoeuvre, x, schedule), simulate(other, manoeuvre, y, schedule)
+    if not np.array_equal(a.failed, b.failed):
+        return np.inf
+    return float(np.max(np.abs(a.output[~a.failed] - b.output[~b.failed]), initial=0.0))
+
+
+def finite(model: Model, manoeuvres: list[Manoeuvre]) -> Finding:
+    """Tell whether signal and states stay finite over the box of all parameters."""
+    spread = over_box(model, N_CANDIDATES)
+    failed = 0
+    for m in manoeuvres:
+        run = simulate(model, m, spread, calibrate(model, m, spread, spans=False).schedule, states=True)
+        moved = np.array(list(run.states.values()))
+        failed += int((run.failed | ~np.isfinite(moved).all(axis=(0, 2))).sum())
+    text = f"{failed} of {N_CANDIDATES * len(manoeuvres)} candidates over the box diverge"
+    return Finding("finite", failed == 0, text)
+
+
+def deterministic(model: Model, manoeuvre: Manoeuvre) -> Finding:
+    """Tell whether the same candidates give the same signal again, bit for bit."""
+    first, second = (simulate(model, manoeuvre, over_box(model, 9)).output for _ in range(2))
+    same = bool(np.array_equal(first, second, equal_nan=True))
+    return Finding("deterministic", same, "the same candidates move the same, bit for bit" if same else
+                   "the same candidates move differently when they are simulated again")  # fmt: skip
+
+
+def on_arrays(effect: Effect, model: Model) -> Finding:
+    """Tell whether what the effect adds works on arrays, as tracing and figures use it."""
+    wrong = []
+    for port, function in effect.adds.items():
+        bound = [a for a, _ in model.graph.nodes[f"{effect.name}__{port}"].arguments]
+        try:
+            with np.errstate(all="ignore"):
+                shape = np.shape(function(**dict.fromkeys(bound, np.full(5, 0.3))))
+        except (TypeError, ValueError):
+            shape = (-1,)
+        if shape not in ((5,), ()):
+            wrong.append(port)
+    return finding("on arrays", wrong, "what it adds at {} does not keep the shape of arrays: np.where chooses there",
+                   "the plain functions keep the shape of arrays")  # fmt: skip
+
+
+def agrees(model: Model, candidate: Array, manoeuvre: Manoeuvre) -> Finding:
+    """Tell whether the compiled model agrees with its plain functions under scipy."""
+    schedule = calibrate(model, manoeuvre, candidate[np.newaxis], FINE).schedule
+    found = simulate(model, manoeuvre, candidate, schedule).output[0]
+    try:
+        with np.errstate(all="ignore"):
+            error = float(np.max(np.abs(found - simulate_plainly(model, manoeuvre, candidate))))
+    except ArmidError as refused:
+        return Finding("compiled", False, str(refused))
+    return Finding("compiled", error <= REFERENCE_TOLERANCE * model.plant.scales.speed,
+                   f"the compiled model is within {error:.2g} of its plain functions under scipy")  # fmt: skip

@@ -1,0 +1,217 @@
+"""Each point of a contract is missed by something: here is what misses it."""
+
+import random
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from pymoo.algorithms.soo.nonconvex.de import DE
+
+from armid.contract import Finding, check_effect, check_fitness, check_identifier, check_plant
+from armid.fitness import Fitness
+from armid.identifiers import as_identifier
+from armid.model import EFFECTS, PLANTS, Effect, Guard, Parameter, State
+
+AXIS = {"driven_axis": replace(PLANTS["driven_axis"], variants=())}
+LEVEL = Parameter("level", "effort", 0.0, 1.0, null=0.0)
+
+
+def drag(omega, level):
+    """Friction in proportion to speed."""
+    return -level * omega
+
+
+def failed(findings: list[Finding]) -> dict[str, str]:
+    """Name -> sentence of the points that do not hold, without the plant's name."""
+    assert all(f.sentence and "\n" not in f.sentence for f in findings)
+    return {f.name.split(" on driven")[0].split(", driven")[0]: f.sentence for f in findings if not f.passed}
+
+
+def effect(function: Callable[..., Any] = drag, *parameters: Parameter, **more: Any) -> Effect:
+    return Effect("own", parameters or (LEVEL,), {"torque": function}, **more)
+
+
+@pytest.mark.parametrize("given", EFFECTS.values(), ids=EFFECTS)
+def test_every_function_of_the_catalogue_says_what_it_is(given: Effect) -> None:
+    assert "documented" not in failed(check_effect(given, {}, strict=True))
+
+
+def offset(level):
+    """More than nothing at null."""
+    return level + 1e-9
+
+
+def shaped(omega, level, width):
+    """Vanishes at null only for some widths."""
+    return -level * omega + (0.001 if width > 0.9 else 0.0)
+
+
+def idle(omega, level):
+    """Nothing at all."""
+    return 0.0 * level * omega
+
+
+def explosive(omega, level):
+    """Drive that grows with the cube of the speed."""
+    return 1e6 * level * omega**3 + 1e3 * level
+
+
+def branching(omega, level):
+    """Statements that arrays cannot take."""
+    if omega > 0:
+        return -level * omega
+    return -0.5 * level * omega
+
+
+def jumping(omega, level):
+    """Coulomb friction as it is written on paper: at rest it jumps to and fro, and no guard says so."""
+    return -level * np.sign(omega)
+
+
+def uncompilable(omega, level):
+    """Something that numba does not know."""
+    return level * np.linalg.norm(omega)
+
+
+BROKEN = {
+    "null law": (effect(offset), {"null law"}),
+    "null law for some shapes": (effect(shaped, LEVEL, Parameter("width", "1", 0.0, 1.0)), {"null law"}),
+    "acts": (effect(idle), {"acts"}),
+    "finite": (effect(explosive), {"finite"}),
+    "on arrays": (effect(branching), {"on arrays"}),
+    "compiled": (effect(jumping), {"compiled"}),
+    "compiles": (effect(uncompilable), {"compiles"}),
+    "bounds": (effect(drag, replace(LEVEL, low=-1e308, high=float("inf"))), {"bounds"}),
+    "values": (effect(drag, replace(LEVEL, low=0.1, high=0.5)), {"values"}),
+    "null values": (effect(drag, replace(LEVEL, null=None, nominal=0.0)), {"null values"}),
+    "units": (effect(drag, replace(LEVEL, unit=" ")), {"units"}),
+    "binds": (effect(lambda altitude, level: altitude), {"binds"}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("given", "points"), BROKEN.values(), ids=BROKEN)
+def test_an_effect_misses_a_point(given: Effect, points: set[str]) -> None:
+    with np.errstate(all="ignore"):
+        assert points <= set(failed(check_effect(given, AXIS)))
+
+
+def test_silence_is_said_and_only_the_catalogue_fails_for_it() -> None:
+    silent = effect(lambda omega, level: -level * omega, states=(State("x", "1", drag, lambda: 0.0),))
+    said = next(f for f in check_effect(silent, AXIS) if f.name == "documented")
+    assert said.passed
+    assert said.sentence == "no docstring: own__torque, initial__own__x"
+    assert "documented" in failed(check_effect(silent, AXIS, strict=True))
+
+
+@pytest.mark.slow
+def test_a_plant_misses_points() -> None:
+    def never(mass):
+        """A guard of what does not move."""
+        return mass
+
+    def later(v):
+        """A switch that nobody asks for."""
+        return v - 0.1
+
+    axis = AXIS["driven_axis"]
+    broken = replace(
+        axis,
+        guards=(Guard("never", never), Guard("later", later, latch=True)),
+        parameters=(replace(axis.parameters[0], unit="", nominal=9.0),),
+        output_unit="deg/s",
+    )
+    points = failed(check_plant(broken))
+    assert set(points) == {"guards", "units", "values", "unit"}
+    assert points["guards"] == "nothing depends on guard never, later, or it never moves"
+
+
+def test_a_plant_that_does_not_bind_is_told_so() -> None:
+    axis = AXIS["driven_axis"]
+    broken = replace(axis, quantities={**axis.quantities, "drive_effort": lambda gain, voltage: gain})
+    assert set(failed(check_plant(broken))) == {"binds"}
+
+
+def test_a_plant_that_runs_away_is_told_so() -> None:
+    axis = AXIS["driven_axis"]
+
+    def push(gain, u, v):
+        """Effort that grows with speed."""
+        return gain * u + 1e5 * v**3
+
+    assert "finite" in failed(check_plant(replace(axis, quantities={**axis.quantities, "drive_effort": push})))
+
+
+def ranks(measured, simulated):
+    """Places among the candidates."""
+    return np.argsort(np.argsort(np.abs(simulated - measured).sum(axis=1))).astype(float)
+
+
+def changes(measured, simulated):
+    """Overwrite what is given."""
+    simulated -= measured
+    return np.abs(simulated).sum(axis=1)
+
+
+def drawn(measured, simulated):
+    """Add noise."""
+    return np.abs(simulated - measured).sum(axis=1) + np.random.default_rng().random(len(simulated))
+
+
+def total(measured, simulated):
+    """One value for all."""
+    return np.abs(simulated - measured).sum()
+
+
+def endless(measured, simulated):
+    """Infinite where the misfit is large."""
+    misfit = np.abs(simulated - measured).max(axis=1)
+    return np.where(misfit > 0.5, np.inf, misfit)
+
+
+FITNESS_BROKEN = {
+    "others untouched": ranks, "leaves its arguments alone": changes, "deterministic": drawn,
+    "one value per candidate": total, "finite": endless,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("point", "function"), FITNESS_BROKEN.items())
+def test_a_fitness_misses_a_point(point: str, function: Callable[..., Any]) -> None:
+    assert point in failed(check_fitness(Fitness("own", function)))
+
+
+class Global(DE):  # type: ignore[misc]
+    """Differential evolution that starts where the global generators say."""
+
+    def _initialize_infill(self) -> Any:
+        found = super()._initialize_infill()
+        found[0].X = self.problem.xl + random.random() * (self.problem.xu - self.problem.xl)
+        return found
+
+
+class Outside(DE):  # type: ignore[misc]
+    """Differential evolution that starts beside the box."""
+
+    def _initialize_infill(self) -> Any:
+        found = super()._initialize_infill()
+        found[0].X = self.problem.xu + 1.0
+        return found
+
+
+def test_an_identifier_misses_points() -> None:
+    assert set(failed(check_identifier(as_identifier("own", DE)))) == set()
+    assert "reproducible" in failed(check_identifier(as_identifier("own", Global)))
+    assert "inside the box" in failed(check_identifier(as_identifier("own", Outside)))
+    declared = replace(as_identifier("own", DE), is_stochastic=False)
+    assert set(failed(check_identifier(declared))) == {"seed"}
+
+
+def test_the_global_generators_are_left_alone() -> None:
+    random.seed(5)
+    state = random.getstate()
+    check_identifier(as_identifier("own", DE))
+    assert random.getstate() == state
+
+
