@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +16,7 @@ from armid.simulation.refusal import UNCOMPILABLE, refusal
 Array = NDArray[np.float64]
 DIVERGED = 1e3
 # Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
-SHARES = 8
+SHARES = 4
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,12 @@ def arranged(candidates: Array, width: int, weights: Array | None) -> tuple[Arra
     return rows, places
 
 
+@cache
+def pool_of(threads: int) -> ThreadPoolExecutor:
+    """Return the pool of so many threads; it stays, as starting threads takes as long as many simulations."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="armid")
+
+
 def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_groups: int, threads: int) -> None:
     """Fill the results group by group; threads take neighbouring groups.
 
@@ -107,10 +114,10 @@ def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_gr
         if threads < 2 or n_groups < 2:
             kernel(*given, 0, n_groups, *results)
             return
-        with ThreadPoolExecutor(threads) as pool:
-            parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in pairwise(edges)]
-            for part in parts:
-                part.result()
+        pool = pool_of(threads)
+        parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in pairwise(edges)]
+        for part in parts:
+            part.result()
     except UNCOMPILABLE as error:
         raise refusal(error) from error
 
