@@ -26,8 +26,6 @@ from armid.cli.options import (
 if TYPE_CHECKING:
     from armid.identification import Identification
 
-SIMILARITIES = ("similarity", "numerical_similarity")
-
 
 @click.command("identify")
 @campaign_argument
@@ -59,6 +57,7 @@ def identify_command(
     The result is judged on train and holdout. Prints parameters with 95 % intervals (from sensitivities and measured
     noise), warnings in words, and errors.
     """
+    from armid.fitness import SIMILARITIES  # noqa: PLC0415 - compiled code that other commands do not need
     from armid.identification import INTERRUPTED  # noqa: PLC0415 - pymoo takes time to import
     from armid.identification import identify as run  # noqa: PLC0415
     from armid.problem import space_of  # noqa: PLC0415

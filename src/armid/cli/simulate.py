@@ -20,7 +20,7 @@ from armid.cli.options import (
 from armid.model import ArmidError, Model, nearest
 from armid.record import Campaign, Override, Piece, Record, read_campaign, write_table
 from armid.registry import load_registry
-from armid.simulation import FINE, STANDARD, calibrate, simulate
+from armid.simulation import accuracy_against, calibrate, simulate
 
 Array = NDArray[np.float64]
 SIGNAL = {"rad/s": "angular_velocity_rad_s", "m/s": "velocity_m_s"}
@@ -86,8 +86,7 @@ def simulated_piece(
     piece: Piece, record: Record, model: Model, candidate: Array, accuracy: str | None
 ) -> dict[str, Array]:
     """Return header -> values of one piece."""
-    hidden = record.noise.rms >= 10.0 * 5e-6 * model.plant.scales.speed
-    wanted = accuracy or (STANDARD if hidden else FINE)
+    wanted = accuracy or accuracy_against(record.noise.rms, model)
     calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted, spans=False)
     run = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
     if run.failed[0]:

@@ -28,6 +28,9 @@ def numerical_dissimilarity(measured: ArrayLike, simulated: ArrayLike) -> Array:
     return 1.0 - numerical_similarity(measured, simulated, failed=-np.inf)
 
 
+# Those whose value is 1 minus a degree that people know.
+SIMILARITIES = ("similarity", "numerical_similarity")
+
 _FITNESSES = (
     Fitness("similarity", dissimilarity, "duration", note="1 - S, the paper's similarity degree (Eq 10)"),
     Fitness("numerical_similarity", numerical_dissimilarity, "duration", note="1 - S1, its numerical part (Eq 13)"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from armid.fitness import SIMILARITIES
 from armid.identification.identify import Identification
 from armid.identification.words import SHOWN
 from armid.problem import Replay
@@ -91,7 +92,7 @@ def draw_record(upper: Any, lower: Any, replay: Replay, found: Identification) -
 def convergence_figure(found: Identification, path: Path) -> None:
     """Draw the best fitness, or for a similarity its degree, against the number of simulations."""
     plt = style()
-    similarity = found.fitness.name in ("similarity", "numerical_similarity")
+    similarity = found.fitness.name in SIMILARITIES
     evaluations, values = found.trace
     x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
     figure, axis = plt.subplots(figsize=(6.8, 4.2), layout="constrained")

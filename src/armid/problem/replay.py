@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from armid.model import Manoeuvre, Model
 from armid.problem.space import Space
 from armid.record import Piece, Record
-from armid.simulation import FINE, STANDARD, Calibration, calibrate, probes, simulate
+from armid.simulation import Calibration, accuracy_against, calibrate, probes, simulate
 
 Array = NDArray[np.float64]
-# Below this many times the engine's standard error the noise no longer hides that error.
-NOISE_HIDES = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +53,7 @@ class Replay:
 
 def accuracy_for(record: Record, model: Model) -> str:
     """Return "fine" for a record whose noise would not hide the engine's standard error, else "standard"."""
-    standard_error = 5e-6 * model.plant.scales.speed
-    return FINE if record.noise.rms < NOISE_HIDES * standard_error else STANDARD
+    return accuracy_against(record.noise.rms, model)
 
 
 def replay_of(record: Record, model: Model, space: Space, accuracy: str | None = None, threads: int = 1) -> Replay:

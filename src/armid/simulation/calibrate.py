@@ -17,6 +17,8 @@ ALLOWED = {STANDARD: 5e-6, FINE: 1e-7}
 LASTING, PASSING = 1.5e-8, 0.1
 SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 MARGIN = 0.5
+# Below this many times the engine's standard error the noise no longer hides that error.
+NOISE_HIDES = 10.0
 # How many candidates must still be before their switch for a long step to count as tried.
 N_WITNESSES = 8
 N_PROBES = 48
@@ -29,6 +31,11 @@ class Calibration:
     schedule: Schedule
     error: float
     reached: bool
+
+
+def accuracy_against(noise: float, model: Model) -> str:
+    """Return "fine" where noise of an rms [unit of the signal] would not hide the standard error, else "standard"."""
+    return FINE if noise < NOISE_HIDES * ALLOWED[STANDARD] * model.plant.scales.speed else STANDARD
 
 
 def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
