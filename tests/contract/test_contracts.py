@@ -7,16 +7,25 @@ import pytest
 
 from armid.contract import check_effect, check_fitness, check_identifier, check_plant, check_thing
 from armid.fitness import FITNESS, Fitness
-from armid.identifiers import IDENTIFIERS
-from armid.model import EFFECTS, PLANTS, Effect, Parameter
+from armid.identifiers import IDENTIFIERS, identifier_of
+from armid.model import EFFECTS, PLANTS, Effect, Parameter, applicable
 
-# Compiling takes some 15 s an effect, so all but one of them are left to continuous integration.
+# Compiling takes some 10 s an effect and plant, so all but one of them are left to continuous integration. What every
+# effect keeps is tried on one compiled model of all of them (tests/model/effects); here, whole, one of each kind: a
+# plain torque, states, a switch with states, and two forms.
+WHOLE = ("coulomb", "gyro_lag", "controller_delay", "flux_saturation")
 LATER = [name for name in EFFECTS if name != "coulomb"]
+ROTARY = PLANTS["driven_axis"].for_unit("rad/s")
 AXIS = {"driven_axis": replace(PLANTS["driven_axis"], variants=())}
+COMPOSED = (
+    "pso+bobyqa", "de+nelder_mead", "pso+least_squares", "cmaes+least_squares", "multistart:bobyqa",
+    "multistart:least_squares", "random+multistart:slsqp", "pymoo_pso+cobyla+sbplx",
+)  # fmt: skip
 ALL = [
     pytest.param(kind, name, thing, id=f"{kind}-{name}", marks=[pytest.mark.slow] if name in LATER else [])
     for kind, things in (
-        ("plants", PLANTS), ("effects", EFFECTS), ("fitness", FITNESS), ("identifiers", IDENTIFIERS),
+        ("plants", PLANTS), ("effects", {name: EFFECTS[name] for name in WHOLE}), ("fitness", FITNESS),
+        ("identifiers", IDENTIFIERS),
     ) for name, thing in things.items()
 ]  # fmt: skip
 
@@ -29,6 +38,17 @@ def failures(findings):
 @pytest.mark.parametrize(("kind", "name", "thing"), ALL)
 def test_registered_things_keep_their_contract(kind, name, thing):
     assert failures(check_thing(kind, name, thing)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, e in applicable(EFFECTS, ROTARY).items() if name not in WHOLE])
+def test_effects_of_any_shaft_keep_their_contract_on_an_axis(name):
+    assert failures(check_effect(EFFECTS[name], {"driven_axis": ROTARY}, strict=True)) == []
+
+
+@pytest.mark.parametrize("name", COMPOSED)
+def test_composed_identifiers_keep_their_contract(name):
+    assert failures(check_identifier(identifier_of(name, IDENTIFIERS))) == []
 
 
 def test_effect_that_does_not_vanish_at_null_is_found():

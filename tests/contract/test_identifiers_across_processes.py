@@ -10,13 +10,16 @@ import pytest
 
 from armid.identifiers import IDENTIFIERS
 
+NAMES = (*IDENTIFIERS, "pso+bobyqa", "de+nelder_mead+sbplx", "cmaes+least_squares", "multistart:lbfgs")
 SCRIPT = """
 import hashlib, json, sys
-from armid.contract.identifier import run
-from armid.identifiers import IDENTIFIERS
+from armid.contract.identifier import BUDGET, run
+from armid.contract.trial_problem import Trial
+from armid.identifiers import IDENTIFIERS, identifier_of
+from armid.problem import Meter
 found = {}
 for name in sys.argv[1:]:
-    log = run(IDENTIFIERS[name], 7, True, 1)[0].log()
+    log = run(identifier_of(name, IDENTIFIERS), 7, Trial(Meter(BUDGET), holes=True))[0].log()
     found[name] = hashlib.sha256(log.X.tobytes() + log.F.tobytes()).hexdigest()
 print(json.dumps(found))
 """
@@ -26,7 +29,7 @@ def logs(hash_seed: str) -> dict[str, str]:
     """Fingerprint of each identifier's log, from a process of its own."""
     paths = [str(Path(__file__).parents[2] / "src"), os.environ.get("PYTHONPATH", "")]
     told = os.environ | {"PYTHONHASHSEED": hash_seed, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
-    told_to = [sys.executable, "-c", SCRIPT, *IDENTIFIERS]
+    told_to = [sys.executable, "-c", SCRIPT, *NAMES]
     done = subprocess.run(told_to, env=told, stdout=subprocess.PIPE, text=True, check=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
 
@@ -34,5 +37,6 @@ def logs(hash_seed: str) -> dict[str, str]:
 @pytest.mark.slow
 def test_two_processes_ask_for_the_same() -> None:
     first, second = logs("1"), logs("2")
-    assert set(first) == set(IDENTIFIERS)
+    assert set(first) == set(NAMES)
+    assert len(set(first.values())) == len(NAMES)
     assert first == second

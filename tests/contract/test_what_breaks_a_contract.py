@@ -2,7 +2,10 @@
 
 import random
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
+from threading import Thread
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -35,7 +38,7 @@ def effect(function: Callable[..., Any] = drag, *parameters: Parameter, **more: 
 
 @pytest.mark.parametrize("given", EFFECTS.values(), ids=EFFECTS)
 def test_every_function_of_the_catalogue_says_what_it_is(given: Effect) -> None:
-    assert "documented" not in failed(check_effect(given, {}, strict=True))
+    assert not any(point.startswith("documented") for point in failed(check_effect(given, {}, strict=True)))
 
 
 def offset(level):
@@ -51,6 +54,11 @@ def shaped(omega, level, width):
 def idle(omega, level):
     """Nothing at all."""
     return 0.0 * level * omega
+
+
+def late(omega, level):
+    """Nothing to first order in its strength."""
+    return -50.0 * level**2 * omega
 
 
 def explosive(omega, level):
@@ -79,6 +87,7 @@ BROKEN = {
     "null law": (effect(offset), {"null law"}),
     "null law for some shapes": (effect(shaped, LEVEL, Parameter("width", "1", 0.0, 1.0)), {"null law"}),
     "acts": (effect(idle), {"acts"}),
+    "responds": (effect(late), {"responds"}),
     "finite": (effect(explosive), {"finite"}),
     "on arrays": (effect(branching), {"on arrays"}),
     "compiled": (effect(jumping), {"compiled"}),
@@ -198,6 +207,49 @@ class Outside(DE):  # type: ignore[misc]
         found = super()._initialize_infill()
         found[0].X = self.problem.xu + 1.0
         return found
+
+
+class Swallowing(DE):  # type: ignore[misc]
+    """Differential evolution that takes an error of the problem for an end."""
+
+    def next(self) -> None:
+        with suppress(Exception):
+            return super().next()
+        self.termination.terminate()
+        self.termination.update(self)
+
+
+class Leaving(DE):  # type: ignore[misc]
+    """Differential evolution that leaves a thread behind."""
+
+    def _setup(self, problem: Any, **options: Any) -> None:
+        super()._setup(problem, **options)
+        Thread(target=sleep, args=(1.0,), daemon=True).start()
+
+
+class Counting(DE):  # type: ignore[misc]
+    """Differential evolution that looks at how much was really simulated."""
+
+    def _infill(self) -> Any:
+        found = super()._infill()
+        found[0].X = self.problem.xl + (self.problem.simulated % 97) / 97.0 * (self.problem.xu - self.problem.xl)
+        return found
+
+
+class Poisoned(DE):  # type: ignore[misc]
+    """Differential evolution that stops at the first NaN."""
+
+    def _initialize_advance(self, infills: Any = None, **options: Any) -> None:
+        super()._initialize_advance(infills, **options)
+        if np.isnan(infills.get("F")).any():
+            self.termination.terminate()
+
+
+@pytest.mark.parametrize(("kind", "point"), [
+    (Swallowing, "errors come out"), (Leaving, "errors come out"), (Counting, "resumable"), (Poisoned, "survives NaN"),
+])  # fmt: skip
+def test_an_identifier_misses_one_point(kind: type[DE], point: str) -> None:
+    assert set(failed(check_identifier(as_identifier("own", kind)))) == {point}
 
 
 def test_an_identifier_misses_points() -> None:

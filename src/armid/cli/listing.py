@@ -1,11 +1,21 @@
 """`armid list`: what there is to choose from."""
 
+import textwrap
+from collections.abc import Sequence
+
 import click
 
 from armid.cli.options import chosen, plugin_option
-from armid.model import Effect, Parameter, Plant
+from armid.model import Effect, Parameter, Plant, refusal_of
 from armid.model.equations import returned_text
 from armid.registry import KINDS, Registry, load_registry
+
+# Columns of a terminal that equations are broken to.
+WIDTH = 110
+
+COMPOSED = """\
+multistart:LOCAL: a local one from ever new starts until the budget is used
+GLOBAL+LOCAL[+LOCAL]: a chain, each phase from the best so far; options share=0.5 (0.5:0.3), NAME.OPTION=VALUE"""
 
 
 @click.command("list")
@@ -21,16 +31,45 @@ def list_command(what: str, plugins: tuple[str, ...]) -> None:
 
 def effect_texts(registry: Registry) -> list[str]:
     """Return one paragraph for each effect."""
-    return [effect_text(e) for e in registry.effects.values()]
+    plants = [p for plant in registry.plants.values() for p in (plant, *plant.variants)]
+    return [effect_text(e, plants) for e in registry.effects.values()]
 
 
-def effect_text(effect: Effect) -> str:
-    """Return name, note, ports with equations, states and parameters of an effect."""
+def effect_text(effect: Effect, plants: Sequence[Plant] = ()) -> str:
+    """Return name, note, forms with equations, states and parameters, source, and the plants that take an effect."""
+    several = len(effect.every_form) > 1
     lines = [f"{effect.name}: {effect.note or 'no note'}"]
-    lines += [f"  port {port} += {returned_text(f)}" for port, f in effect.adds.items()]
+    for form in effect.every_form:
+        lines += [f"  in the form {form.form}"] if several else []
+        lines += form_lines(form, several or form.source != effect.source)
+    lines += [f"  source: {effect.source}"] if effect.source and not several else []
+    return "\n".join(folded(line) for line in [*lines, f"  on {places(effect, plants)}"])
+
+
+def form_lines(effect: Effect, with_source: bool) -> list[str]:
+    """Return ports with equations, states, switches and parameters of one form of an effect."""
+    lines = [f"  port {port} += {returned_text(f)}" for port, f in effect.adds.items()]
     lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {returned_text(s.rate)}" for s in effect.states]
+    lines += [f"  switch {g.name} where {returned_text(g.function)} comes to 0" for g in effect.guards]
     lines += [f"  {parameter_text(p)}" for p in effect.parameters]
-    return "\n".join([*lines, f"  source: {effect.source}"] if effect.source else lines)
+    return lines + ([f"  source: {effect.source}"] if with_source and effect.source else [])
+
+
+def places(effect: Effect, plants: Sequence[Plant]) -> str:
+    """Return the plants that offer the ports and names of an effect, siblings by what they record."""
+    fitting = [p for p in plants if any(not refusal_of(e, p) for e in effect.every_form)]
+    names = list(dict.fromkeys(p.name for p in fitting))
+    shown = []
+    for name in names:
+        units = [p.output_unit for p in fitting if p.name == name]
+        whole = len(units) == sum(p.name == name for p in plants)
+        shown.append(name if whole else f"{name} in {', '.join(units)}")
+    return ", ".join(shown) or "no plant"
+
+
+def folded(line: str) -> str:
+    """Return a line broken to the width of the list, what follows indented."""
+    return textwrap.fill(line, WIDTH, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
 
 
 def parameter_text(parameter: Parameter) -> str:
@@ -73,7 +112,7 @@ def identifier_texts(registry: Registry) -> list[str]:
     """Return one line for each identifier."""
     lines = []
     for name, i in registry.identifiers.items():
-        kinds = {"global": i.is_global, "gradient": i.uses_gradient, "stochastic": i.is_stochastic}
-        words = [word for word, on in kinds.items() if on]
-        lines.append(f"{name}: {i.note or 'no note'} ({', '.join(words) or 'local'})")
-    return lines
+        kinds = {"gradient": i.uses_gradient, "stochastic": i.is_stochastic, "rmse or likelihood": i.needs_residuals}
+        words = ["global" if i.is_global else "local", *(word for word, on in kinds.items() if on)]
+        lines.append(f"{name}: {i.note or 'no note'} ({', '.join(words)})")
+    return [*lines, COMPOSED]

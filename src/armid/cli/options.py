@@ -18,7 +18,7 @@ plugin_option = click.option(
     help="Register your own plant, effect, fitness or identifier; runs the file's code. Repeatable.",
 )  # fmt: skip
 effects_option = click.option(
-    "--effects", default="", metavar="NAME,NAME", help="Effects to add to those that the campaign declares."
+    "--effects", default="", metavar="NAME,NAME[:FORM]", help="Effects to add to those that the campaign declares."
 )
 accuracy_option = click.option(
     "--accuracy", default="auto", show_default=True, metavar="standard|fine|auto",
@@ -101,9 +101,10 @@ def model_of(campaign: "Campaign", effects: str, registry: Registry) -> Model:
     """Return the campaign's model with further effects added."""
     model = Model(campaign.plant)
     wanted = [*campaign.effects, *(name.strip() for name in effects.split(",") if name.strip())]
-    for name in wanted:
+    for text in wanted:
+        name, _, form = text.partition(":")
         effect = registry.effects.get(name)
         if effect is None:
             raise ArmidError(f"effect '{name}' is not known: {nearest(name, registry.effects)}")
-        model = model + effect
+        model = model + (effect.in_form(form) if form else effect)
     return model

@@ -1,5 +1,7 @@
 """Candidates on which contracts are tried."""
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,3 +44,26 @@ def away(model: Model, effect: Effect, share: float) -> Array:
             farther = p.high if p.high - p.null >= p.null - p.low else p.low
             values[name] = p.null + share * (farther - p.null)
     return np.array(list(values.values()))
+
+
+def corners(model: Model, effect: Effect) -> Array:
+    """Return nominal values with every combination of the bounds of an effect's free parameters."""
+    names = [f"{effect.name}.{p.name}" for p in effect.parameters if p.fixed is None]
+    bounds = [(model.parameters[n].low, model.parameters[n].high) for n in names]
+    values = dict(zip(model.parameters, nominal(model), strict=True))
+    return np.array([list((values | dict(zip(names, corner, strict=True))).values()) for corner in product(*bounds)])
+
+
+def from_null(model: Model, effect: Effect, shares: Array) -> Array:
+    """Return nominal values with each strength of an effect in turn at shares of its range from its null.
+
+    Shape (n_strengths, n_shares, n_parameters); into the range where the null is a bound.
+    """
+    start, names = nominal(model), list(model.parameters)
+    moved = []
+    for name in (f"{effect.name}.{p.name}" for p in effect.parameters if p.null is not None):
+        p, rows = model.parameters[name], np.tile(start, (len(shares), 1))
+        assert p.null is not None
+        rows[:, names.index(name)] += shares * (p.high - p.low) * (1.0 if p.high > p.null else -1.0)
+        moved.append(rows)
+    return np.array(moved)

@@ -1,6 +1,7 @@
 """The contract of an effect."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from armid.contract.effect_on_plant import check_on
 from armid.contract.finding import Finding
@@ -10,19 +11,30 @@ from armid.model.effect import Equation
 
 
 def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS, strict: bool = False) -> list[Finding]:
-    """Try an effect on every plant that offers its ports and names.
+    """Try an effect, in each of its forms, on every plant that offers its ports and names.
 
     strict: a function without a docstring fails; otherwise that is only said.
     """
+    return [f for form in effect.every_form for f in check_form(form, plants, strict)]
+
+
+def check_form(effect: Effect, plants: Mapping[str, Plant], strict: bool) -> list[Finding]:
+    """Try one form of an effect."""
     models, refusals = [], []
     for plant in (p for given in plants.values() for p in (given, *given.variants)):
         try:
             models.append(Model(plant) + effect)
         except ArmidError as error:
             refusals.append(f"{plant.name}: {error}")
-    fits = f"fits {', '.join(m.plant.name for m in models)}" if models else f"fits no plant ({'; '.join(refusals)})"
+    fits = f"fits {', '.join(m.plant.name for m in models)}" if models else fits_none(refusals)
     own = [*check_parameters(effect.parameters), has_null(effect), documented(effect, strict)]
-    return [Finding("binds", bool(models), fits), *own, *(f for model in models for f in check_on(effect, model))]
+    found = [Finding("binds", bool(models), fits), *own, *(f for model in models for f in check_on(effect, model))]
+    return [replace(f, name=f"{f.name} in the form {effect.form}") for f in found] if effect.form else found
+
+
+def fits_none(refusals: list[str]) -> str:
+    """Return why an effect fits no plant, and how a plant of one's own comes to be tried."""
+    return f"fits no plant ({'; '.join(refusals)}); --plugin FILE.py:attribute has it tried on your own"
 
 
 def has_null(effect: Effect) -> Finding:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.contract.candidates import at_null, away, nominal, over_box
+from armid.contract.candidates import at_null, away, corners, from_null, nominal, over_box
 from armid.contract.finding import Finding
 from armid.contract.manoeuvres import trial_manoeuvres
 from armid.contract.parameters import finding
@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 # Shares of the plant's speed scale: at null, and against scipy.
 NULL_TOLERANCE, REFERENCE_TOLERANCE = 1e-12, 1e-5
 N_CANDIDATES, AWAY = 16, 0.3
+# Shares of the range at which the response to a strength is compared, and by how much it may bend between them.
+SMALL, BENT = np.array([1e-4, 2e-4]), 0.05
 
 
 def check_on(effect: Effect, model: Model) -> list[Finding]:
@@ -29,7 +31,8 @@ def check_on(effect: Effect, model: Model) -> list[Finding]:
         return [Finding(f"compiles {where}", False, str(error))]
     found = [
         shown(effect, model), null_law(effect, model, manoeuvres), acts(effect, model, manoeuvres),
-        finite(model, manoeuvres), deterministic(model, manoeuvres[0]), on_arrays(effect, model),
+        responds(effect, model, manoeuvres), finite(model, manoeuvres, corners(model, effect)),
+        deterministic(model, manoeuvres[0]), on_arrays(effect, model),
         agrees(model, away(model, effect, AWAY), manoeuvres[0]),
     ]  # fmt: skip
     return [Finding(f"{f.name} {where}", f.passed, f.sentence) for f in found]
@@ -70,15 +73,34 @@ def distance(one: Model, x: Array, other: Model, y: Array, manoeuvre: Manoeuvre)
     return float(np.max(np.abs(a.output[~a.failed] - b.output[~b.failed]), initial=0.0))
 
 
-def finite(model: Model, manoeuvres: list[Manoeuvre]) -> Finding:
-    """Tell whether signal and states stay finite over the box of all parameters."""
+def responds(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Finding:
+    """Tell whether the signal answers in proportion to each small strength: what has no slope at null is not traced."""
+    strengths, still = from_null(model, effect, SMALL), nominal(model)[np.newaxis]
+    if not strengths.size:
+        return Finding("responds", False, "no parameter has a null value")
+    answers = np.zeros((len(strengths), 2))
+    for m in manoeuvres:
+        both = np.concatenate([still, strengths.reshape(-1, still.shape[1])])
+        output = simulate(model, m, both, calibrate(model, m, both, spans=False).schedule).output
+        moved = np.abs(output[1:] - output[0]).max(axis=1).reshape(len(strengths), 2) / SMALL
+        answers = np.where(moved[:, 1:] > answers[:, 1:], moved, answers)
+    names = [p.name for p in effect.parameters if p.null is not None]
+    steady = (answers[:, 1] > 0.0) & (np.abs(answers[:, 0] - answers[:, 1]) <= BENT * answers[:, 1])
+    bent = [n for n, kept in zip(names, steady, strict=True) if not kept]
+    return finding("responds", bent, "at null the signal does not answer in proportion to {}: nothing would trace it",
+                   "at null the signal answers in proportion to each strength")  # fmt: skip
+
+
+def finite(model: Model, manoeuvres: list[Manoeuvre], more: Array | None = None) -> Finding:
+    """Tell whether signal and states stay finite over the box of all parameters, and for more candidates."""
     spread = over_box(model, N_CANDIDATES)
+    spread = spread if more is None else np.concatenate([spread, more])
     failed = 0
     for m in manoeuvres:
         run = simulate(model, m, spread, calibrate(model, m, spread, spans=False).schedule, states=True)
         moved = np.array(list(run.states.values()))
         failed += int((run.failed | ~np.isfinite(moved).all(axis=(0, 2))).sum())
-    text = f"{failed} of {N_CANDIDATES * len(manoeuvres)} candidates over the box diverge"
+    text = f"{failed} of {len(spread) * len(manoeuvres)} candidates over the box diverge"
     return Finding("finite", failed == 0, text)
 
 

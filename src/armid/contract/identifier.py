@@ -1,6 +1,7 @@
 """The contract of an identifier."""
 
 import random
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -8,20 +9,21 @@ import numpy as np
 from pymoo.optimize import minimize
 
 from armid.contract.finding import Finding
-from armid.contract.trial_problem import Trial
+from armid.contract.trial_problem import Array, Trial
 from armid.identifiers import Identifier
-from armid.problem import PENALTY, Meter, MeterTermination
+from armid.problem import Log, Meter, MeterTermination
 
 BUDGET = 403
+# Where the trial's simulations begin to raise, and where a run is cut off to be resumed: both inside a generation.
+RAISES_AT = 50
+CUT_AT = 217
 
 
 def check_identifier(identifier: Identifier) -> list[Finding]:
-    """Try an identifier on a trial problem, with and without failing simulations."""
-    (meter, problem), (again, _), (holed, _) = (run(identifier, 1, holes, noise)
-                                                for holes, noise in ((False, 1), (False, 2), (True, 1)))  # fmt: skip
+    """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed."""
+    (meter, problem), (again, _) = (run(identifier, 1, noise=noise) for noise in (1, 2))
     log = meter.log()
     best = f"the best of the log is {np.min(log.F):.3g}, the best that is kept {meter.best_f:.3g}"
-    failures = f"{holed.n_failed} of {holed.used} failed, best {holed.best_f:.3g}"
     return [
         Finding("exact budget", 0 < meter.used <= BUDGET, f"{meter.used} of {BUDGET} simulations used"),
         Finding("inside the box", problem.outside == 0, f"{problem.outside} candidates outside the bounds"),
@@ -29,25 +31,80 @@ def check_identifier(identifier: Identifier) -> list[Finding]:
         Finding("improves", meter.best_f < float(np.median(log.F[:20])), "better than the median of its first 20"),
         Finding("reproducible", same(meter, again), "the same seed asks for the same candidates, bit for bit"),
         seeded(identifier, meter),
-        Finding("survives failures", bool(holed.best_f < PENALTY), failures),
+        failing(identifier, meter, "survives failures", bare=False),
+        failing(identifier, meter, "survives NaN", bare=True),
+        raising(identifier),
+        resumed(identifier, meter),
     ]
 
 
 def seeded(identifier: Identifier, meter: Meter) -> Finding:
     """Tell whether another seed changes what is asked for, as it is declared."""
-    alike = same(meter, run(identifier, 2, False, 1)[0])
+    alike = same(meter, run(identifier, 2)[0])
     says = "stochastic" if identifier.is_stochastic else "not stochastic"
     text = f"declared {says}, and another seed asks for {'the same' if alike else 'other'} candidates"
     return Finding("seed", alike != identifier.is_stochastic, text)
 
 
-def run(identifier: Identifier, seed: int, holes: bool, noise: int) -> tuple[Meter, Trial]:
-    """Run an identifier on the trial problem; noise: state of the global generators, which must not matter."""
-    meter = Meter(BUDGET)
-    problem = Trial(meter, holes)
+def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -> Finding:
+    """Tell whether it searches on and improves where a fifth of the box fails; bare: with NaN instead of a penalty.
+
+    undisturbed: the run without failures; one that ends before a third of it has been stopped by a failure.
+    """
+    meter, problem = run(identifier, 1, Trial(Meter(BUDGET), holes=True, bare=bare))
+    log = meter.log()
+    first = log.F[~log.failed][:20]
+    improves = first.size > 0 and meter.best_f < float(np.median(first))
+    value = "NaN" if bare else "a penalty"
+    text = f"{meter.n_failed} of {meter.used} failed and gave {value}, best {meter.best_f:.3g}"
+    return Finding(name, improves and problem.outside == 0 and 3 * meter.used >= undisturbed.used, text)
+
+
+class BrokenError(Exception):
+    """Stand for whatever a user's model may raise."""
+
+
+def raising(identifier: Identifier) -> Finding:
+    """Tell whether an error of the problem comes out as it is and leaves no thread behind."""
+    before = set(threading.enumerate())
+    seen = 0
+
+    def watch(X: Array) -> None:
+        nonlocal seen
+        seen += len(X)
+        if seen > RAISES_AT:
+            raise BrokenError
+
+    came = "nothing"
+    try:
+        run(identifier, 1, Trial(Meter(BUDGET), watch=watch))
+    except Exception as error:
+        came = type(error).__name__
+    ended_before = came == "nothing" and seen <= RAISES_AT
+    left = [t.name for t in threading.enumerate() if t not in before]
+    text = f"a problem that raises BrokenError: {came} came out, {len(left)} threads are left"
+    return Finding("errors come out", (came == BrokenError.__name__ or ended_before) and not left, text)
+
+
+def resumed(identifier: Identifier, meter: Meter) -> Finding:
+    """Tell whether a run that was cut off and resumed from its log ends as the undisturbed one, bit for bit."""
+    known = min(CUT_AT, meter.used // 2)
+    log = meter.log()
+    cut = Log(log.X[:known].copy(), log.F[:known].copy(), log.failed[:known].copy())
+    again, problem = run(identifier, 1, Trial(Meter(BUDGET, resume_from=cut)))
+    saved = again.used - problem.simulated
+    text = f"{saved} of {known} candidates answered from the log, {problem.simulated} simulated, the same in the end"
+    enough = saved == again.recalled and (saved == known or identifier.needs_residuals)
+    return Finding("resumable", same(meter, again) and enough, text)
+
+
+def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: int = 1) -> tuple[Meter, Trial]:
+    """Run an identifier on a trial problem; noise: state of the global generators, which must not matter."""
+    trial = Trial(Meter(BUDGET)) if problem is None else problem
+    assert trial.meter is not None
     with disturbed(noise):
-        minimize(problem, identifier.build(BUDGET), MeterTermination(meter), seed=seed, copy_algorithm=False)
-    return meter, problem
+        minimize(trial, identifier.build(BUDGET), MeterTermination(trial.meter), seed=seed, copy_algorithm=False)
+    return trial.meter, trial
 
 
 @contextmanager

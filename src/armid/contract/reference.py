@@ -32,10 +32,12 @@ class PlainModel:
         values = dict(zip((k.replace(".", "__") for k in model.parameters), map(float, candidate), strict=True))
         values |= dict(zip(model.constants, model.constant_values(manoeuvre.constants), strict=True))
         self.known = values
-        self.manoeuvre, self.inputs = manoeuvre, [i.name for i in model.plant.inputs]
+        self.manoeuvre, self.inputs = manoeuvre, {i.name: i.hold or manoeuvre.hold for i in model.plant.inputs}
         guards = [n.key for n in self.graph.of_kind("guard")]
         self.kinks = [g for g in guards if g.removeprefix("guard__") not in self.latches]
         self.n_rates = 0
+        # the sample whose value a held input has
+        self.sample = 0
 
     def evaluate(self, keys: list[str], values: dict[str, Any]) -> list[Any]:
         """Return the values of some nodes."""
@@ -61,8 +63,8 @@ class PlainModel:
     def input_at(self, name: str, time: float) -> float:
         """Return an input between its samples."""
         samples, place = self.manoeuvre.inputs[name], (time - self.manoeuvre.start_time) / self.manoeuvre.interval
-        if self.manoeuvre.hold == "zero":
-            return float(samples[min(max(int(np.floor(place + 1e-9)), 0), len(samples) - 1)])
+        if self.inputs[name] == "zero":
+            return float(samples[self.sample])
         return float(np.interp(place, np.arange(len(samples)), samples))
 
     def rates(self, time: float, states: Array, closed: tuple[float, ...]) -> Array:
@@ -100,6 +102,7 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
     out[0] = plain.output(times[0], states, closed)
     for i in range(1, len(times)):
         states, closed = carried(plain, times[i - 1], times[i], states, closed)
+        plain.sample = i
         out[i] = plain.output(times[i], states, closed)
     return out
 

@@ -1,5 +1,6 @@
 """What the machine is: equations, no numba, no files."""
 
+from armid.model.applicable import applicable, refusal_of
 from armid.model.catalogue import EFFECTS, PLANTS
 from armid.model.effect import Effect, Guard, State
 from armid.model.errors import ArmidError, nearest
@@ -11,5 +12,5 @@ from armid.model.scales import Scales
 
 __all__ = [
     "EFFECTS", "PLANTS", "ArmidError", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
-    "Parameter", "Plant", "Scales", "State", "nearest",
+    "Parameter", "Plant", "Scales", "State", "applicable", "nearest", "refusal_of",
 ]  # fmt: skip

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from armid.model.errors import ArmidError
+from armid.model.errors import ArmidError, nearest
 from armid.model.parameter import Parameter, check_name
 
 Equation = Callable[..., Any]
@@ -52,9 +52,13 @@ class Effect:
     """Declare an addition: plain scalar functions whose argument names are the binding.
 
     Own parameters and states are looked up first, then the plant's names. `adds` maps a port to the function whose
-    value is added there. At the null values the model equals the model without the effect.
+    value is added there. `binds` maps an argument to the name that it stands for, for an effect that is written once
+    for several variables. At the null values the model equals the model without the effect.
 
-    Raises ArmidError when it adds nothing or names something twice.
+    form, forms: where one effect has several published forms, `form` says in a word which one this is and `forms` holds
+    the others, whole effects of the same name. A model takes one of them; who looks for an effect tries `every_form`.
+
+    Raises ArmidError when it adds nothing, names something twice, or has a form of another name or without a word.
     """
 
     name: str
@@ -64,6 +68,9 @@ class Effect:
     guards: tuple[Guard, ...] = ()
     note: str = ""
     source: str = field(default="", compare=False)
+    binds: Mapping[str, str] = field(default_factory=dict)
+    form: str = ""
+    forms: tuple["Effect", ...] = ()
 
     def __post_init__(self) -> None:
         check_name(self.name, "effect")
@@ -76,3 +83,26 @@ class Effect:
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ArmidError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")
+        self._check_forms()
+
+    def _check_forms(self) -> None:
+        words = [e.form for e in self.every_form]
+        if any(e.name != self.name for e in self.forms):
+            raise ArmidError(f"effect '{self.name}' has a form of another name: forms are found under one name")
+        if self.forms and (not all(words) or len(set(words)) < len(words)):
+            raise ArmidError(f"effect '{self.name}' has the forms {words}: a word of its own is expected for each")
+
+    @property
+    def every_form(self) -> tuple["Effect", ...]:
+        """The effect and its other published forms."""
+        return (self, *self.forms)
+
+    def in_form(self, word: str) -> "Effect":
+        """Return the form of that word.
+
+        Raises ArmidError for a word that no form has.
+        """
+        known = {e.form: e for e in self.every_form}
+        if word not in known:
+            raise ArmidError(f"effect '{self.name}' has no form '{word}': {nearest(word, filter(None, known))}")
+        return known[word]

@@ -111,6 +111,11 @@ def finder(plant: Plant, effect: Effect | None, initial: bool) -> tuple[Callable
     if not initial:
         names |= {n: n for n in [*(i.name for i in plant.inputs), *(g.name for g in plant.guards if g.latch), "time"]}
     names |= {alias: names[name] for alias, name in plant.aliases.items() if name in names}
+    for argument, name in ({} if effect is None else effect.binds).items():
+        if name not in names and not initial:
+            raise ArmidError(f"effect '{effect.name if effect else ''}' binds '{argument}' to '{name}', which nobody "
+                             f"offers here: {nearest(name, names)}")  # fmt: skip
+        names |= {argument: names[name]} if name in names else {}
     names |= own
     return names.get, list(names)
 

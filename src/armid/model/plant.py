@@ -8,6 +8,8 @@ from armid.model.errors import ArmidError, nearest
 from armid.model.parameter import Parameter, check_name
 from armid.model.scales import Scales
 
+HOLDS = ("", "linear", "zero")
+
 
 @dataclass(frozen=True)
 class Constant:
@@ -24,19 +26,33 @@ class Constant:
 
 @dataclass(frozen=True)
 class Input:
-    """Declare a measured column that drives the machine.
+    """Declare a measured column that drives the machine: a force, a commanded position, a supply voltage, a switch.
 
-    columns: headers that are taken without being named in the campaign, with the factor to SI (or to `unit`).
-    required: whether a record without it is refused.
+    name: as the equations spell it. unit: for people; a column is taken as it is, but `_deg` and `_deg_s` become rad.
+    columns: headers that are taken without being named in the campaign (there: [inputs] or [records.inputs]).
+    required: whether a record without it is refused; else it has the value `default` throughout.
+    hold: "linear" (straight between samples), "zero" (it keeps the value of the last sample, as a switch does), or "":
+        as the campaign says.
+    typical: smallest and largest usual value, between which `armid check` moves it; None: half the effort scale.
+
+    Raises ArmidError for another hold, and for a typical range that is none.
     """
 
     name: str
     unit: str
     columns: tuple[str, ...] = ()
     required: bool = True
+    default: float = 0.0
+    hold: str = ""
+    typical: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "input")
+        if self.hold not in HOLDS:
+            raise ArmidError(f"input '{self.name}' has the hold '{self.hold}': 'linear', 'zero' or '' is expected")
+        if self.typical is not None and not self.typical[0] < self.typical[1]:
+            raise ArmidError(f"input '{self.name}' is typically {self.typical}: a smaller and a larger value are "
+                             "expected")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -44,6 +60,7 @@ class ManoeuvreKey:
     """Declare a key of a campaign's record that sets a constant: constant = factor x value.
 
     low, high: allowed range in the key's own unit; boolean: true and false stand for 1 and 0.
+    unlike: a constant whose value this one must not have, "" for none: a target that is no start.
     """
 
     key: str
@@ -53,21 +70,40 @@ class ManoeuvreKey:
     high: float | None = None
     boolean: bool = False
     required: bool = False
+    unlike: str = ""
 
 
 @dataclass(frozen=True)
 class Plant:
     """Declare a machine: equations are plain scalar functions bound by argument name.
 
+    An argument is a state, parameter, constant, input, latch, port or quantity of that name, or `time` [s]; what an
+    initial value asks for must not move. Functions use numpy, math, numbers and functions of their own kind; np.where,
+    np.minimum and np.maximum choose. studies/your_own_machine/ explains a whole plant line by line.
+
+    name: as campaign.toml spells it. parameters: what is searched. states: what is integrated.
     quantities: name -> function of states, parameters, constants, inputs, latches, ports and other quantities; the
         order does not matter, a loop among them is refused.
+    constants: what is known, with default values; a campaign sets others under [constants], a record its own under
+        [records.constants] (another gain of its controller).
+    inputs: measured columns that drive it, as many as there are.
     ports: name -> unit; a port is a sum of what effects add there, 0 when nothing does, and stands in the equations
-        under its name.
+        under its name. Ours are found by their names: most effects add to `torque`, some to `drive` or `output`.
+    guards: where the equations have a kink or switch; without one at a limit or a step of theirs the engine is slower
+        and less accurate there.
+    keys: further keys of a record in campaign.toml that set constants.
     output: the state or quantity that is recorded; output_unit: "rad/s" or "m/s".
-    aliases: further names for states and quantities, so that effects can be written once for many plants.
+    aliases: further names for states and quantities, so that effects can be written once for many plants: ours ask for
+        `omega` (speed), `theta` (position), `drive_effort` and `load_effort` (what drives, what it works against).
     from_rest: True when a record starts at t = 0 from the declared initial state; False when it starts at its first
-        sample from the measured state, given as the constants `start_position` and `start_speed`.
+        sample from the measured state: then declare the constants `start_position` and `start_speed` (either or both),
+        which the reader sets from the columns of position and speed, and use them as initial values.
+    scales: typical largest effort and speed; the engine's accuracy is a share of the speed, and effects give their
+        bounds as multiples of both. scales_from_records: a campaign sets them instead, from its train records:
+        effort = max |`gain` x first input|, speed = max |measured|.
     variants: sibling plants for another unit of the recorded signal.
+
+    Raises ArmidError for a name that is declared twice or that nobody declares.
     """
 
     name: str
@@ -84,6 +120,7 @@ class Plant:
     keys: tuple[ManoeuvreKey, ...] = ()
     aliases: Mapping[str, str] = field(default_factory=dict)
     from_rest: bool = True
+    scales_from_records: bool = False
     variants: tuple["Plant", ...] = ()
     note: str = ""
 

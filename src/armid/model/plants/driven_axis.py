@@ -66,11 +66,12 @@ linear_axis = Plant(
     ),
     inputs=(Input("u", "V, N or N m", ("drive_V", "drive_N", "drive_N_m")),),
     ports={"torque": "N", "drive": "N", "output": "m/s"},
-    aliases={"omega": "v", "theta": "q", "speed": "v", "position": "q"},
+    aliases={"omega": "v", "theta": "q", "speed": "v", "position": "q", "load_effort": "gravity_effort"},
     output="recorded_speed",
     output_unit="m/s",
     scales=Scales(effort=1.0, speed=1.0, effort_unit="N", length_unit="m"),
     from_rest=False,
+    scales_from_records=True,
 )
 
 rotary_axis = replace(

@@ -106,6 +106,11 @@ def drive_effort(field_flux, current, drive_ratio):
     return field_flux * current * drive_ratio
 
 
+def load_effort(gravity_torque, balance_torque):
+    """Torque of what the drive works against, gravity less balance [N m]; only effects ask for it."""
+    return gravity_torque - balance_torque
+
+
 def recorded_speed(omega, output):
     """Angular velocity that the gyro records [rad/s]."""
     return omega + output
@@ -218,7 +223,7 @@ shell_transfer_arm = Plant(
         for f in (
             arm_inertia, total_inertia, gravity_moment, gravity_level, gravity_upright, gravity_torque, squeeze,
             piston_moment, balance_torque, direction, damping, demand, voltage, field_flux, back_emf, motor_torque,
-            drive_ratio, drive_effort, recorded_speed,
+            drive_ratio, drive_effort, load_effort, recorded_speed,
         )
     },
     constants=(
@@ -254,10 +259,14 @@ shell_transfer_arm = Plant(
     ),
     keys=(
         ManoeuvreKey("start_angle_deg", "theta_C", DEGREE, -55.0, 45.0, required=True),
-        ManoeuvreKey("target_angle_deg", "theta_D", DEGREE, -55.0, 45.0, required=True),
-        ManoeuvreKey("shell", "shell", boolean=True), ManoeuvreKey("supply_V", "U", 1.0, 1.0, 100.0),
+        ManoeuvreKey("target_angle_deg", "theta_D", DEGREE, -55.0, 45.0, required=True, unlike="theta_C"),
+        ManoeuvreKey("shell", "shell", boolean=True, required=True),
+        ManoeuvreKey("supply_V", "U", 1.0, 1.0, 100.0, required=True),
     ),
-    aliases={"I": "current", "speed": "omega", "angle": "theta", "T_d": "motor_torque"},
+    aliases={
+        "I": "current", "speed": "omega", "angle": "theta", "position": "theta", "gravity_effort": "gravity_torque",
+        "T_d": "motor_torque",
+    },
     output="recorded_speed",
     output_unit="rad/s",
     scales=Scales(effort=1000.0, speed=2.0, effort_unit="N m", length_unit="rad"),

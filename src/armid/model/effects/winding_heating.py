@@ -1,0 +1,34 @@
+"""The winding warms up and its resistance grows (Hughes and Drury, Electric Motors and Drives, chapter 3; IEC 60034-1).
+
+On the time of a stroke no heat leaves the copper: the resistance follows the integral of the current squared.
+"""
+
+from armid.model.effect import Effect, State
+from armid.model.parameter import Parameter
+
+
+def winding(current, R, rise, heat):
+    """Voltage at the winding [V], -R rise heat I."""
+    return -R * rise * heat * current
+
+
+def heat_rate(current):
+    """Square of the current [A2]."""
+    return current**2
+
+
+def cold():
+    """Return 0: the declared resistance is that at the start."""
+    return 0.0
+
+
+winding_heating = Effect(
+    name="winding_heating",
+    parameters=(
+        Parameter("rise", "1/(A2 s)", 0.0, 2e-4, null=0.0, note="relative growth of resistance per integral of I^2"),
+    ),
+    adds={"winding": winding},
+    states=(State("heat", "A2 s", heat_rate, cold),),
+    note="the winding's resistance grows with the integral of the current squared",
+    source="Hughes and Drury, Electric Motors and Drives, chapter 3; IEC 60034-1",
+)

@@ -1,0 +1,195 @@
+"""All effects in one compiled model of a plant: each of them alone, in pairs, at its corners, and all at once.
+
+An effect at its null adds exactly nothing (tested), so one compiled model serves for each effect: all but it are at
+their nulls. The judge is scipy on the plain functions of the plant with that effect alone.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from armid.contract import simulate_plainly
+from armid.contract.candidates import away, corners, from_null, middle
+from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, applicable
+from armid.model.plants.driven_axis import linear_axis, rotary_axis
+from armid.simulation import Schedule, simulate
+
+Array = NDArray[np.float64]
+ARM = PLANTS["shell_transfer_arm"]
+# Fine enough that the engine is within 1e-7 rad/s of the truth, but for the brushes' width.
+FINE_STEPS, AGREES, AWAY = Schedule(24), 5e-6, 0.3
+NAMES = {"arm": tuple(EFFECTS), "axis": tuple(applicable(EFFECTS, linear_axis))}
+EACH = [pytest.param(where, name, marks=pytest.mark.slow) for where, names in NAMES.items() for name in names]
+PAIRS = [("arm", "stribeck"), ("arm", "shell_rocking"), ("arm", "controller_delay"), ("arm", "worm_direction"),
+         ("arm", "gas_heat_loss"), ("axis", "asymmetric_viscous"), ("axis", "drive_gain"), ("axis", "output_lag"),
+         ("axis", "load_friction")]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A plant with every effect that it takes, and one manoeuvre."""
+
+    model: Model
+    manoeuvre: Manoeuvre
+    own: dict[str, float]
+
+    def candidate(self, model: Model, values: Array | None = None) -> Array:
+        """Return the candidate of this model that moves as that one: effects that it has not are at their nulls."""
+        known = {} if values is None else dict(zip(model.parameters, values, strict=True))
+        nominal = {n: middle(p) if p.null is None else p.null for n, p in self.model.parameters.items()}
+        return np.array(list((nominal | known | self.own).values()))
+
+    def alone(self, *effects: Effect) -> Model:
+        """Return the plant with some effects."""
+        return Model(self.model.plant, effects)
+
+    def values(self, model: Model, candidate: Array) -> Array:
+        """Return the part of a candidate that a smaller model has."""
+        known = dict(zip(self.model.parameters, candidate, strict=True))
+        return np.array([known[name] for name in model.parameters])
+
+    def moved(self, candidates: Array) -> Array:
+        """Return the signals of candidates, (n_candidates, n_samples); none may fail."""
+        run = simulate(self.model, self.manoeuvre, candidates, FINE_STEPS)
+        assert not run.failed.any()
+        return run.output
+
+    @cached_property
+    def still(self) -> Array:
+        """The signal with all effects at their nulls."""
+        return self.moved(self.candidate(self.model)[np.newaxis])[0]
+
+    def misses(self, *effects: Effect) -> float:
+        """Return the largest difference to scipy with some effects away from null."""
+        model = self.alone(*effects)
+        candidate = self.candidate(self.model)
+        for effect in effects:
+            moved = self.candidate(self.alone(effect), away(self.alone(effect), effect, AWAY))
+            candidate = np.where(moved != self.candidate(self.model), moved, candidate)
+        plain = simulate_plainly(model, self.manoeuvre, self.values(model, candidate))
+        assert np.abs(plain - self.still).max() > 1e-3
+        return float(np.abs(self.moved(candidate[np.newaxis])[0] - plain).max())
+
+
+def whole_arm() -> Whole:
+    """Lowering with the shell, the switch at 0.578 s, to 0.75 s."""
+    return Whole(Model(ARM, tuple(EFFECTS.values())), Manoeuvre(5e-3, 151), {})
+
+
+def whole_axis() -> Whole:
+    """A light hanging axis under a sine that turns it over twice; all scales are 1."""
+    times = 5e-3 * np.arange(201)
+    manoeuvre = Manoeuvre(5e-3, 201, {"gravity_moment": 0.4, "start_speed": 0.1}, {"u": 0.1 + 0.5 * np.sin(9 * times)})
+    return Whole(Model(linear_axis, tuple(applicable(EFFECTS, linear_axis).values())), manoeuvre, {"mass": 0.06})
+
+
+@pytest.fixture(scope="module")
+def whole() -> Callable[[str], Whole]:
+    """Return a function that gives the plant with everything; each is made once."""
+    made: dict[str, Whole] = {}
+
+    def get(where: str) -> Whole:
+        if where not in made:
+            made[where] = whole_arm() if where == "arm" else whole_axis()
+        return made[where]
+
+    return get
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", NAMES)
+def test_with_all_effects_at_null_the_plant_moves_as_declared(whole, where):
+    """Whatever their shapes are."""
+    w = whole(where)
+    bare = w.alone()
+    declared = simulate(bare, w.manoeuvre, w.values(bare, w.candidate(w.model))[np.newaxis], FINE_STEPS).output[0]
+    rng = np.random.default_rng(1)
+    shapes = np.tile(w.candidate(w.model), (16, 1))
+    for i, (name, p) in enumerate(w.model.parameters.items()):
+        if p.null is None and name not in bare.parameters:
+            shapes[:, i] = rng.uniform(p.low, p.high, 16)
+    assert np.abs(w.moved(shapes) - declared).max() <= 1e-12 * w.model.plant.scales.speed
+
+
+@pytest.mark.parametrize(("where", "name"), EACH)
+def test_each_moves_as_its_plain_functions(whole, where, name):
+    assert whole(where).misses(EFFECTS[name]) <= AGREES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("where", "name"), PAIRS)
+def test_pairs_compose(whole, where, name):
+    assert whole(where).misses(EFFECTS["coulomb"], EFFECTS[name]) <= AGREES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", NAMES)
+def test_all_at_once_move_as_their_plain_functions(whole, where):
+    w = whole(where)
+    candidate = w.candidate(w.model)
+    for effect in w.model.effects:
+        moved = w.candidate(w.alone(effect), away(w.alone(effect), effect, 0.03))
+        candidate = np.where(moved != w.candidate(w.model), moved, candidate)
+    plain = simulate_plainly(w.model, w.manoeuvre, candidate)
+    assert np.abs(w.moved(candidate[np.newaxis])[0] - plain).max() <= AGREES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", NAMES)
+def test_the_signal_answers_every_strength_in_proportion(whole, where):
+    """One-sided at a null that is a bound: else the derivative by which tracing ranks effects would be 0 or wild."""
+    w = whole(where)
+    shares = np.array([1e-4, 2e-4])
+    for effect in w.model.effects:
+        model = w.alone(effect)
+        for rows in from_null(model, effect, shares):
+            answers = (w.moved(np.array([w.candidate(model, row) for row in rows])) - w.still) / shares[:, np.newaxis]
+            size = np.abs(answers[1]).max()
+            assert size > 1e-3, effect.name
+            assert np.abs(answers[1] - answers[0]).max() <= 0.02 * size, effect.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", NAMES)
+def test_corners_are_finite_or_counted_and_touch_no_neighbour(whole, where):
+    w = whole(where)
+    rows = [w.candidate(w.alone(e), row) for e in w.model.effects for row in corners(w.alone(e), e)]
+    population = np.array(rows)
+    run = simulate(w.model, w.manoeuvre, population, FINE_STEPS)
+    assert np.array_equal(run.failed, ~np.isfinite(run.output).all(axis=1))
+    assert run.failed.sum() == 0
+    order = np.random.default_rng(2).permutation(len(population))
+    again = simulate(w.model, w.manoeuvre, population[order], FINE_STEPS)
+    assert np.array_equal(again.output, run.output[order])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["quadratic_drag", "output_lag"])
+def test_a_pair_of_its_own_moves_as_within_the_whole(whole, name):
+    """Compiled apart, with two effects only, and in the other order; linear and rotary are the same equations."""
+    w = whole("axis")
+    pair = Model(rotary_axis, (EFFECTS[name], EFFECTS["coulomb"]))
+    values = dict(zip(pair.parameters, away(pair, EFFECTS[name], AWAY), strict=True))
+    values |= {"inertia": w.own["mass"], "coulomb.level": 0.05}
+    within = w.candidate(w.alone()) * 1.0
+    for i, key in enumerate(w.model.parameters):
+        within[i] = values.get(key, within[i])
+    apart = simulate(pair, w.manoeuvre, np.array([list(values.values())]), FINE_STEPS).output[0]
+    assert np.abs(apart - w.moved(within[np.newaxis])[0]).max() <= 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("where", "name", "form"), [("arm", "flux_saturation", "arctangent"),
+                                                     ("axis", "worm_speed", "agma")])  # fmt: skip
+def test_another_form_moves_as_its_plain_functions(whole, where, name, form):
+    w, effect = whole(where), EFFECTS[name].in_form(form)
+    model = w.alone(effect)
+    values = dict(zip(model.parameters, away(model, effect, AWAY), strict=True)) | w.own
+    candidate = np.array(list(values.values()))
+    found = simulate(model, w.manoeuvre, candidate[np.newaxis], FINE_STEPS).output[0]
+    assert np.abs(found - simulate_plainly(model, w.manoeuvre, candidate)).max() <= AGREES
+    assert np.abs(found - w.still).max() > 1e-3
