@@ -45,7 +45,7 @@ def axis_replay(rng, start_noise):
     noise = Noise(NOISE, None, 0.0, 1.0, 1501, "differences")
 
     def replay(manoeuvre, measured):
-        piece = Piece(manoeuvre, measured, slice(0, 1501))
+        piece = Piece(manoeuvre, measured, slice(0, 1501), start_deviation={"start_speed": start_noise})
         record = Record("a.csv", "train", "m/s", manoeuvre, measured, np.empty(0), noise, (piece,), (piece,))
         return Replay(record, model, (piece,), (calibration,))
 
@@ -62,13 +62,13 @@ def test_intervals_cover_the_truth_in_spite_of_a_noisy_start():
         x = np.array([MASS, SLOPE])
         for _ in range(4):
             information = information_at((replay,), space, x)
-            without = information_at((replace(replay, model=rested(replay.model)),), space, x)
+            without = information_at((surely_started(replay),), space, x)
             x = x + without.step * without.deviation
         z.append((x - [MASS, SLOPE]) / information.deviation)
     assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.4
     assert (information.deviation > 2.0 * without.deviation).any()
 
 
-def rested(model):
-    """The same equations, said to start from rest: no noise of the start is reckoned with."""
-    return Model(replace(model.plant, from_rest=True), model.effects)
+def surely_started(replay):
+    """The same record, said to start from a state that is known: no noise of the start is reckoned with."""
+    return replace(replay, pieces=tuple(replace(piece, start_deviation={}) for piece in replay.pieces))

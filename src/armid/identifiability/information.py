@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.identifiability.start import start_scatter
+from armid.identifiability.weighted import STEP
 from armid.problem.replay import Replay
 from armid.problem.space import Space
 from armid.record.noise import correlation_sum
 
 Array = NDArray[np.float64]
-# Step of the central differences, as a share of the range: above rounding, below curvature.
-STEP = 1e-4
 NORMAL_95 = 1.959963984540054
 # Directions whose information is below this share of the strongest cannot be told from nothing.
 SINGULAR = 1e-13
@@ -26,12 +25,14 @@ class Level:
     """Say how far a record scatters about the model.
 
     rms: [unit of the record]; effective_fraction: independent samples per sample; from_residual: the residual was far
-    above the noise, so that the residual itself, with its correlation in time, is what scatters.
+    above the noise, so that the residual itself, with its correlation in time, is what scatters; assumed: nothing was
+    measured, the reader was told so.
     """
 
     rms: float
     effective_fraction: float
     from_residual: bool = False
+    assumed: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ class Information:
     correlation: of the estimates, shape (n_free, n_free), NaN where not determined.
     levels: of the records. step: how far a least-squares step inside the box would move each parameter, in standard
     deviations, NaN where not determined: far above 1 where a search has not come to the minimum.
+    fisher: information matrix of the parameters in shares of their range, shape (n_free, n_free), weighed with 1 where
+    a record has no noise.
     """
 
     names: tuple[str, ...]
@@ -49,6 +52,7 @@ class Information:
     correlation: Array
     levels: tuple[Level, ...] = ()
     step: Array = field(default_factory=lambda: np.empty(0))
+    fisher: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def half_width(self) -> Array:
@@ -93,17 +97,19 @@ def residual_of(replay: Replay, space: Space, x: Array) -> Array:
     return np.asarray(replay.measured - replay.signal(space.complete(x[np.newaxis]))[0])
 
 
-def information_at(replays: tuple[Replay, ...], space: Space, x: Array) -> Information:
+def information_at(
+    replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...] | None = None
+) -> Information:
     """Return intervals and correlations at a candidate, from the sensitivities and the measured noise.
 
     Fisher information F = sum over records of f J^T J / level^2 with f the share of samples that are independent;
     covariance = F^-1 (the Cramer-Rao bound of an unbiased estimate). The level is the noise, or the residual where that
     is far above it. A record without noise and without residual gives an interval of width 0. Where records start from
     a measured state, what its noise does to the estimate is added (see `start_scatter`).
-    x: free parameters, SI, shape (n_free,).
+    x: free parameters, SI, shape (n_free,). levels: one for each record, None: as measured.
     """
     span = space.high[space.free] - space.low[space.free]
-    levels = tuple(level_of(r, space, x) for r in replays)
+    levels = tuple(level_of(r, space, x) for r in replays) if levels is None else levels
     noise_free = any(level.rms == 0.0 for level in levels)
     total, started, slope = np.zeros((len(x), len(x))), np.zeros((len(x), len(x))), np.zeros(len(x))
     for replay, level in zip(replays, levels, strict=True):
@@ -125,7 +131,7 @@ def information_at(replays: tuple[Replay, ...], space: Space, x: Array) -> Infor
     with np.errstate(invalid="ignore"):
         steps = np.zeros(len(x)) if noise_free else step / deviation
     shown = np.where(known & noise_free, 0.0, deviation * span)
-    return Information(space.free_names, shown, correlation, levels, steps)
+    return Information(space.free_names, shown, correlation, levels, steps, total)
 
 
 def step_inside(step: Array, x: Array, low: Array, high: Array) -> Array:

@@ -6,28 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from armid.display import SHOWN, style
 from armid.fitness import SIMILARITIES
 from armid.identification.identify import Identification
-from armid.identification.words import SHOWN
 from armid.problem import Replay
+
+__all__ = ["chosen", "convergence_figure", "draw_record", "fit_figure", "set_log_scale", "style", "title"]
 
 # Okabe-Ito: told apart by colour-blind readers.
 MEASURED, SIMULATED, RESIDUAL = "#000000", "#D55E00", "#0072B2"
 MOST_RECORDS = 8
 # Letters of a title that fit above one column.
 LINE = 60
-
-
-def style() -> Any:
-    """Return pyplot on a backend without a screen, in the house style."""
-    import matplotlib as mpl  # noqa: PLC0415 - takes time to import, and only figures need it
-    import seaborn as sns  # noqa: PLC0415
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt  # noqa: PLC0415
-
-    sns.set_theme(context="notebook", style="ticks", font_scale=1.0)
-    return plt
 
 
 def fit_figure(found: Identification, path: Path) -> None:

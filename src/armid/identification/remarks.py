@@ -93,7 +93,8 @@ def noise_remarks(found: Identification) -> list[str]:
         said.append(f"{len(replays)} records: noise {min(values):.3g} to {max(values):.3g} {SHOWN[unit][0]} rms.")
     pairs = zip(replays, found.information.levels, strict=True)
     above = [(r.record, level.rms) for r, level in pairs if level.from_residual]
-    said += [misfit_remark(record.file, rms, record.noise.rms) for record, rms in above[:MOST_NAMED]]
+    searched = bool(found.space.free.any())
+    said += [misfit_remark(record.file, rms, record.noise.rms, searched) for record, rms in above[:MOST_NAMED]]
     if len(above) > MOST_NAMED:
         said.append(f"So it is with {len(above) - MOST_NAMED} more records.")
     return said
@@ -110,9 +111,12 @@ def noise_remark(replay: Replay, unit: str) -> str:
     return f"{text} from high-frequency differences of the motion, as fewer than 50 samples were recorded at rest."
 
 
-def misfit_remark(file: str, rms: float, noise: float) -> str:
-    """Return the sentence for a record whose residual is far above its noise."""
+def misfit_remark(file: str, rms: float, noise: float, searched: bool) -> str:
+    """Return the sentence for a record whose residual is far above its noise; searched: some parameter was free."""
     times = rms / noise if noise else np.inf
+    if not searched:
+        return (f"{file}: the residual is {times:.3g} times the noise: the model, in which nothing is free, lacks "
+                "something.")  # fmt: skip
     return (f"{file}: the residual is {times:.3g} times the noise: the model lacks something, or the search has not "
             "come to the minimum; the intervals are widened to the residual and its correlation in time, and hold only "
             "as far as what is lacking averages out.")  # fmt: skip

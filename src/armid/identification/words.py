@@ -3,17 +3,11 @@
 import numpy as np
 from rich.table import Table
 
+from armid.display import SHOWN, shown
 from armid.identification.errors import Errors
 from armid.identification.identify import Identification
 
-# Units as people read them: SI unit -> (unit on screen, factor).
-SHOWN = {"Pa": ("MPa", 1e-6), "rad/s": ("deg/s", 180.0 / np.pi), "m/s": ("mm/s", 1e3)}
-
-
-def shown(value: float, unit: str) -> tuple[float, str]:
-    """Return a value in the unit that people read."""
-    name, factor = SHOWN.get(unit, (unit, 1.0))
-    return value * factor, name
+__all__ = ["SHOWN", "error_cells", "error_table", "interval_text", "parameter_table", "shown"]
 
 
 def parameter_table(found: Identification) -> Table:

@@ -1,0 +1,146 @@
+"""`armid identifiability`: how well the records of a campaign pin down the parameters."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.cli.new_files import NewFiles, refuse_unwritable
+from armid.cli.options import (
+    accuracy_of,
+    accuracy_option,
+    assignments,
+    campaign_argument,
+    effects_option,
+    interval,
+    intervals,
+    model_of,
+    number,
+    numbers,
+    plugin_option,
+)
+from armid.model import ArmidError, nearest
+
+if TYPE_CHECKING:
+    from armid.identifiability.examine import Examination
+    from armid.problem import Space
+
+Array = NDArray[np.float64]
+
+
+@click.command("identifiability")
+@campaign_argument
+@effects_option
+@click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
+              help="Free a parameter between bounds, SI. Repeatable.")
+@click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
+@click.option("--at", default="", metavar="NAME=VALUE,...",
+              help="Examine this point, SI, instead of the least-squares estimate.")
+@click.option("--from", "source", type=click.Path(path_type=Path), metavar="RESULT.json",
+              help="Examine the point that `armid identify` found.")
+@click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
+@click.option("--noise", type=float, metavar="RMS",
+              help="White noise to assume for every record, rad/s or m/s, in place of what was measured.")
+@click.option("--rank", default="volume", show_default=True, metavar="volume|worst|shrinkage",
+              help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for identifiability.json and the figures.")
+@accuracy_option
+@plugin_option
+def identifiability_command(
+    campaign: Path, effects: str, bounds: tuple[str, ...], fix: tuple[str, ...], at: str, source: Path | None,
+    window: str, noise: float | None, rank: str, out: Path | None, accuracy: str, plugins: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Say what the train records tell about the parameters, and what one more manoeuvre would buy.
+
+    Cramer-Rao intervals, parameters that move together, the profile likelihood of each parameter. Holdout records are
+    not looked at.
+    """
+    from armid.identifiability.examine import examine  # noqa: PLC0415 - compiled code that other commands do not need
+    from armid.identifiability.purchase import SHRINKAGE, VOLUME, WORST  # noqa: PLC0415
+    from armid.problem import space_of  # noqa: PLC0415
+    from armid.record import read_campaign  # noqa: PLC0415
+    from armid.registry import load_registry  # noqa: PLC0415
+
+    if rank not in (VOLUME, WORST, SHRINKAGE):
+        raise ArmidError(f"--rank '{rank}': {nearest(rank, (VOLUME, WORST, SHRINKAGE))}")
+    if noise is not None and not (np.isfinite(noise) and noise > 0.0):
+        raise ArmidError(f"--noise is {noise:g}, a finite number above 0 is expected")
+    if at and source is not None:
+        raise ArmidError("--at and --from are both given: one point is expected")
+    registry = load_registry(plugins)
+    read = read_campaign(campaign, registry.plants, registry.effects)
+    if window:
+        read = read.with_window(*interval(window, "--window"))
+    model = model_of(read, effects, registry)
+    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
+    point = point_of(space, at, source)
+    if out is not None:
+        refuse_unwritable(out)
+    found = examine(read, model, space, point, noise, rank, accuracy_of(accuracy))
+    report(found)
+    if out is not None:
+        write(found, out)
+
+
+def point_of(space: "Space", at: str, source: Path | None) -> Array | None:
+    """Return the point that was asked for, SI, shape (n_free,); None where none was."""
+    if at:
+        given = {n: number(v, f"--at {n}") for n, v in assignments(at.split(","), "--at").items()}
+        return free_values(space, given, "--at")
+    return None if source is None else free_values(space, read_point(source), f"--from {source}")
+
+
+def read_point(path: Path) -> dict[str, float]:
+    """Return name -> value of the result of an identification.
+
+    Raises ArmidError for a file that is none.
+    """
+    try:
+        parameters = json.loads(path.read_text(encoding="utf-8"))["parameters"]
+        return {str(name): float(entry["value"]) for name, entry in parameters.items()}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ArmidError(f"--from {path} holds no parameters with values: a result.json of `armid identify` is "
+                         "expected") from error  # fmt: skip
+
+
+def free_values(space: "Space", given: dict[str, float], where: str) -> Array:
+    """Return the values of the free parameters in order; a fixed one may be named, its value stays as it is fixed."""
+    for name in given:
+        if name not in space.names:
+            raise ArmidError(f"{where}: parameter '{name}' is not in the model: {nearest(name, space.names)}")
+    missing = [name for name in space.free_names if name not in given]
+    if missing:
+        raise ArmidError(f"{where}: parameter '{missing[0]}' is free and has no value there: one is expected")
+    return np.array([given[name] for name in space.free_names])
+
+
+def report(found: "Examination") -> None:
+    """Print tables and remarks."""
+    from rich.console import Console  # noqa: PLC0415 - takes time to import
+
+    from armid.identifiability.remarks import remarks  # noqa: PLC0415
+    from armid.identifiability.words import offer_table, parameter_table  # noqa: PLC0415
+
+    console = Console(width=None if sys.stdout.isatty() else 132)
+    console.print(parameter_table(found))
+    console.print(offer_table(found))
+    for remark in remarks(found):
+        console.print(f"- {remark}", highlight=False, markup=False)
+
+
+def write(found: "Examination", out: Path) -> None:
+    """Write identifiability.json and the figures, all or none."""
+    from armid.identifiability.figures import profile_figure, sensitivity_figure  # noqa: PLC0415
+    from armid.identifiability.result import result_of  # noqa: PLC0415
+
+    with NewFiles(out) as files:
+        text = json.dumps(result_of(found), indent=2, allow_nan=False) + "\n"
+        files.path("identifiability.json").write_text(text)
+        profile_figure(found, files.path("profiles.png"))
+        sensitivity_figure(found, files.path("sensitivities.png"))
+    print(f"wrote {', '.join(files.names)} to {out}")

@@ -1,0 +1,6 @@
+"""How numbers and figures are shown to people."""
+
+from armid.display.style import GREY, OKABE_ITO, style
+from armid.display.units import SHOWN, shown
+
+__all__ = ["GREY", "OKABE_ITO", "SHOWN", "shown", "style"]

@@ -1,0 +1,235 @@
+"""A whole examination: what it says of a campaign, in numbers, words and figures."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armid.identifiability import examine, information_at
+from armid.identifiability.figures import draw_profile, profile_figure, sensitivity_figure, smooth
+from armid.identifiability.profile import THRESHOLD
+from armid.identifiability.remarks import remarks
+from armid.identifiability.result import result_of
+from armid.identifiability.words import (
+    deviation_text,
+    interval_text,
+    offer_table,
+    offer_text,
+    parameter_table,
+    profile_text,
+)
+from armid.model import EFFECTS, ArmidError
+from armid.problem import space_of
+
+TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
+NOISE = 0.25 * np.pi / 180.0
+
+
+@pytest.fixture(scope="module")
+def one_stroke(lowering, arm, arm_space):
+    """The lowering, cut at 0.7 s."""
+    return examine(lowering, arm, arm_space)
+
+
+@pytest.fixture(scope="module")
+def with_friction(lowering, arm):
+    """The same with friction that is not there."""
+    model = arm + EFFECTS["coulomb"]
+    return examine(lowering, model, space_of(model))
+
+
+def sentence(found, *words):
+    """Return the one remark that holds all of some words."""
+    told = [r for r in remarks(found) if all(w in r for w in words)]
+    assert len(told) == 1, remarks(found)
+    return told[0]
+
+
+def test_at_the_estimate_it_is_the_information_there(one_stroke, arm_space):
+    expected = information_at(one_stroke.replays, arm_space, one_stroke.minimum)
+    np.testing.assert_allclose(one_stroke.information.deviation, expected.deviation, rtol=1e-6)
+    np.testing.assert_array_equal(one_stroke.x, one_stroke.minimum)
+    assert np.abs(expected.step).max() < 0.05
+    assert [p.name for p in one_stroke.profiles] == ["p0", "k", "eta3", "n"]
+    assert not one_stroke.at_bound.any()
+
+
+def test_what_moves_together_is_said(one_stroke):
+    told = sentence(one_stroke, "p0, eta3 and n move together")
+    assert "+0.42 % of n goes next to unseen with" in told
+    # p0 less and n more balance the arm alike
+    assert "-0.14 % of p0" in told
+
+
+def test_unseen_moves_are_unseen(one_stroke, arm_space):
+    """Move as the sentence says: chi2 rises far less than by the move of the leading parameter alone."""
+    (group,) = one_stroke.groups
+    span = arm_space.high - arm_space.low
+    move = np.zeros(4)
+    move[[0, 2, 3]] = 0.01 * group.direction
+    fisher = one_stroke.information.fisher
+    alone = np.diag(move) @ fisher @ np.diag(move)
+    assert move @ fisher @ move < 0.01 * np.diag(alone).max()
+    assert np.abs(group.direction).max() == 1.0
+    assert (span > 0).all()
+
+
+def test_holdout_has_no_say(lowering, one_stroke, arm, arm_space):
+    train, holdout = lowering.records
+    (piece,) = holdout.pieces
+    lost = replace(piece, measured=-7.0 * piece.measured)
+    garbage = replace(holdout, pieces=(lost,), measured=-7.0 * holdout.measured)
+    again = examine(replace(lowering, records=(train, garbage)), arm, arm_space)
+    assert json.dumps(result_of(again)) == json.dumps(result_of(one_stroke))
+
+
+def test_an_effect_that_is_not_there_is_below_a_bound(with_friction):
+    told = sentence(with_friction, "coulomb.level may be null")
+    assert "it is below" in told
+    profile = with_friction.profiles[4]
+    assert profile.bounded == (False, True)
+    assert profile_text(profile, 1.0).startswith("box 0")
+    assert with_friction.at_bound[4]
+    # the bound holds the friction, so that the parabola, which knows no bound, promises too little
+    assert "believe the profile" in sentence(with_friction, "p0: the profile says")
+
+
+def test_a_point_that_is_given(lowering, arm, arm_space, one_stroke):
+    point = TRUTH * [1.0, 0.98, 1.0, 1.0]
+    found = examine(lowering, arm, arm_space, point)
+    np.testing.assert_array_equal(found.x, point)
+    np.testing.assert_allclose(found.minimum, one_stroke.minimum, rtol=1e-5)
+    assert "k is" in sentence(found, "The point that was given is not the least-squares minimum")
+    near = examine(lowering, arm, arm_space, one_stroke.minimum)
+    assert not [r for r in remarks(near) if "point that was given" in r]
+    with pytest.raises(ArmidError, match=r"k is 2, a value from 0\.6 to 1\.1 is expected"):
+        examine(lowering, arm, arm_space, np.array([3.05e6, 2.0, 0.55, 1.4]))
+
+
+def test_nothing_free_is_refused(lowering, arm, arm_space):
+    space = arm_space
+    for name, value in zip(arm_space.names, TRUTH, strict=True):
+        space = space.with_fixed(name, value)
+    with pytest.raises(ArmidError, match="no parameter is free"):
+        examine(lowering, arm, space)
+
+
+def measuring(campaign, change, noise):
+    """Return a campaign whose train records measured something else, with a noise."""
+    (train,) = campaign.train
+    told = replace(train.noise, rms=noise)
+    pieces = tuple(replace(p, measured=change(p)) for p in train.pieces)
+    return replace(campaign, records=(replace(train, pieces=pieces, noise=told),))
+
+
+def test_without_noise_one_is_assumed_and_said(one_stroke, lowering, arm, arm_space):
+    (clean,) = (r.signal(TRUTH[np.newaxis])[0] for r in one_stroke.replays)
+
+    def exact(piece):
+        return np.concatenate([clean, piece.measured[clean.size :]])
+
+    found = examine(measuring(lowering, exact, 0.0), arm, arm_space)
+    (level,) = found.information.levels
+    assert level.assumed
+    assert level.rms == pytest.approx(1e-3 * np.sqrt(np.mean(clean**2)), rel=1e-6)
+    assert "ASSUMED" in sentence(found, "lower.csv")
+    np.testing.assert_allclose(found.x, TRUTH, rtol=1e-5)
+    assert all(p.bounded == (True, True) for p in found.profiles)
+    # groups do not depend on the noise; intervals are in proportion to it
+    assert [g.names for g in found.groups] == [g.names for g in one_stroke.groups]
+    louder = examine(measuring(lowering, exact, 0.0), arm, arm_space, noise=10.0 * level.rms)
+    np.testing.assert_allclose(louder.information.deviation, 10.0 * found.information.deviation, rtol=1e-4)
+
+
+def test_a_misfit_widens_and_is_said(one_stroke, lowering, arm, arm_space):
+    def rocking(piece):
+        times = np.arange(piece.measured.size) * 1e-3
+        return piece.measured + 0.05 * np.sin(2 * np.pi * 8.0 * times)
+
+    found = examine(measuring(lowering, rocking, lowering.train[0].noise.rms), arm, arm_space)
+    assert found.information.levels[0].from_residual
+    assert "times the noise: the model lacks something" in sentence(found, "lower.csv")
+    widths = [b.high - b.low for b in found.profiles]
+    assert (np.array(widths) > 5.0 * np.array([a.high - a.low for a in one_stroke.profiles])).all()
+
+
+def test_what_is_not_seen_is_said(paper_arm, arm, arm_space):
+    found = examine(replace(paper_arm, records=paper_arm.train[:1]).with_window(0.0, 0.3), arm, arm_space)
+    assert sentence(found, "k is not seen at all")
+    assert sentence(found, "k is bounded on neither side")
+    assert found.offers[0].best == 1
+    assert ": k from not determined to" in offer_text(found, found.offers[0])
+    assert np.isinf(found.offers[0].before[1])
+    json.dumps(result_of(found), allow_nan=False)
+
+
+def test_the_numbers_for_other_programs(with_friction):
+    told = json.loads(json.dumps(result_of(with_friction), allow_nan=False))
+    assert list(told["parameters"]) == ["p0", "k", "eta3", "n", "coulomb.level"]
+    entry = told["parameters"]["p0"]
+    assert entry["profile"]["low"] < entry["profile"]["minimum"] < entry["profile"]["high"]
+    assert len(entry["profile"]["values"]) == len(entry["profile"]["rise"])
+    assert told["fixed"] == {"coulomb.width": pytest.approx(0.01)}
+    assert told["at"] == "estimate"
+    assert len(told["directions"]) == 5
+    assert told["directions"][0]["eigenvalue"] == pytest.approx(told["collinearity_index"] ** -2, rel=1e-6)
+    offer = told["offers"][0]
+    assert set(offer["manoeuvre"]) == {"start_angle_deg", "target_angle_deg", "shell", "supply_V"}
+    assert offer["deviation"]["n"]["after"] < offer["deviation"]["n"]["before"]
+
+
+def test_tables(with_friction):
+    assert parameter_table(with_friction).row_count == 5
+    rows = offer_table(with_friction, most=3)
+    cells = list(rows.columns[0].cells)
+    assert cells[0] == "none"
+    assert cells[-1].startswith("lower.csv once more")
+    assert len(cells) == 5
+
+
+def test_digits_follow_the_width():
+    assert interval_text(1.39814, 1.40181) == "1.39814 to 1.40181"
+    assert interval_text(90.4, 97.9) == "90.40 to 97.90"
+    assert interval_text(100.0, 4000.0) == "100 to 4000"
+    assert interval_text(1.0, 1.0) == "1.000000 to 1.000000"
+
+
+def test_deviations_are_percent_of_plant_parameters_only(with_friction):
+    space = with_friction.space
+    assert deviation_text(space, 0, 3.05e4, 3.05e6) == "1 %"
+    assert deviation_text(space, 4, 2.5, 40.0) == "2.5 N m"
+    assert deviation_text(space, 0, np.inf, 3.05e6) == "not determined"
+
+
+def test_figures_show_what_was_found(one_stroke, with_friction, paper_arm, arm, arm_space, tmp_path):
+    from matplotlib import pyplot as plt
+
+    profile_figure(with_friction, tmp_path / "profiles.png")
+    sensitivity_figure(one_stroke, tmp_path / "one.png")
+    sensitivity_figure(examine(paper_arm, arm, arm_space), tmp_path / "several.png")
+    for name in ("profiles.png", "one.png", "several.png"):
+        assert plt.imread(tmp_path / name).std() > 0.05
+
+
+def test_a_profile_is_drawn_with_its_threshold_its_parabola_and_its_bound(with_friction):
+    from matplotlib import pyplot as plt
+
+    figure, axis = plt.subplots()
+    profile = with_friction.profiles[4]
+    draw_profile(axis, profile)
+    drawn = {line.get_label(): line for line in axis.lines}
+    assert set(drawn) == {"by curvature", "profile", "fitted again", "95 % threshold", "bound of the box", "estimate"}
+    assert drawn["95 % threshold"].get_ydata()[0] == THRESHOLD
+    parabola = drawn["by curvature"]
+    expected = ((parabola.get_xdata() - profile.estimate) / profile.deviation) ** 2
+    np.testing.assert_allclose(parabola.get_ydata(), expected)
+    left, right = axis.get_xlim()
+    assert left <= profile.low < profile.high <= right
+    plt.close(figure)
+
+
+def test_the_curve_goes_through_the_points(one_stroke):
+    profile = one_stroke.profiles[0]
+    values, rise = smooth(profile, 1e-6)
+    np.testing.assert_allclose(np.interp(1e-6 * profile.values, values, rise), profile.rise, atol=0.02)
