@@ -1,17 +1,27 @@
-"""Make a campaign of SYNTHETIC records of the shell transfer arm.
+"""Make campaigns of SYNTHETIC records of the shell transfer arm, and judge what was said of blind ones.
 
     python studies/test_stand.py OUT_FOLDER [--p0 3.05e6 --k 1.0 --eta3 0.55 --n 1.4] [--effect coulomb=40 ...]
+    python studies/test_stand.py blind OUT_FOLDER --seed 1 [--only control,coulomb]
+    python studies/test_stand.py score OUT_FOLDER RESULTS_FOLDER
 
 The stand plays the machine: it simulates the declared arm, with any undeclared effects that are asked for, and measures
 it with a noisy gyro. It shares no code with `src/`, so a campaign is an independent check of what identifies it.
+`blind` makes many campaigns that do not tell their truth; it lies in OUT_FOLDER.key.json, and `score` alone reads it:
+RESULTS_FOLDER holds a folder for each campaign with the report.json of `armid close-loop`.
 No machine was measured; the constants of the arm are engineering estimates. `--help` lists every option.
 
-The exit code is 0 when the campaign is written and 2, with one sentence on stderr, when the input is refused.
+The exit code is 0 when all is written and 2, with one sentence on stderr, when the input is refused. To make a single
+campaign in a folder that is called blind or score, write ./blind or ./score.
 """
 
 import sys
 
-from stand.command import main
+from stand.blind.command import main as make_blind
+from stand.command import main as make_campaign
+from stand.score.command import main as score
+
+COMMANDS = {"blind": make_blind, "score": score}
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    words = sys.argv[1:]
+    sys.exit(COMMANDS[words[0]](words[1:]) if words and words[0] in COMMANDS else make_campaign(words))

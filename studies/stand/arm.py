@@ -80,8 +80,12 @@ class Arm:
         return motors + gears + worm + self.load(shell).inertia
 
     def volume(self, angle: float) -> float:
-        """Give the gas volume V = V0 - S l (theta - theta_A) [m3] at an angle [rad] (paper Eq 5)."""
-        return self.gas_volume - self.piston_area * self.piston_lever * (angle - self.travel[0])
+        """Give the gas volume V = V0 - S l (theta - theta_A) [m3] at an angle [rad] (paper Eq 5).
+
+        It stays above 0 for angles that only a trial step of the integrator takes, far beyond the travel.
+        """
+        volume = self.gas_volume - self.piston_area * self.piston_lever * (angle - self.travel[0])
+        return max(volume, 1e-3 * self.gas_volume)
 
     def pressure(self, angle: float) -> float:
         """Give the pressure of a polytropic gas p = p0 (V0/V)^n [Pa] at an angle [rad] (paper Eq 5)."""

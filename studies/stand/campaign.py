@@ -35,8 +35,9 @@ def make_records(settings: Settings, rng: np.random.Generator) -> list[Record]:
         for count in range(1, 1 + (settings.repeats if index == 0 else 1)):
             original = f"{manoeuvre.name}.csv" if count > 1 else None
             file = f"{manoeuvre.name}_{count}.csv" if original else f"{manoeuvre.name}.csv"
-            speed = measure(trajectory, settings.gyro, settings.effects.gyro_bias_deg_s, rng)
-            records.append(Record(file, manoeuvre, role, record_times(trajectory), speed, original))
+            speed = measure(trajectory, settings.gyro, settings.effects.gyro_bias_deg_s, rng, settings.rest_samples)
+            times = record_times(trajectory, settings.rest_samples)
+            records.append(Record(file, manoeuvre, role, times, speed, original))
     return records
 
 
@@ -78,17 +79,18 @@ def campaign_text(settings: Settings, records: list[Record]) -> str:
     lines += ["", f'name = "{settings.name}"', 'plant = "shell_transfer_arm"']
     lines.append(f"gyro_range_deg_s = {short(settings.gyro.range_deg_s)}")
     for record in records:
-        lines += ["", "[[records]]", *_record_lines(settings, record)]
+        lines += ["", "[[records]]", *record_lines(record, settings.window_s)]
     return "\n".join([*lines, ""])
 
 
-def _record_lines(settings: Settings, record: Record) -> list[str]:
+def record_lines(record: Record, window_s: tuple[float, float] | None = None) -> list[str]:
+    """Write the keys of a record as campaign.toml holds them."""
     told = record.manoeuvre
     lines = [f'file = "{record.file}"', f'role = "{record.role}"']
     lines += [f"start_angle_deg = {float(told.start_deg)}", f"target_angle_deg = {float(told.target_deg)}"]
     lines += [f"shell = {str(told.shell).lower()}", f"supply_V = {float(told.supply_volt)}"]
-    if settings.window_s:
-        lines.append(f"window_s = [{settings.window_s[0]}, {settings.window_s[1]}]")
+    if window_s:
+        lines.append(f"window_s = [{window_s[0]}, {window_s[1]}]")
     if record.repeat_of:
         lines.append(f'repeat_of = "{record.repeat_of}"')
     return lines

@@ -20,7 +20,7 @@ from stand.refusal import RefusalError
 from stand.settings import Settings
 
 
-class _Parser(argparse.ArgumentParser):
+class Parser(argparse.ArgumentParser):
     """Refuse with one sentence, where argparse prints the usage as well."""
 
     def error(self, message: str) -> NoReturn:
@@ -70,6 +70,7 @@ def read_settings(options: argparse.Namespace) -> Settings:
         holdout=holdout,
         repeats=options.repeats,
         duration_s=options.duration,
+        rest_s=options.rest,
         window_s=tuple(options.window_s) if options.window_s else None,
         seed=options.seed,
         figure=options.figure,
@@ -90,7 +91,7 @@ def _manoeuvre(word: str) -> Manoeuvre:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog="test_stand.py",
         description="Make a campaign of SYNTHETIC records of the shell transfer arm.",
         epilog=f"effects (0 = off; SI units unless the name says otherwise):\n{describe_effects()}",
@@ -134,5 +135,6 @@ def _add_measurement(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--quantisation-deg-s", type=float, default=gyro.quantisation_deg_s, help=step)
     group.add_argument("--gyro-range-deg-s", type=float, default=gyro.range_deg_s, help="largest speed (default 200)")
     group.add_argument("--duration", type=float, default=1.2, help="seconds after the brake opens (default 1.2)")
+    group.add_argument("--rest", type=float, default=0.1, help="seconds of rest before it (default 0.1)")
     group.add_argument("--window-s", type=float, nargs=2, metavar=("START", "END"), help="window asked of each record")
     group.add_argument("--seed", type=int, default=1, help="seed of the noise (default 1)")

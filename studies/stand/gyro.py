@@ -11,6 +11,7 @@ from stand.trajectory import SAMPLES_PER_SECOND, Trajectory
 
 FloatArray = npt.NDArray[np.float64]
 REST_SAMPLES = 100
+"""Samples of rest that a record begins with, unless more are asked for."""
 NOISE_DAMPING = 0.7
 """Damping ratio of the gyro that colours the noise, an estimate."""
 
@@ -47,14 +48,20 @@ class Gyro:
         return next(exact, 6)
 
 
-def record_times(trajectory: Trajectory) -> FloatArray:
-    """Give the times of a record [s]: 100 ms of rest under the brake, then the manoeuvre from t = 0."""
-    return np.arange(-REST_SAMPLES, trajectory.time_s.size) / SAMPLES_PER_SECOND
+def record_times(trajectory: Trajectory, rest_samples: int = REST_SAMPLES) -> FloatArray:
+    """Give the times of a record [s]: samples of rest under the brake, then the manoeuvre from t = 0."""
+    return np.arange(-rest_samples, trajectory.time_s.size) / SAMPLES_PER_SECOND
 
 
-def measure(trajectory: Trajectory, gyro: Gyro, bias_deg_s: float, rng: np.random.Generator) -> FloatArray:
+def measure(
+    trajectory: Trajectory,
+    gyro: Gyro,
+    bias_deg_s: float,
+    rng: np.random.Generator,
+    rest_samples: int = REST_SAMPLES,
+) -> FloatArray:
     """Give one record of a trajectory [deg/s], rest included: speed plus noise, rounded to steps, kept in range."""
-    rest = np.full(REST_SAMPLES, bias_deg_s)
+    rest = np.full(rest_samples, bias_deg_s)
     shown = np.concatenate((rest, np.degrees(trajectory.gyro)))
     return _quantise(shown + noise(shown.size, gyro, rng), gyro)
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from stand.arm import Arm
 from stand.effects import Effects
-from stand.gyro import Gyro
+from stand.gyro import REST_SAMPLES, Gyro
 from stand.manoeuvre import KNOWN, NAME, Manoeuvre, write_manoeuvre
 from stand.refusal import RefusalError
+from stand.trajectory import SAMPLES_PER_SECOND
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class Settings:
     holdout: tuple[str, ...] = ("empty",)
     repeats: int = 3
     duration_s: float = 1.2
+    rest_s: float = REST_SAMPLES / SAMPLES_PER_SECOND
     window_s: tuple[float, float] | None = None
     seed: int = 1
     figure: str | None = None
@@ -57,6 +59,8 @@ class Settings:
             raise RefusalError(f"the seed must be 0 or more, not {self.seed}")
         if not (math.isfinite(self.duration_s) and 0.01 <= self.duration_s <= 10.0):
             raise RefusalError(f"the duration must lie between 0.01 and 10 s, not {self.duration_s}")
+        if not (math.isfinite(self.rest_s) and 0.1 <= self.rest_s <= 10.0):
+            raise RefusalError(f"the rest must last between 0.1 and 10 s, not {self.rest_s}")
         if self.window_s and not -0.1 <= self.window_s[0] < self.window_s[1] <= self.duration_s:
             raise RefusalError(
                 f"the window must rise and lie between -0.1 and {self.duration_s} s, not {self.window_s}"
@@ -70,6 +74,11 @@ class Settings:
         if self.repeats < 2:
             raise RefusalError("the figure compares repeats, so --repeats must be 2 or more")
 
+    @property
+    def rest_samples(self) -> int:
+        """Give the samples of rest before t = 0."""
+        return round(self.rest_s * SAMPLES_PER_SECOND)
+
     def command(self) -> str:
         """Give the full command that makes this campaign again, defaults written out and no absolute path."""
         folder = Path(self.folder.name) if self.folder.is_absolute() else self.folder
@@ -82,6 +91,7 @@ class Settings:
             option = each.name.replace("range", "gyro_range").replace("_", "-")
             words += [f"--{option}", short(getattr(self.gyro, each.name))]
         words += ["--duration", short(self.duration_s), "--seed", str(self.seed)]
+        words += ["--rest", short(self.rest_s)] if self.rest_samples != REST_SAMPLES else []
         if self.window_s:
             words += ["--window-s", *(short(edge) for edge in self.window_s)]
         on = self.effects.switched_on()

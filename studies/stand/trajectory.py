@@ -1,30 +1,25 @@
 """How the simulated arm moves through one manoeuvre."""
 
-import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import solve_ivp
 
+from stand.late import is_late, late_stage, notice
 from stand.motion import Motion
-from stand.refusal import RefusalError
+from stand.stage import closed_stage, open_stage
 
 FloatArray = npt.NDArray[np.float64]
 SAMPLES_PER_SECOND = 1000
 TOLERANCE = 1e-11
-MOST_RATES = 300_000
-"""Evaluations of the equations that a stage may take; a usual one takes some 10,000."""
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """Hold a manoeuvre sampled at 1 kHz from t = 0: time [s], the states by name, the speed the gyro shows [rad/s].
 
-    `switch_s` is the instant of E [s], or None when the arm does not get there.
+    `switch_s` is the instant at which the closed loop begins [s], or None when the arm does not get there.
     """
 
     time_s: FloatArray
@@ -33,8 +28,8 @@ class Trajectory:
     switch_s: float | None
 
 
-def simulate(motion: Motion, duration_s: float) -> Trajectory:
-    """Integrate a manoeuvre from rest and sample it at 1 kHz.
+def simulate(motion: Motion, duration_s: float, tolerance: float = TOLERANCE) -> Trajectory:
+    """Integrate a manoeuvre from rest and sample it at 1 kHz; `tolerance` is relative and absolute.
 
     DOP853 runs to the switch E, the first instant at which abs(theta_D - theta) falls to delta_E, and starts again
     from there in closed loop; a stroke no longer than delta_E is in closed loop from the start.
@@ -43,61 +38,26 @@ def simulate(motion: Motion, duration_s: float) -> Trajectory:
     time = np.arange(round(duration_s * SAMPLES_PER_SECOND) + 1) / SAMPLES_PER_SECOND
     start = np.array(list(motion.start.values()))
     if abs(motion.manoeuvre.target - motion.manoeuvre.start) <= motion.arm.switch_distance:
-        return _trajectory(motion, time, _stage(motion, start, 0.0, time, closed_loop=True).y, 0.0)
-    before = _stage(motion, start, 0.0, time, closed_loop=False)
+        return _trajectory(motion, time, _closed_loop(motion, start, None, time, tolerance), 0.0)
+    before = open_stage(motion, start, time, tolerance)
     if not before.t_events[0].size:
         return _trajectory(motion, time, before.y, None)
     switch, state = float(before.t_events[0][0]), before.y_events[0][0]
+    begins = notice(motion, switch) if is_late(motion) else switch
     rest = time[before.y.shape[1] :]
     if not rest.size:
-        return _trajectory(motion, time, before.y, switch)
-    after = _stage(motion, state, switch, rest, closed_loop=True)
-    return _trajectory(motion, time, np.hstack((before.y, after.y)), switch)
+        return _trajectory(motion, time, before.y, begins)
+    after = _closed_loop(motion, state, switch, rest, tolerance)
+    return _trajectory(motion, time, np.hstack((before.y, after)), begins)
 
 
-def _stage(motion: Motion, state: FloatArray, begin: float, samples: FloatArray, *, closed_loop: bool) -> Any:
-    """Integrate one stage from `begin` [s]; the first event is E, which ends the open loop, the second the travel."""
-    count = itertools.count()
-
-    def rates(_time: float, values: FloatArray) -> list[float]:
-        if next(count) > MOST_RATES:
-            raise RefusalError(f"{motion.manoeuvre.name} is too stiff to integrate: an effect is too fast or too large")
-        return motion.rates(values, closed_loop)
-
-    events = [_ending(_to_switch(motion), not closed_loop), _ending(_to_stops(motion), True)]
-    span = (begin, float(samples[-1]))
-    found: Any = solve_ivp(
-        rates, span, state, method="DOP853", t_eval=samples, events=events, rtol=TOLERANCE, atol=TOLERANCE
-    )
-    if found.t_events[1].size:
-        where = f"at {found.t_events[1][0]:.3f} s, and the stand has no end stops"
-        raise RefusalError(f"{motion.manoeuvre.name} would leave the travel of -55 to 45 deg {where}")
-    if not found.success or not np.isfinite(found.y).all():
-        raise RefusalError(f"{motion.manoeuvre.name} cannot be integrated with these values: {found.message}")
-    return found
-
-
-def _to_switch(motion: Motion) -> Callable[[FloatArray], float]:
-    """Give the distance to E [rad]: abs(theta_D - theta) - delta_E."""
-    target, distance = motion.manoeuvre.target, motion.arm.switch_distance
-    return lambda values: abs(target - float(values[0])) - distance
-
-
-def _to_stops(motion: Motion) -> Callable[[FloatArray], float]:
-    """Give the distance to the nearer end of the travel [rad]."""
-    low, high = motion.arm.travel
-    return lambda values: min(float(values[0]) - low, high - float(values[0]))
-
-
-def _ending(distance: Callable[[FloatArray], float], terminal: bool) -> Any:
-    """Make an event of scipy where a distance falls to 0."""
-
-    def event(_time: float, values: FloatArray) -> float:
-        return distance(values)
-
-    event.terminal = terminal  # type: ignore[attr-defined]
-    event.direction = -1.0  # type: ignore[attr-defined]
-    return event
+def _closed_loop(
+    motion: Motion, state: FloatArray, switch: float | None, samples: FloatArray, tolerance: float
+) -> FloatArray:
+    """Integrate from the switch E, or from t = 0 where there is none, to the last sample."""
+    if is_late(motion):
+        return late_stage(motion, state, switch, samples, tolerance)
+    return np.asarray(closed_stage(motion, state, switch or 0.0, samples, tolerance).y)
 
 
 def _trajectory(motion: Motion, time: FloatArray, values: FloatArray, switch_s: float | None) -> Trajectory:

@@ -38,10 +38,31 @@ SIZES = {
     "gyro_bias_deg_s": 0.3,
     "gyro_scale": 0.005,
     "rocking_hz": 10.0,
+    "seal_friction": 250.0,
+    "asymmetric_friction": 40.0,
+    "torque_offset": 15.0,
+    "worm_braking": 1.0,
+    "worm_speed": 0.1,
+    "drive_gain": 0.05,
+    "flux_atan": 150.0,
+    "line_loss": 2e4,
+    "tachometer_ripple": 0.05,
+    "controller_delay": 0.005,
+    "controller_period": 0.01,
+    "cam_bump": 60.0,
+    "motor_fade": 0.005,
+    "piston_stiction": 800.0,
+    "cable_spring": 150.0,
+    "pressure_friction": 0.08,
+    "base_compliance": 1e-4,
+    "slipping_ripple": 50.0,
+    "sway": 30.0,
 }
 STIFF = {"tachometer_lag": 1e-5, "gyro_bandwidth_hz": 1e4, "rocking_hz": 1e3}
-NEARLY_NULL = {name: 1e-6 * size for name, size in SIZES.items() if name not in STIFF} | {
+LATE = {"controller_delay": 5e-4, "controller_period": 1e-3}
+NEARLY_NULL = {name: 1e-6 * size for name, size in SIZES.items() if name not in STIFF | LATE} | {
     "flux_saturation": 1e9,
+    "flux_atan": 1e7,
     "gas_heat_loss": 1e7,
 }
 
@@ -110,8 +131,11 @@ def test_refuses_an_effect_too_stiff_to_integrate() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["coulomb", "stribeck", "viscous", "drag", "flux_saturation", "brush_drop", "winding_heating", "supply_sag"]
-)
+    "name",
+    ["coulomb", "stribeck", "viscous", "drag", "flux_saturation", "brush_drop", "winding_heating", "supply_sag",
+     "seal_friction", "asymmetric_friction", "worm_speed", "flux_atan", "line_loss", "cam_bump", "motor_fade",
+     "piston_stiction", "pressure_friction"],
+)  # fmt: skip
 def test_a_loss_delays_the_switch_both_ways(name: str) -> None:
     for manoeuvre in ("lower", "raise"):
         lossy, declared = (moved(effects, manoeuvre).switch_s for effects in (Effects(**{name: SIZES[name]}), None))
@@ -175,8 +199,9 @@ def test_no_shell_no_rocking() -> None:
 
 
 def test_all_effects_together_run_in_both_directions() -> None:
+    sizes = {name: size for name, size in SIZES.items() if name != "controller_period"}
     for name in ("lower", "raise"):
-        assert np.isfinite(moved(Effects(**SIZES), name).gyro).all()
+        assert np.isfinite(moved(Effects(**sizes), name, 0.9).gyro).all()
 
 
 def test_refuses_to_leave_the_travel() -> None:

@@ -1,0 +1,1 @@
+"""Make a suite of campaigns whose truth only the scorer reads."""

@@ -1,0 +1,1 @@
+"""Judge what a closed loop said of blind campaigns."""

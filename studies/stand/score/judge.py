@@ -1,0 +1,166 @@
+"""Judge what the report of one campaign says against the truth."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+Entry = Mapping[str, Any]
+PARAMETERS = ("p0", "k", "eta3", "n")
+LARGEST_GROUP = 4
+EMPIRICAL = "unnamed:"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Hold what a report claims: each named effect with its group (itself included), and the empirical terms."""
+
+    groups: Mapping[str, frozenset[str]]
+    empirical: tuple[str, ...]
+    verdict: str
+
+    @property
+    def said(self) -> str:
+        """Write the names, each with what it cannot be told from."""
+        told = [" or ".join((name, *sorted(group - {name}))) for name, group in self.groups.items()]
+        return "; ".join((*told, *self.empirical))
+
+
+def read_claim(report: Entry) -> Claim:
+    """Read the effects of a report in the end; one that was added and removed again does not count."""
+    steps = {step["effect"]: step for step in report["steps"]}
+    empirical = tuple(name for name in report["effects"] if _is_empirical(name, steps))
+    named = [name for name in report["effects"] if name not in empirical]
+    groups = {name: frozenset((name, *(steps[name]["alternatives"] if name in steps else ()))) for name in named}
+    return Claim(groups, empirical, report["verdict"])
+
+
+def _is_empirical(name: str, steps: Mapping[str, Entry]) -> bool:
+    return name.startswith(EMPIRICAL) or bool(name in steps and steps[name]["empirical"])
+
+
+@dataclass(frozen=True)
+class Matched:
+    """Hold which truths are named, which are held by a group alone, and which names belong to no truth."""
+
+    named: tuple[str, ...]
+    grouped: tuple[str, ...]
+    extra: tuple[str, ...]
+
+
+def match(truths: Sequence[str], claim: Claim) -> Matched:
+    """Give each truth the name that is its own, else one group that holds it; a group of more than 4 holds nothing."""
+    named = tuple(truth for truth in truths if truth in claim.groups)
+    free = {name: group for name, group in claim.groups.items() if name not in named}
+    grouped = []
+    for truth in truths:
+        holds = [name for name, group in free.items() if truth in group and len(group) <= LARGEST_GROUP]
+        if truth not in named and holds:
+            grouped.append(truth)
+            del free[holds[0]]
+    return Matched(named, tuple(grouped), tuple(free))
+
+
+def judgement(label: str, truths: Sequence[str], claim: Claim, matched: Matched) -> str:
+    """Give one word for a campaign of a class.
+
+    control: right, false_alarm. unlisted: claimed (a library's names alone are said to explain all), else empirical,
+    partial, none. Others: right, group (held by a group that cannot be told apart), right_with_extra, half,
+    half_with_extra (of two), wrong, cannot_tell, empirical, none.
+    """
+    if label == "unlisted":
+        return _of_unlisted(claim)
+    return _of_listed(truths, claim, matched) if truths else _of_nothing(claim)
+
+
+def _of_nothing(claim: Claim) -> str:
+    silent = not claim.groups and not claim.empirical
+    return "right" if silent and claim.verdict == "no_discrepancy" else "false_alarm"
+
+
+def _of_unlisted(claim: Claim) -> str:
+    if claim.groups and claim.verdict == "explained":
+        return "claimed"
+    return "empirical" if claim.empirical else "partial" if claim.groups else "none"
+
+
+def _of_listed(truths: Sequence[str], claim: Claim, matched: Matched) -> str:
+    found = len(matched.named) + len(matched.grouped)
+    if found == 0 and claim.groups:
+        return "wrong"
+    if found == 0:
+        quiet = "cannot_tell" if claim.verdict == "cannot_tell_apart" else "none"
+        return "empirical" if claim.empirical else quiet
+    whole = "right" if found == len(truths) else "half"
+    if matched.extra:
+        return f"{whole}_with_extra"
+    return "group" if whole == "right" and matched.grouped else whole
+
+
+def judge(campaign: str, entry: Entry, report: Entry) -> dict[str, Any]:
+    """Give one row: truth, claim and judgement, held-out errors over their noise, bias of the four parameters.
+
+    Raises KeyError for a key that the report lacks.
+    """
+    claim = read_claim(report)
+    truths = [each["name"] for each in entry["effects"] if each["listed"]]
+    matched = match(truths, claim)
+    own = [len(group) for name, group in claim.groups.items() if group & set(truths)]
+    wrong = [len(claim.groups[name]) for name in matched.extra]
+    row = {
+        **told(campaign, entry),
+        "verdict": claim.verdict,
+        "named": claim.said,
+        "judgement": judgement(entry["class"], truths, claim, matched),
+        "wrong_alone": 1 in wrong,
+        "wrong_group": any(size > 1 for size in wrong),
+        "largest_group": max((len(group) for group in claim.groups.values()), default=0),
+        "group_of_truth": max(own, default=0),
+    }
+    return row | _errors(entry, report) | _parameters(entry, report)
+
+
+def told(campaign: str, entry: Entry) -> dict[str, Any]:
+    """Give what the key tells of a campaign."""
+    effects, fit = entry["effects"], entry["declared_fit"]
+    return {
+        "campaign": campaign,
+        "class": entry["class"],
+        "noise": entry["noise"]["kind"],
+        "truth": "; ".join(each["name"] for each in effects),
+        "form": "; ".join(each["form"] for each in effects),
+        "port": "; ".join(each["port"] for each in effects),
+        "matching": all(each["matching"] for each in effects),
+        "strength": "; ".join(str(each["strength"]) for each in effects),
+        "matters": bool(fit and fit["matters"]),
+        "expected_over_floor": fit["holdout_ratio"] if fit else None,
+        "floor": entry["floor"]["holdout"],
+    }
+
+
+def _errors(entry: Entry, report: Entry) -> dict[str, float | None]:
+    """Give held-out rmse before and after [rad/s], over the noise, and how much of it went."""
+    floor = entry["floor"]["holdout"]
+    before, after = ((report["error"][when]["holdout"] or {}).get("rmse") for when in ("before", "after"))
+    if before is None or after is None or floor is None:
+        return dict.fromkeys(("before", "after", "before_over_floor", "after_over_floor", "cut", "excess_cut"))
+    excess = [math.sqrt(max(0.0, rmse**2 - floor**2)) for rmse in (before, after)]
+    return {
+        "before": before,
+        "after": after,
+        "before_over_floor": before / floor,
+        "after_over_floor": after / floor,
+        "cut": 1.0 - after / before,
+        "excess_cut": 1.0 - excess[1] / excess[0] if excess[0] else None,
+    }
+
+
+def _parameters(entry: Entry, report: Entry) -> dict[str, Any]:
+    """Give the relative error of each parameter before and after, and whether it is trusted after."""
+    row: dict[str, Any] = {}
+    for name in PARAMETERS:
+        truth = entry["parameters"][name]
+        for when in ("before", "after"):
+            row[f"bias_{when}_{name}"] = report["parameters"][when][name]["value"] / truth - 1.0
+        row[f"trusted_{name}"] = bool(report["parameters"]["after"][name]["trusted"])
+    return row

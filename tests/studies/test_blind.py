@@ -1,0 +1,229 @@
+"""The blind suite: what it holds, that it tells nothing, and that its key lies apart."""
+
+import json
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armid.record import read_campaign
+from stand.arm import Arm
+from stand.blind.case import cases_of, shuffled
+from stand.blind.command import SUITE, main
+from stand.blind.fit import Shown, fit_declared
+from stand.blind.lanes import declared_speeds
+from stand.blind.suite import read_suite
+from stand.blind.write import key_path
+from stand.effects import Effects
+from stand.manoeuvre import KNOWN
+from stand.motion import Motion
+from stand.refusal import RefusalError
+from stand.trajectory import simulate
+
+LISTED = {
+    "coulomb", "stribeck", "viscous", "quadratic_drag", "seal_friction", "shell_rocking", "tilt", "worm_direction",
+    "worm_speed", "flux_saturation", "brush_drop", "winding_heating", "supply_sag", "gas_heat_loss", "line_loss",
+    "tachometer_lag", "tachometer_offset", "controller_delay", "gyro_lag", "gyro_bias", "gyro_scale", "drive_gain",
+    "torque_offset",
+}  # fmt: skip
+SMALL = """
+[suite]
+bandwidth_hz = 40.0
+noise_deg_s = [0.25, 0.30]
+duration_s = [1.2, 1.3]
+rest_s = 0.2
+margin = 0.1
+controls = 1
+[suite.ranges]
+p0 = [2.6e6, 3.5e6]
+k = [0.6, 1.1]
+eta3 = [0.45, 0.70]
+n = [0.9, 1.5]
+[[suite.effects]]
+name = "gyro_bias"
+port = "output"
+form = "constant"
+signed = true
+sizes = [{ gyro_bias_deg_s = 0.4 }]
+[suite.one_stroke]
+effects = ["none"]
+"""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make four campaigns in one process: a control, an effect twice, one stroke."""
+    folder = tmp_path_factory.mktemp("blind") / "suite"
+    folder.with_name("small.toml").write_text(SMALL)
+    assert main([str(folder), *words_of(folder.with_name("small.toml")), "--processes", "1"]) == 0
+    return folder
+
+
+def words_of(suite: Path) -> list[str]:
+    return ["--seed", "5", "--suite", str(suite)]
+
+
+def key_of(folder: Path) -> dict[str, Any]:
+    return dict(json.loads(key_path(folder).read_text()))
+
+
+def test_the_suite_holds_what_the_question_asks() -> None:
+    suite = read_suite(SUITE)
+    cases = cases_of(suite, 1)
+    counts = Counter(case.label for case in cases)
+    assert counts["control"] == 100
+    assert (counts["two"], counts["unlisted"], counts["one_stroke"]) == (20, 12, 12)
+    assert {kind.name for kind in suite.effects} == LISTED
+    assert all(len(suite.kind(name).sizes) == 3 for name in LISTED)
+    assert len({kind.name for kind in suite.unlisted}) >= 6
+    assert not {kind.name for kind in suite.unlisted} & LISTED
+    for label in ("control", "single", "two", "unlisted"):
+        assert Counter(case.coloured for case in cases if case.label == label)[True] * 2 == counts[label]
+
+
+def test_two_effects_are_of_two_ports() -> None:
+    for case in cases_of(read_suite(SUITE), 1):
+        if case.label == "two":
+            assert len({each.kind.port for each in case.planted}) == 2
+
+
+def test_the_sizes_of_an_effect_grow() -> None:
+    """Take the first number that differs; for a saturation, a time constant or a frequency less is more."""
+    for kind in read_suite(SUITE).effects:
+        changing = next((n for n in kind.sizes[0] if kind.sizes[0][n] != kind.sizes[-1][n]), None)
+        values = [size[changing] for size in kind.sizes] if changing else []
+        assert values in (sorted(values), sorted(values, reverse=True))
+
+
+def test_campaigns_of_a_part_are_those_of_the_whole() -> None:
+    cases = cases_of(read_suite(SUITE), 1)
+    part = shuffled(cases, 1, ["coulomb"])
+    assert {case.index for case in part.values()} == {case.index for case in cases if case.chosen(["coulomb"])}
+    assert list(part) == [f"c{count:03d}" for count in range(len(part))]
+    whole = [case.index for case in shuffled(cases, 1).values()]
+    assert sorted(whole) == list(range(len(cases))) != whole
+
+
+def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path) -> None:
+    again = tmp_path / "suite"
+    assert main([str(again), *words_of(small.with_name("small.toml")), "--processes", "2"]) == 0
+    for file in (each for each in small.rglob("*") if each.is_file()):
+        assert (again / file.relative_to(small)).read_bytes() == file.read_bytes()
+    assert key_path(again).read_bytes() == key_path(small).read_bytes()
+
+
+def test_the_key_lies_beside_the_campaigns_and_not_among_them(small: Path) -> None:
+    assert sorted(each.name for each in small.parent.iterdir()) == ["small.toml", "suite", "suite.key.json"]
+    assert sorted(each.name for each in small.iterdir()) == ["c000", "c001", "c002", "c003"] == sorted(
+        key_of(small)["campaigns"]
+    )
+    assert {each.suffix for each in small.rglob("*") if each.is_file()} == {".toml", ".md", ".csv"}
+
+
+def test_a_campaign_tells_nothing_of_its_truth(small: Path) -> None:
+    words = re.compile(r"effect|seed|true|noise|colou?r|white|p0|eta3|bias|class|index|key", re.IGNORECASE)
+    for campaign in small.iterdir():
+        for name in ("campaign.toml", "README.md"):
+            text = (campaign / name).read_text().replace("shell = true", "")
+            assert not words.search(text), words.search(text)
+            assert "SYNTHETIC and blind" in text
+        assert (campaign / "lower.csv").read_text().startswith("time_s,angular_velocity_deg_s\n-0.200,")
+
+
+def test_the_package_reads_every_campaign(small: Path) -> None:
+    for name, entry in key_of(small)["campaigns"].items():
+        campaign = read_campaign(small / name)
+        one = entry["class"] == "one_stroke"
+        assert len(campaign.train) == (1 if one else 4)
+        assert len(campaign.holdout) in ((0, 1) if one else (2,))
+        assert {record.file for record in campaign.records} == {record["file"] for record in entry["records"]}
+        for record in campaign.records:
+            assert record.rest.size == 200
+
+
+def test_the_truth_is_away_from_the_edges_and_explains_the_records(small: Path) -> None:
+    ranges = read_suite(SUITE).ranges
+    for name, entry in key_of(small)["campaigns"].items():
+        for parameter, (low, high) in ranges.items():
+            assert low + 0.1 * (high - low) <= entry["parameters"][parameter] <= high - 0.1 * (high - low)
+        arm = Arm(**entry["parameters"])
+        effects = Effects(**{k: v for each in entry["effects"] for k, v in each["sizes"].items()})
+        for record in entry["records"][:1]:
+            measured = np.loadtxt(small / name / record["file"], delimiter=",", skiprows=1)[200:, 1]
+            stroke = type(KNOWN["lower"])("lower", record["start_angle_deg"], record["target_angle_deg"])
+            true = simulate(Motion(arm, stroke, effects), (measured.size - 1) / 1000.0, 1e-9).gyro
+            left = float(np.sqrt(np.mean((np.radians(measured) - true) ** 2)))
+            assert left == pytest.approx(record["noise"], rel=1e-4)
+            assert np.degrees(left) == pytest.approx(entry["noise"]["rms_deg_s"], rel=0.25)
+
+
+def test_what_effects_do_is_told_for_each_campaign(small: Path) -> None:
+    for entry in key_of(small)["campaigns"].values():
+        if entry["class"] == "single":
+            fit = entry["declared_fit"]
+            expected = np.hypot(1.0, fit["left_holdout"] / entry["floor"]["holdout"])
+            assert fit["holdout_ratio"] == pytest.approx(expected, rel=1e-4)
+            assert fit["left_train"] <= np.radians(0.4)
+            assert entry["effects"][0]["alone"]["holdout_ratio"] == fit["holdout_ratio"]
+            assert abs(entry["effects"][0]["sizes"]["gyro_bias_deg_s"]) == 0.4
+        else:
+            assert entry["declared_fit"] is None
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_lanes_agree_with_the_stand(name: str) -> None:
+    pairs = [(Arm(), KNOWN[name]), (Arm(3.2e6, 0.9, 0.6, 1.2), KNOWN[name])]
+    for found, (arm, manoeuvre) in zip(declared_speeds(pairs, 1001), pairs):
+        assert np.abs(found - simulate(Motion(arm, manoeuvre), 1.0, 1e-9).gyro).max() < 5e-4
+
+
+def test_the_fit_finds_an_arm_that_lacks_nothing() -> None:
+    truth = Arm(3.2e6, 0.9, 0.6, 1.2)
+    strokes = [KNOWN[name] for name in ("lower", "raise", "empty")]
+    shown = Shown(strokes, declared_speeds([(truth, stroke) for stroke in strokes], 801))
+    ranges = read_suite(SUITE).ranges
+    found = fit_declared(shown, Arm(), ranges)
+    for name in ranges:
+        assert getattr(found, name) == pytest.approx(getattr(truth, name), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["suite"], "--seed"),
+        (["suite", "--seed", "-1"], "seed must be 0"),
+        (["suite", "--seed", "1", "--only", "cool"], "no class or effect 'cool'"),
+        (["suite", "--seed", "1", "--processes", "0"], "processes must be 1"),
+        (["suite", "--seed", "1", "--suite", "none.toml"], "cannot be read"),
+        (["suite", "--seed", "1", "--suite", "empty.toml"], "lacks the key 'suite'"),
+        (["suite", "--seed", "1", "--suite", "wrong.toml"], "describes no suite"),
+        (["file", "--seed", "1"], "is a file"),
+        (["full", "--seed", "1"], "give --force"),
+        (["full", "--seed", "1", "--force"], "holds mine.txt"),
+    ],
+)
+def test_refuses_with_one_sentence_and_writes_nothing(
+    words: list[str], sentence: str, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "empty.toml").write_text("")
+    (tmp_path / "wrong.toml").write_text("[suite]\ncontrols =")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert sentence in said.err
+    assert said.err.count("\n") == 1
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_suite_refuses_an_effect_it_does_not_hold(tmp_path: Path) -> None:
+    file = tmp_path / "suite.toml"
+    file.write_text(SMALL.replace('"none"', '"coulomb"'))
+    with pytest.raises(RefusalError, match="'coulomb', which is none"):
+        cases_of(read_suite(file), 1)

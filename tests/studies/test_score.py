@@ -1,0 +1,196 @@
+"""The scorer: one word for each report, and the targets."""
+
+import copy
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stand.blind.write import key_path
+from stand.score.command import main
+from stand.score.judge import judge
+from stand.score.targets import Target, targets_of
+
+ROOT = Path(__file__).parents[2]
+FLOOR = 0.005
+TRUE = {"p0": 3e6, "k": 1.0, "eta3": 0.6, "n": 1.2}
+
+
+def entry(label: str, *names: str, listed: bool = True, matching: bool = True, matters: bool = True) -> dict[str, Any]:
+    told = {"port": "torque", "form": "f", "matching": matching, "listed": listed, "strength": 1, "sizes": {}}
+    return {
+        "class": label,
+        "parameters": TRUE,
+        "effects": [{"name": name, **told} for name in names],
+        "noise": {"kind": "white"},
+        "floor": {"train": FLOOR, "holdout": None if label == "one_stroke" else FLOOR},
+        "declared_fit": {"holdout_ratio": 3.0, "matters": matters} if names else None,
+    }
+
+
+def report(
+    verdict: str, *steps: tuple[str, tuple[str, ...]], after: float = FLOOR, bias: float = 0.0
+) -> dict[str, Any]:
+    held = {"train": {"rmse": 0.0}, "holdout": {"rmse": 0.02}}
+    found = {name: {"value": value * (1.0 + bias), "trusted": bias == 0.0} for name, value in TRUE.items()}
+    return {
+        "verdict": verdict,
+        "effects": [name for name, _ in steps],
+        "steps": [
+            {"effect": name, "alternatives": list(others), "empirical": name.startswith("unnamed:")}
+            for name, others in steps
+        ],
+        "error": {"before": held, "after": {"train": {"rmse": 0.0}, "holdout": {"rmse": after}}},
+        "parameters": {"before": copy.deepcopy(found), "after": found},
+    }
+
+
+COULOMB = ("coulomb", ())
+PAIR = ("coulomb", ("seal_friction",))
+TILT = ("tilt", ())
+TERM = ("unnamed:torque", ())
+
+
+@pytest.mark.parametrize(
+    ("label", "truths", "verdict", "steps", "word"),
+    [
+        ("control", (), "no_discrepancy", (), "right"),
+        ("control", (), "unexplained", (), "false_alarm"),
+        ("control", (), "explained", (COULOMB,), "false_alarm"),
+        ("control", (), "partly_explained", (TERM,), "false_alarm"),
+        ("single", ("coulomb",), "explained", (COULOMB,), "right"),
+        ("single", ("coulomb",), "explained", (PAIR,), "right"),
+        ("single", ("seal_friction",), "cannot_tell_apart", (PAIR,), "group"),
+        ("single", ("coulomb",), "explained", (COULOMB, TILT), "right_with_extra"),
+        ("single", ("coulomb",), "partly_explained", (COULOMB, TERM), "right"),
+        ("single", ("viscous",), "explained", (COULOMB,), "wrong"),
+        ("single", ("viscous",), "explained", (PAIR,), "wrong"),
+        ("single", ("e",), "cannot_tell_apart", (("a", ("b", "c", "d", "e")),), "wrong"),
+        ("single", ("viscous",), "cannot_tell_apart", (), "cannot_tell"),
+        ("single", ("viscous",), "no_discrepancy", (), "none"),
+        ("single", ("viscous",), "partly_explained", (TERM,), "empirical"),
+        ("two", ("coulomb", "tilt"), "explained", (TILT, COULOMB), "right"),
+        ("two", ("seal_friction", "tilt"), "explained", (TILT, PAIR), "group"),
+        ("two", ("coulomb", "seal_friction"), "explained", (PAIR,), "half"),
+        ("two", ("coulomb", "viscous"), "explained", (COULOMB, TILT), "half_with_extra"),
+        ("two", ("stribeck", "viscous"), "explained", (COULOMB, TILT), "wrong"),
+        ("unlisted", ("cam_bump",), "explained", (COULOMB,), "claimed"),
+        ("unlisted", ("cam_bump",), "partly_explained", (COULOMB,), "partial"),
+        ("unlisted", ("cam_bump",), "partly_explained", (COULOMB, TERM), "empirical"),
+        ("unlisted", ("cam_bump",), "unexplained", (), "none"),
+        ("one_stroke", (), "no_discrepancy", (), "right"),
+        ("one_stroke", (), "explained", (COULOMB,), "false_alarm"),
+        ("one_stroke", ("coulomb",), "cannot_tell_apart", (("viscous", ("coulomb",)),), "group"),
+    ],
+)
+def test_one_word_for_each_report(label: str, truths: tuple[str, ...], verdict: str, steps: Any, word: str) -> None:
+    told = entry(label, *truths, listed=label != "unlisted")
+    assert judge("c000", told, report(verdict, *steps))["judgement"] == word
+
+
+def test_a_wrong_name_with_a_group_is_not_alone() -> None:
+    row = judge("c000", entry("single", "viscous"), report("explained", PAIR))
+    assert (row["wrong_alone"], row["wrong_group"], row["largest_group"], row["group_of_truth"]) == (False, True, 2, 0)
+    row = judge("c000", entry("single", "viscous"), report("explained", COULOMB))
+    assert (row["wrong_alone"], row["wrong_group"]) == (True, False)
+
+
+def test_an_effect_that_was_removed_again_does_not_count() -> None:
+    told = report("explained", TILT, COULOMB)
+    told["effects"] = ["coulomb"]
+    assert judge("c000", entry("single", "coulomb"), told)["judgement"] == "right"
+
+
+def test_errors_and_biases_are_reckoned() -> None:
+    row = judge("c000", entry("single", "coulomb"), report("explained", COULOMB, after=0.006, bias=0.02))
+    assert (row["before_over_floor"], row["after_over_floor"]) == pytest.approx((4.0, 1.2))
+    assert row["cut"] == pytest.approx(0.7)
+    assert row["excess_cut"] == pytest.approx(1.0 - (0.44 / 15.0) ** 0.5)
+    assert row["bias_after_eta3"] == pytest.approx(0.02)
+    assert row["trusted_n"] is False
+
+
+def test_a_record_without_holdout_has_no_held_out_error() -> None:
+    told = report("cannot_tell_apart")
+    told["error"]["before"]["holdout"] = told["error"]["after"]["holdout"] = None
+    row = judge("c000", entry("one_stroke"), told)
+    assert row["before"] is row["after_over_floor"] is row["cut"] is None
+
+
+def found(rows: list[dict[str, Any]], words: str) -> Target:
+    (target,) = (each for each in targets_of(rows, 0) if each.question.endswith(words))
+    return target
+
+
+def test_the_targets_count_what_they_say() -> None:
+    right, wrong = (report("explained", (name, ())) for name in ("coulomb", "tilt"))
+    rows = [judge("c", entry("single", "coulomb"), right) for _ in range(19)]
+    held = "20 %: right name, or a group that holds it"
+    assert (found(rows, held).found, found(rows, held).met) == (1.0, True)
+    rows += [judge("c", entry("single", "coulomb"), wrong) for _ in range(2)]
+    assert found(rows, held).met is False
+    assert found(rows, "20 %: wrong name alone").found == pytest.approx(2 / 21)
+    assert found(rows, "20 %: wrong name alone").met is False
+    rows += [judge("c", entry("single", "coulomb", matters=False), wrong) for _ in range(9)]
+    assert found(rows, held).among == 21
+    assert found(rows, "20 %: share of all").found == pytest.approx(0.7)
+
+
+def test_a_target_that_nothing_tells_of_is_neither_met_nor_missed() -> None:
+    assert {each.met for each in targets_of([], 0)[1:]} == {None}
+    assert targets_of([], 3)[0].met is False
+
+
+@pytest.mark.parametrize(("trusted", "met"), [(0.0, False), (0.3, True)])
+def test_one_stroke_may_not_be_trusted(trusted: float, met: bool) -> None:
+    rows = [judge("c", entry("one_stroke"), report("no_discrepancy", bias=trusted))]
+    assert found(rows, "eta3 or n trusted").met is met
+
+
+@pytest.fixture
+def suite(tmp_path: Path) -> Path:
+    """Write a key of two campaigns and the report of one."""
+    folder = tmp_path / "suite"
+    key = {"campaigns": {"c000": entry("control"), "c001": entry("single", "coulomb")}}
+    key_path(folder).write_text(json.dumps(key))
+    (tmp_path / "results" / "c001").mkdir(parents=True)
+    (tmp_path / "results" / "c001" / "report.json").write_text(json.dumps(report("explained", COULOMB)))
+    return folder
+
+
+def test_scores_from_the_command_line(suite: Path) -> None:
+    results = suite.with_name("results")
+    words = [sys.executable, str(ROOT / "studies" / "test_stand.py"), "score", str(suite), str(results)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert "FAIL campaigns without a report: 1 of 2 = 0" in done.stdout
+    score = json.loads((results / "score" / "score.json").read_text())
+    assert [row["judgement"] for row in score["judgements"]] == ["right", "missing"]
+    assert (results / "score" / "judgements.csv").read_text().count("\n") == 3
+    assert len(score["targets"]) == (results / "score" / "targets.csv").read_text().count("\n") - 1
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"), [("{", "is no JSON"), ("{}", "is no report of a closed loop"), ("[]", "is no report")]
+)
+def test_refuses_what_is_no_report(
+    text: str, sentence: str, suite: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (suite.with_name("results") / "c001" / "report.json").write_text(text)
+    assert main([str(suite), str(suite.with_name("results"))]) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1
+
+
+def test_refuses_a_suite_without_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path / "suite"), str(tmp_path)]) == 2
+    assert "suite.key.json cannot be read" in capsys.readouterr().err
+
+
+def test_nothing_in_the_package_names_a_key() -> None:
+    files = list((ROOT / "src").rglob("*.py"))
+    assert len(files) > 50
+    assert not [file for file in files if "key.json" in file.read_text()]

@@ -1,0 +1,181 @@
+"""What each added effect of the stand must do: closed forms, equivalences, limits and signs."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from stand.arm import Arm
+from stand.drive import drive, flux, relative_friction, worm_efficiency
+from stand.effects import Effects, read_effects
+from stand.friction import friction
+from stand.manoeuvre import KNOWN
+from stand.motion import Motion
+from stand.refusal import RefusalError
+from stand.trajectory import Trajectory, simulate
+from stand.unlisted import unlisted_torque
+
+ARM = Arm()
+LEVER = ARM.piston_lever
+
+
+@cache
+def moved(effects: Effects, name: str = "lower", duration_s: float = 0.9) -> Trajectory:
+    return simulate(Motion(ARM, KNOWN[name], effects), duration_s, 1e-9)
+
+
+def states(count: int = 200) -> list[dict[str, float]]:
+    """Draw states within what a stroke meets."""
+    rng = np.random.default_rng(5)
+    low, high = (-0.9, -3.0, -70.0), (0.7, 3.0, 70.0)
+    return [dict(zip(("angle", "speed", "current"), map(float, rng.uniform(low, high)))) for _ in range(count)]
+
+
+@pytest.mark.parametrize("name", ["lower", "raise"])
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ({"seal_friction": 300.0, "seal_width": 0.004},
+         {"coulomb": 300.0 * LEVER, "coulomb_width": 0.004, "coulomb_tanh": 1.0}),
+        ({"asymmetric_friction": 40.0, "asymmetric_share": 0.0},
+         {"coulomb": 40.0, "coulomb_width": 0.002, "coulomb_tanh": 1.0}),
+        ({"line_loss": 2e4}, {"drag": 2e4 * LEVER * ARM.piston_area}),
+        ({"worm_braking": 1.0},
+         {"worm_loss": 1.0 - (2.0 - 1.0 / 0.55) / 0.55, "worm_width": 0.002, "worm_tanh": 1.0}),
+        ({"piston_stiction": 500.0, "stiction_fade_deg": 1e9}, {"seal_friction": 500.0}),
+        ({"cam_bump": 30.0, "cam_width_deg": 1e6}, {"seal_friction": 30.0 / LEVER}),
+        ({"sway": 20.0, "sway_hz": 1e-9, "sway_phase_deg": 90.0}, {"torque_offset": 20.0}),
+        ({"rocking_hz": 8.0, "rocking_stop": 1e3}, {"rocking_hz": 8.0}),
+        ({"base_compliance": 1e-4, "base_hz": 1e-3}, {}),
+    ],
+    ids=lambda told: next(iter(told), "declared"),
+)  # fmt: skip
+def test_two_ways_to_say_the_same_agree(one: dict[str, float], other: dict[str, float], name: str) -> None:
+    assert np.abs(moved(Effects(**one), name).gyro - moved(Effects(**other), name).gyro).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"coulomb": 40.0, "coulomb_tanh": 1.0},
+        {"stribeck": 40.0, "stribeck_exponent": 1.0},
+        {"seal_friction": 300.0},
+        {"asymmetric_friction": 40.0},
+    ],
+    ids=lambda told: next(iter(told)),
+)
+def test_friction_takes_energy_out_at_any_state(told: dict[str, float]) -> None:
+    assert all(friction(ARM, Effects(**told), now) * now["speed"] > 0.0 for now in states())
+
+
+@pytest.mark.parametrize("told", [{"cam_bump": 60.0}, {"piston_stiction": 800.0}, {"pressure_friction": 0.1}])
+def test_nameless_friction_takes_energy_out_at_any_state(told: dict[str, float]) -> None:
+    for now in states():
+        torque = unlisted_torque(ARM, Effects(**told), now, -0.8, 400.0)
+        assert torque * now["speed"] <= 0.0
+
+
+def test_friction_of_either_direction_has_its_own_size() -> None:
+    effects = Effects(asymmetric_friction=40.0, asymmetric_share=0.25)
+    down, up = (friction(ARM, effects, {"speed": speed}) for speed in (1.0, -1.0))
+    assert (down, up) == pytest.approx((50.0, -30.0))
+
+
+def test_the_exponent_of_stribeck_shapes_how_it_fades() -> None:
+    for exponent in (1.0, 2.0):
+        effects = Effects(stribeck=40.0, stribeck_exponent=exponent, stribeck_tanh=1.0)
+        found = friction(ARM, effects, {"speed": 0.3})
+        assert found == pytest.approx(40.0 * math.exp(-(2.0**exponent)))
+
+
+def test_atan_saturates_as_its_series_says() -> None:
+    """K I_s atan(x) = K I (1 - x^2/3 + ...), x = I/I_s, and K I_s pi/2 in the end; the rational form bends at once."""
+    bent = Effects(flux_atan=100.0)
+    assert flux(ARM, bent, {"current": -10.0}) == pytest.approx(ARM.excitation * 10.0 * (1.0 - 0.01 / 3.0), rel=1e-4)
+    assert flux(ARM, bent, {"current": 1e7}) == pytest.approx(ARM.excitation * 100.0 * math.pi / 2.0, rel=1e-4)
+    rational = flux(ARM, Effects(flux_saturation=100.0), {"current": 10.0})
+    assert rational == pytest.approx(ARM.excitation * 10.0 / 1.1)
+
+
+def test_a_fading_motor_loses_torque_with_the_charge() -> None:
+    effects = Effects(motor_fade=0.01)
+    fresh, worn = (flux(ARM, effects, {"current": 50.0, "charge": charge}) for charge in (0.0, 25.0))
+    assert worn == pytest.approx(fresh / 1.25)
+    passed = moved(effects).states
+    assert passed["charge"][-1] == pytest.approx(np.trapezoid(np.abs(passed["current"]), dx=1e-3), rel=1e-3)
+
+
+def test_the_gain_of_the_drive_is_a_factor_of_its_torque_and_not_of_the_back_emf() -> None:
+    for now in states(20):
+        assert drive(ARM, Effects(drive_gain=0.07), now) == pytest.approx(1.07 * drive(ARM, Effects(), now))
+        assert flux(ARM, Effects(drive_gain=0.07), now) == flux(ARM, Effects(), now)
+
+
+@pytest.mark.parametrize(("speed", "current", "expected"), [(1, 9, 0.55), (-1, -9, 0.55), (1, -9, 2 - 1 / 0.55)])
+def test_a_braking_worm_has_the_efficiency_of_the_other_direction(speed: int, current: int, expected: float) -> None:
+    now = {"angle": 0.0, "speed": float(speed), "current": float(current)}
+    assert worm_efficiency(ARM, Effects(worm_braking=1.0), now) == pytest.approx(expected)
+
+
+def test_a_self_locking_worm_passes_nothing_back() -> None:
+    now = {"angle": 0.0, "speed": 1.0, "current": -9.0}
+    assert worm_efficiency(Arm(eta3=0.48), Effects(worm_braking=1.0), now) == pytest.approx(0.0)
+
+
+def test_a_worm_rubs_less_the_faster_it_slides() -> None:
+    found = [relative_friction(speed) for speed in (0.0, 0.01, 0.1, 1.0, 5.0)]
+    assert found[0] == pytest.approx(1.0)
+    assert sorted(found, reverse=True) == found
+    assert relative_friction(-1.0) == found[3] == pytest.approx(0.4, abs=0.15)
+
+
+def test_a_worm_can_lose_exponentially_with_speed() -> None:
+    now = {"angle": 0.0, "speed": -1.0, "current": 9.0}
+    found = worm_efficiency(ARM, Effects(worm_speed=0.1, worm_fade=0.5), now)
+    assert found == pytest.approx(0.55 * (1.0 - 0.1 * math.exp(-2.0)))
+
+
+def test_heat_that_is_lost_again_ends_below_heat_that_is_kept() -> None:
+    kept, lost = (
+        moved(Effects(winding_heating=4e-5, winding_cooling=rate)).states["heat"] for rate in (0.0, 2.0)
+    )
+    assert kept[-1] == kept.max()
+    assert 0.2 * kept[-1] < lost[-1] < 0.9 * kept[-1]
+
+
+def test_a_stop_in_the_tray_stiffens_it() -> None:
+    soft, hard = (moved(Effects(rocking_hz=5.0, rocking_stop=stop)).states for stop in (0.0, 0.003))
+    stretch = [np.abs(states["shell_angle"] - states["angle"]).max() for states in (soft, hard)]
+    assert stretch[1] < 0.8 * stretch[0]
+
+
+def test_a_taut_cable_pulls_only_beyond_its_angle() -> None:
+    effects = Effects(cable_spring=100.0, cable_angle_deg=-10.0)
+    slack, taut = (
+        unlisted_torque(ARM, effects, {"angle": math.radians(deg), "speed": 0.0}, 0.0, 0.0) for deg in (-11.0, 10.0)
+    )
+    assert (slack, taut) == pytest.approx((0.0, -100.0 * math.radians(20.0)))
+
+
+def test_a_stiff_base_tilts_by_its_compliance() -> None:
+    compliance = 2e-5
+    found = moved(Effects(base_compliance=compliance, base_hz=60.0, base_damping=0.7)).states
+    reaction = -np.gradient(found["speed"], 1e-3) * ARM.inertia(True)
+    assert np.allclose(found["base"][100:550], compliance * reaction[100:550], rtol=0, atol=1e-3)
+    assert np.abs(found["base"][100:550]).max() > 5e-3
+
+
+def test_what_depends_on_time_depends_on_it_alone() -> None:
+    now = {"angle": 0.3, "speed": 0.0, "current": 0.0, "clock": 0.25}
+    assert unlisted_torque(ARM, Effects(sway=10.0, sway_hz=1.0), now, 0.0, 0.0) == pytest.approx(10.0)
+    ripple = Effects(slipping_ripple=10.0, slip_hz=1.0)
+    expected = 10.0 * math.sin(24.0 * 0.3 + math.pi / 2.0)
+    assert unlisted_torque(ARM, ripple, now, 0.0, 0.0) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("words", [["worm_width=0.1"], ["controller_delay=0.01", "controller_period=0.01"],
+                                   ["cam_bump=10", "cam_width_deg=0"], ["rocking_stop=0.1"]])  # fmt: skip
+def test_refuses_details_that_mean_nothing(words: list[str]) -> None:
+    with pytest.raises(RefusalError):
+        read_effects(words)
