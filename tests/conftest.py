@@ -8,12 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
 from armid.model import EFFECTS, Model
 from armid.problem import Replay, Space, replays, space_of
 from armid.record import Campaign, read_campaign, write_table
 
+# How fast inputs are made hangs on what else the machine does.
+settings.register_profile("armid", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("armid")
 ROOT = Path(__file__).parents[1]
 Array = NDArray[np.float64]
 AXIS_TOML = """\

@@ -39,6 +39,12 @@ class Registry:
 
         return IDENTIFIERS | {name: as_identifier(name, own) for name, own in self.own_identifiers.items()}
 
+    def identifier_of(self, name: str) -> Any:
+        """Return the Identifier of a name, a chain such as `pso+bobyqa` or `multistart:bobyqa`; errors in words."""
+        from armid.identifiers import identifier_of  # noqa: PLC0415 - pymoo takes time to import
+
+        return identifier_of(name, self.identifiers)
+
     def add(self, kind: str, name: str, thing: Any) -> None:
         """Register a user's own.
 

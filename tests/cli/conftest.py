@@ -24,7 +24,7 @@ LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
 
 def drag(omega, c):
     """Drag [N m]."""
-    return -c * omega * abs(omega)
+    return -c * omega**3
 
 
 def lost(omega, c, omga):
@@ -32,7 +32,7 @@ def lost(omega, c, omga):
     return c * omga
 
 
-quadratic_drag = Effect("quadratic_drag", LEVEL, {"torque": drag})
+cubic_drag = Effect("cubic_drag", LEVEL, {"torque": drag})
 unknown_name = Effect("unknown_name", LEVEL, {"torque": lost})
 unknown_port = Effect("unknown_port", LEVEL, {"torqe": drag})
 coulomb = Effect("coulomb", LEVEL, {"torque": drag})
@@ -69,7 +69,7 @@ def diverging(measured, simulated):
     return np.full(len(simulated), np.nan)
 
 
-def de(budget):
+def evolution(budget):
     """Search by differential evolution."""
     return DE(pop_size=20)
 

@@ -83,19 +83,19 @@ def test_what_is_not_seen_is_not_determined(identified):
 
 def test_effects_window_fitness_and_identifier(identified, mine):
     options = ("--effects", "coulomb, viscous", "--bounds", "coulomb.width=0.001:0.1", "--fitness", "rmse")
-    _, result = identified(*options, "--plugin", f"{mine}:de", "--identifier", "de")
+    _, result = identified(*options, "--plugin", f"{mine}:evolution", "--identifier", "evolution")
     assert result["effects"] == ["coulomb", "viscous"]
     assert list(result["parameters"])[4:] == ["coulomb.level", "coulomb.width", "viscous.slope"]
     assert [p["unit"] for p in result["parameters"].values()][4:] == ["N m", "rad/s", "N m s/rad"]
-    assert (result["fitness"], result["identifier"], result["used"]) == ("rmse", "de", 160)
+    assert (result["fitness"], result["identifier"], result["used"]) == ("rmse", "evolution", 160)
     assert result["fitness_value"] == result["error"]["train"]["rmse"]
 
 
 def test_a_user_s_effect_and_fitness(identified, mine):
-    plugins = ("--plugin", f"{mine}:quadratic_drag", "--plugin", f"{mine}:largest_miss")
-    _, result = identified(*plugins, "--effects", "quadratic_drag", "--fitness", "largest_miss")
+    plugins = ("--plugin", f"{mine}:cubic_drag", "--plugin", f"{mine}:largest_miss")
+    _, result = identified(*plugins, "--effects", "cubic_drag", "--fitness", "largest_miss")
     assert result["fitness"] == "largest_miss"
-    assert "quadratic_drag.c" in result["parameters"]
+    assert "cubic_drag.c" in result["parameters"]
 
 
 @pytest.mark.parametrize(("fitness", "target"),
@@ -148,7 +148,7 @@ def test_a_warning_is_one_line(run, tmp_path, write_axis):
         warnings.simplefilter("default")
         ran = run("identify", folder, "--budget", "80")
     assert ran.code == 0
-    assert re.fullmatch(r"armid: warning: move\.csv: irregular sampling: .*\n", ran.err)
+    assert re.fullmatch(r"armid: warning: axis/move\.csv: irregular sampling: .*\n", ran.err)
 
 
 def test_the_interval_is_that_of_the_information(identified, paper_arm, arm, arm_space):

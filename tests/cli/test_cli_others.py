@@ -8,16 +8,21 @@ import numpy as np
 import pytest
 
 from armid.cli.main import app
+from armid.model import EFFECTS
 
 
 def test_list_effects(run):
     ran = run("list", "effects")
     assert (ran.code, ran.err) == (0, "")
-    assert re.findall(r"^(\w+): ", ran.out, re.MULTILINE)[:3] == ["coulomb", "viscous", "torque_offset"]
+    assert re.findall(r"^(\w+): ", ran.out, re.MULTILINE) == list(EFFECTS)
+    assert max(map(len, ran.out.splitlines())) <= 110
+    assert ran.out.count("  source: ") >= len(EFFECTS)
     assert "port torque += -level * omega / sqrt(omega ** 2 + width ** 2)" in ran.out
     assert "level [effort] from 0 to 0.5, null 0" in ran.out
     assert "fixed at 0.005 unless bounds free it" in ran.out
     assert "source: doi:10.1016/0005-1098(94)90209-7" in ran.out
+    assert "on shell_transfer_arm, driven_axis\n" in ran.out
+    assert re.search(r"^flux_sat.*\n  in the form rational\n(.*\n)*  in the form arctangent\n", ran.out, re.MULTILINE)
 
 
 def test_list_plants(run):
@@ -33,15 +38,18 @@ def test_list_plants(run):
 
 def test_list_fitness_and_identifiers(run):
     names = re.findall(r"^(\w+): .* \(records join by (\w+)\)$", run("list", "fitness").out, re.MULTILINE)
-    assert dict(names) == {"similarity": "duration", "numerical_similarity": "duration", "rmse": "samples",
-                           "nrmse": "samples", "likelihood": "sum"}  # fmt: skip
-    assert re.search(r"^pso: the paper's particle swarm .*\(global, stochastic\)$", run("list", "identifiers").out)
+    assert dict(names) == {"similarity": "duration", "numerical_similarity": "duration",
+                           "shape_similarity": "duration", "rmse": "samples", "nrmse": "samples",
+                           "likelihood": "sum"}  # fmt: skip
+    identifiers = run("list", "identifiers").out
+    assert re.search(r"^pso: the paper's particle swarm .*\(global, stochastic\)$", identifiers, re.MULTILINE)
+    assert "(local, gradient, stochastic, rmse or likelihood)" in identifiers
 
 
 @pytest.mark.parametrize(("what", "name", "line"), [
-    ("effects", "quadratic_drag", "port torque += -c * omega * abs(omega)"),
+    ("effects", "cubic_drag", "port torque += -c * omega ** 3"),
     ("fitness", "largest_miss", "largest_miss: a function of the user (records join by duration)"),
-    ("identifiers", "de", "de: a function of the user"),
+    ("identifiers", "evolution", "evolution: a function of the user"),
 ])  # fmt: skip
 def test_a_user_s_things_are_listed(run, mine, what, name, line):
     assert line in run("list", what, "--plugin", f"{mine}:{name}").out
@@ -59,7 +67,7 @@ def test_list_refuses(refused, arguments, fragments):
         assert fragment in sentence
 
 
-@pytest.mark.parametrize("name", ["quadratic_drag", "largest_miss", "de"])
+@pytest.mark.parametrize("name", ["cubic_drag", "largest_miss", "evolution"])
 def test_check_runs_the_contract(run, mine, name):
     ran = run("check", f"{mine}:{name}")
     assert ran.code == 0
@@ -74,7 +82,7 @@ def test_check_tells_what_does_not_hold(run, mine):
 
 
 def test_check_refuses_what_cannot_be_read(refused, mine):
-    assert "has no 'quadratic_dra', did you mean 'quadratic_drag'" in refused("check", f"{mine}:quadratic_dra")
+    assert "has no 'cubic_dra', did you mean 'cubic_drag'" in refused("check", f"{mine}:cubic_dra")
     assert "is of type int" in refused("check", f"{mine}:number")
     assert "Missing argument" in refused("check")
 
@@ -138,7 +146,7 @@ def test_without_a_command_the_help_is_shown(run):
 
 
 def test_an_unknown_command_is_refused(refused):
-    assert "did you mean 'identify'" in refused("identfy").lower()
+    assert "did you mean 'simulate'" in refused("simulte").lower()
 
 
 def test_version(run):

@@ -40,6 +40,7 @@ def test_the_campaign_value_of_each_fitness() -> None:
     expected = {
         "similarity": 1.0 - mean(similarity(x, a, 0.001)[0], similarity(y, b, 0.001)[0]),
         "numerical_similarity": 1.0 - mean(numerical_similarity(x, a), numerical_similarity(y, b)),
+        "shape_similarity": 1.0 - mean(similarity(x, a, 0.001)[2], similarity(y, b, 0.001)[2]),
         "rmse": np.sqrt((squares[0] + squares[1]) / (x.size + y.size)),
         "nrmse": np.sqrt((relative[0] + relative[1]) / (x.size + y.size)),
         "likelihood": (squares[0] + squares[1]) / 0.2**2,

@@ -20,7 +20,7 @@ from pymoo.optimize import minimize
 from pymoo.util.display.single import SingleObjectiveOutput
 from scipy.stats import ks_2samp
 
-from armid.identifiers.catalogue import IDENTIFIERS, Identifier, as_identifier
+from armid.identifiers import IDENTIFIERS, Identifier, as_identifier
 from armid.identifiers.pso import PaperPSO
 from armid.problem.meter import Meter
 from armid.problem.termination import MeterTermination

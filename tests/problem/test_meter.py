@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from armid.problem.meter import Meter
+from armid.problem.meter import Log, Meter
 from armid.problem.meter import __file__ as meter_file
 from armid.problem.termination import MeterTermination
 
@@ -151,3 +151,40 @@ def test_the_meter_needs_no_pymoo() -> None:
     imported = {a.name for n in nodes if isinstance(n, ast.Import) for a in n.names}
     imported |= {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module}
     assert {name.split(".")[0] for name in imported} == {"typing", "numpy", "armid"}
+
+
+def log_of(x: list[float], f: list[float]) -> Log:
+    """Return the log of a run of candidates with one parameter, NaN where one failed."""
+    values = np.array(f)
+    return Log(np.array(x)[:, np.newaxis], np.where(np.isnan(values), 1e100, values), np.isnan(values))
+
+
+def asked(meter: Meter, x: list[float]) -> list[float]:
+    """Ask the meter what it remembers, and record the rest as 9."""
+    known = meter.recall(np.array(x)[:, np.newaxis])
+    meter.record(np.array(x)[:, np.newaxis], [*known, *[9.0] * (len(x) - len(known))])
+    return known.tolist()
+
+
+def test_remembers_an_earlier_run_while_candidates_agree() -> None:
+    meter = Meter(100, resume_from=log_of([1, 2, 3, 4, 5], [0.1, np.nan, 0.3, 0.4, 0.5]))
+    assert asked(meter, [1, 2]) == [0.1, np.inf]
+    assert asked(meter, [3]) == [0.3]
+    assert asked(meter, [4, 5, 6]) == [0.4, 0.5]
+    assert asked(meter, [7]) == []
+    assert (meter.recalled, meter.used) == (5, 7)
+
+
+def test_what_differs_by_a_bit_ends_the_memory() -> None:
+    meter = Meter(100, resume_from=log_of([1, 2, 3, 4], [0.1, 0.2, 0.3, 0.4]))
+    assert asked(meter, [1, np.nextafter(2.0, 3.0), 3]) == [0.1]
+    assert asked(meter, [4]) == []
+    assert meter.recalled == 1
+    other = Meter(100, resume_from=log_of([1, 2], [0.1, 0.2]))
+    assert other.recall(np.ones((1, 3))).tolist() == []
+
+
+def test_without_an_earlier_run_nothing_is_remembered() -> None:
+    meter = Meter(100)
+    assert asked(meter, [1, 2]) == []
+    assert meter.recalled == 0

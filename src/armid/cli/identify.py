@@ -29,9 +29,11 @@ if TYPE_CHECKING:
 
 @click.command("identify")
 @campaign_argument
-@click.option("--identifier", default="pso", show_default=True, help="Who searches: see `armid list identifiers`.")
+@click.option("--identifier", default="pso", show_default=True,
+              help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.")
 @click.option("--option", "options", multiple=True, metavar="NAME=VALUE",
-              help="Option of the identifier, such as velocity_limit=0.2 of pso. Repeatable.")
+              help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
+              "0.5:0.3 for three phases), pso.velocity_limit=0.2. Repeatable.")
 @click.option("--fitness", default="similarity", show_default=True, help="What is minimised: see `armid list fitness`.")
 @effects_option
 @click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
@@ -71,7 +73,7 @@ def identify_command(
     model = model_of(read, effects, registry)
     space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
     distance: Any = chosen(fitness, registry.fitness, "fitness")
-    searcher: Any = chosen(identifier, registry.identifiers, "identifier")
+    searcher = registry.identifier_of(identifier)
     searcher = searcher.with_options({n: value_of(v) for n, v in assignments(options, "--option").items()})
     goal = 1.0 - target if target is not None and fitness in SIMILARITIES else target
     if out is not None:

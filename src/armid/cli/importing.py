@@ -31,3 +31,20 @@ def emps(folder: Path | None, out: Path, plugins: tuple[str, ...]) -> None:
 
     load_registry(plugins)
     print(f"wrote {import_emps(folder, out)}")
+
+
+@import_group.command("dfki")
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="New folder to write.")
+@click.option("--holdout", metavar="NAME", help="Record to hold out, ddp or direct_collocation; else both train.")
+@plugin_option
+def dfki(folder: Path, out: Path, holdout: str | None, plugins: tuple[str, ...]) -> None:
+    """Import DFKI's torque-limited simple pendulum: a rotary axis that swings up, two records in pieces of 1 s.
+
+    FOLDER holds ddp_measured.csv and direct_collocation_measured.csv of the set (its licence: BSD-3-Clause). Gravity
+    and inertia are estimates from CAD and nothing is free, so that what the records show beyond them is an effect.
+    """
+    from armid.record.importers import import_dfki  # noqa: PLC0415 - as above
+
+    load_registry(plugins)
+    print(f"wrote {import_dfki(folder, out, holdout)}")

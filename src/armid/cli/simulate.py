@@ -38,8 +38,9 @@ def simulate_command(
 ) -> None:
     """Simulate every record of a campaign.
 
-    Writes DIR/<record's file name>. Columns: time_s (the record's times from 0 on), the states, and the recorded
-    signal, SI. A parameter that is not set takes the value that the campaign fixes, else its nominal one.
+    Writes DIR/<record's file name>. Columns: time_s (the record's times from 0 on; the even grid of a record whose
+    times are irregular), the states, and the recorded signal, SI. A parameter that is not set takes the value that the
+    campaign fixes, else its nominal one.
     """
     registry = load_registry(plugins)
     read = read_campaign(campaign, registry.plants, registry.effects)
@@ -51,6 +52,9 @@ def simulate_command(
             write_table(files.path(record.file), simulated_table(record, model, candidate, wanted))
     for name, value in zip(model.parameters, candidate, strict=True):
         print(f"{name} = {value:.9g} {model.parameters[name].unit}")
+    for record in read.records:
+        if record.irregularity is not None:
+            print(f"{record.file}: on its even grid of {record.manoeuvre.interval:.6g} s, as its times are irregular")
     print(f"wrote {len(read.records)} files to {out}")
 
 
@@ -102,6 +106,6 @@ def simulated_piece(
         elif state.column:
             table[state.column] = run.states[name][0]
     table.setdefault(SIGNAL[model.plant.output_unit], run.output[0])
-    if any("output" in e.adds for e in model.effects):
-        table[model.states[speed].column] = run.states[speed][0]
+    if speed in model.states and any("output" in e.adds for e in model.effects):
+        table[model.states[speed].column or f"{speed}_state"] = run.states[speed][0]
     return table

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armid.fitness.fitness import Fitness
-from armid.fitness.measures import chi_square, mean_square, relative_mean_square
+from armid.fitness.measures import chi_square, inverse_noise, mean_square, relative_mean_square, unity
 from armid.fitness.series import Array
 from armid.fitness.similarity import numerical_similarity, scored
 
@@ -28,15 +28,31 @@ def numerical_dissimilarity(measured: ArrayLike, simulated: ArrayLike) -> Array:
     return 1.0 - numerical_similarity(measured, simulated, failed=-np.inf)
 
 
+def shape_dissimilarity(
+    measured: ArrayLike,
+    simulated: ArrayLike,
+    interval: float,
+    epsilon: float = 0.03,
+    xi: float = 0.030,
+    slope_threshold: float = 0.2,
+) -> Array:
+    """Return 1 - S2 of Eq 14 per candidate, a step function; +inf, arguments and errors as `dissimilarity`."""
+    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)
+    values: Array = 1.0 - scores[2]
+    return values
+
+
 # Those whose value is 1 minus a degree that people know.
-SIMILARITIES = ("similarity", "numerical_similarity")
+SIMILARITIES = ("similarity", "numerical_similarity", "shape_similarity")
 
 _FITNESSES = (
     Fitness("similarity", dissimilarity, "duration", note="1 - S, the paper's similarity degree (Eq 10)"),
     Fitness("numerical_similarity", numerical_dissimilarity, "duration", note="1 - S1, its numerical part (Eq 13)"),
-    Fitness("rmse", mean_square, "samples", np.sqrt, "signal", "root of the mean square over all samples"),
+    Fitness("shape_similarity", shape_dissimilarity, "duration", note="1 - S2, its shape part (Eq 14), in steps"),
+    Fitness("rmse", mean_square, "samples", np.sqrt, "signal", "root of the mean square over all samples", unity),
     Fitness("nrmse", relative_mean_square, "samples", np.sqrt, "1", "rmse with each record divided by its own rms"),
-    Fitness("likelihood", chi_square, "sum", None, "1", "sum of (x - x')^2 / noise^2: -2 log likelihood, white noise"),
+    Fitness("likelihood", chi_square, "sum", None, "1", "sum of (x - x')^2 / noise^2: -2 log likelihood, white noise",
+            inverse_noise),
 )
 
 FITNESS: dict[str, Fitness] = {fitness.name: fitness for fitness in _FITNESSES}

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armid.fitness.series import Array, as_series, has_failed
 from armid.model.errors import ArmidError, nearest
@@ -26,6 +26,8 @@ class Fitness:
         (sample interval [s]) and `noise` (noise rms [signal's unit]) of the record; returns one value per candidate.
     join: how records join: "duration" (mean weighted by duration), "samples" (by number of samples), "sum".
     finish: applied to the joined values, such as a square root; None: nothing.
+    weigh: noise rms of a record [signal's unit] -> weight w of its residual, where the finished value is a rising
+        function of sum w^2 (x - x')^2 over all samples of all records; None: it has no such form.
     unit: of the finished value; note: what it is, in words.
     Raises ArmidError for a function that is none or asks for something unknown, and for an unknown join.
     """
@@ -36,6 +38,7 @@ class Fitness:
     finish: Callable[[Array], Array] | None = None
     unit: str = "1"
     note: str = ""
+    weigh: Callable[[float], float] | None = None
     asks: tuple[str, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -58,7 +61,16 @@ class Fitness:
             if given[name] is None:
                 raise ArmidError(f"fitness '{self.name}' asks for the {name} of the record, which is not known")
         values = one_per_candidate(self.name, self.function(**{name: given[name] for name in self.asks}), len(rows))
-        return np.where(has_failed(rows) | ~np.isfinite(values), np.inf, values)
+        return finite_or_inf(values, has_failed(rows))
+
+    def weight_of(self, noise: float) -> float:
+        """Return the weight of a record's residual for a least-squares method.
+
+        noise: rms of the record [signal's unit]. Raises ArmidError when the fitness is no sum of squares.
+        """
+        if self.weigh is None:
+            raise ArmidError(f"fitness '{self.name}' is no sum of squares, least squares expects rmse or likelihood")
+        return self.weigh(noise)
 
 
 def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
@@ -96,6 +108,12 @@ def one_per_candidate(name: str, values: object, n_candidates: int) -> Array:
     return numbers
 
 
+def finite_or_inf(values: Array, failed: NDArray[np.bool_]) -> Array:
+    """Return values, (n,), with +inf for those that failed or are no finite number."""
+    good = np.isfinite(values) & ~failed
+    return values if good.all() else np.where(good, values, np.inf)
+
+
 def join_records(fitness: Fitness, values: ArrayLike, durations: ArrayLike, n_samples: ArrayLike) -> Array:
     """Join the values of a campaign's records: one finished value per candidate, (n_candidates,), +inf if one failed.
 
@@ -103,19 +121,31 @@ def join_records(fitness: Fitness, values: ArrayLike, durations: ArrayLike, n_sa
     n_samples: of the records, (n_records,).
     Raises ArmidError for shapes that do not match and for weights that are not above 0.
     """
-    table = np.asarray(values, dtype=np.float64)
-    weights = {"duration": durations, "samples": n_samples, "sum": np.ones(len(table))}[fitness.join]
-    weight = np.asarray(weights, dtype=np.float64)
-    if table.ndim != 2 or weight.shape != table.shape[:1] or len(table) == 0:
-        raise ArmidError(f"{table.shape} values and {weight.shape} weights of records do not match")
+    return joined(fitness, np.asarray(values, dtype=np.float64), record_weights(fitness, durations, n_samples))
+
+
+def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike) -> Array:
+    """Return what each record weighs, (n_records,); arguments as of `join_records`.
+
+    Raises ArmidError for weights that are not above 0.
+    """
+    ones = np.ones(np.shape(n_samples))
+    weight = np.asarray({"duration": durations, "samples": n_samples, "sum": ones}[fitness.join], dtype=np.float64)
     if not ((weight > 0.0) & (weight < np.inf)).all():
         raise ArmidError(f"fitness '{fitness.name}' weighs records by {fitness.join}, expected numbers above 0")
-    failed = ~np.isfinite(table).all(axis=0)
+    return weight
+
+
+def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
+    """Return what `join_records` does for values, (n_records, n_candidates), of records that weigh so much."""
+    if table.ndim != 2 or weight.shape != table.shape[:1] or len(table) == 0:
+        raise ArmidError(f"{table.shape} values and {weight.shape} weights of records do not match")
+    failed = ~np.asarray(np.isfinite(table).all(axis=0))
+    known = np.where(failed, 0.0, table) if failed.any() else table
     # no matrix product: its rounding of one candidate may depend on how many others there are
-    total = (weight[:, np.newaxis] * np.where(failed, 0.0, table)).sum(axis=0)
-    joined = total if fitness.join == "sum" else total / weight.sum()
-    finished = joined if fitness.finish is None else fitness.finish(joined)
-    return np.where(failed | ~np.isfinite(finished), np.inf, finished)
+    total = (weight[:, np.newaxis] * known).sum(axis=0)
+    mean = total if fitness.join == "sum" else total / weight.sum()
+    return finite_or_inf(mean if fitness.finish is None else fitness.finish(mean), failed)
 
 
 def as_fitness(name: str, obj: Fitness | Callable[..., Any]) -> Fitness:

@@ -47,10 +47,21 @@ def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array
 
     noise: rms of the measuring noise [signal's unit]. Raises ArmidError unless it is a number above 0.
     """
+    weight = inverse_noise(noise)
+    x, rows = as_series(measured, simulated)
+    return weight**2 * np.asarray(_sums_of_squares(x, rows))
+
+
+def inverse_noise(noise: float) -> float:
+    """Return 1/noise, the weight of a residual whose noise has this rms [signal's unit]; errors as `chi_square`."""
     if not 0.0 < noise < np.inf:
         raise ArmidError(f"the noise of the record is {noise}, expected an rms above 0 in the signal's unit")
-    x, rows = as_series(measured, simulated)
-    return np.asarray(_sums_of_squares(x, rows)) / noise**2
+    return 1.0 / noise
+
+
+def unity(noise: float) -> float:
+    """Return 1, the weight of a residual in the rmse, whatever the noise."""
+    return 1.0
 
 
 # Neither nnan nor ninf may be added: a NaN in y has to reach the sum.

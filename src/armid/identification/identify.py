@@ -12,9 +12,10 @@ from armid.fitness import Fitness
 from armid.identifiability import Information, information_at
 from armid.identification.errors import Errors, campaign_errors
 from armid.identification.interrupt import ctrl_c_waits, is_interrupt
-from armid.identifiers import Identifier
+from armid.identifiers import Identifier, can_run_alone, run_alone
 from armid.model import ArmidError, Model
 from armid.problem import IdentificationProblem, Meter, MeterTermination, Replay, Space, replays
+from armid.problem.problem import fitness_of, weights_of
 from armid.record import Campaign
 
 Array = NDArray[np.float64]
@@ -76,10 +77,13 @@ def identify(
     paper's step 7). progress: called with the meter after each generation. Holdout records are simulated once, after
     the search. Ctrl-C ends the search and not the run: the best candidate so far is judged, `stopped` is "interrupted".
 
-    Raises ArmidError for a negative seed and when every candidate diverged.
+    Raises ArmidError for a negative seed, a fitness that the identifier cannot minimise, and when every candidate
+    diverged.
     """
     if seed < 0:
         raise ArmidError(f"the seed is {seed}, a whole number of at least 0 is expected")
+    identifier.refuse(fitness)
+    identifier.build(Meter(budget, target).budget)  # refuses bad options before anything is calibrated
     train = replays(campaign.train, model, space, accuracy)
     meter = Meter(budget, target)
     if space.free.any():
@@ -92,15 +96,22 @@ def identify(
     else:
         stopped, x = "no parameter is free", np.empty(0)
     candidate = space.complete(x[np.newaxis])[0]
+    value = meter.best_f if len(x) else value_of(fitness, train, candidate)
     holdout = replays(campaign.holdout, model, space, accuracy)
     errors = campaign_errors(train, candidate)
     assert errors is not None
     trace = meter.trace()
     return Identification(
-        campaign, model, space, fitness, identifier.name, candidate, meter.best_f, information_at(train, space, x),
+        campaign, model, space, fitness, identifier.name, candidate, value, information_at(train, space, x),
         errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
         budget, meter.used, meter.n_failed, seed, stopped,
     )  # fmt: skip
+
+
+def value_of(fitness: Fitness, train: tuple[Replay, ...], candidate: Array) -> float:
+    """Return the fitness of one whole candidate, which nobody searched."""
+    signals = [r.signal(candidate[np.newaxis]) for r in train]
+    return float(fitness_of(fitness, train, [r.measured for r in train], signals, weights_of(fitness, train))[0])
 
 
 def search(
@@ -114,16 +125,13 @@ def search(
     algorithm = identifier.build(meter.budget)
     with ctrl_c_waits() as interrupted:
 
-        def after_generation(running: Algorithm) -> None:
+        def is_over() -> bool:
             if progress is not None:
                 progress(meter)
-            if interrupted():
-                running.termination.terminate()
-                running.termination.update(running)
+            return interrupted() or meter.reached or meter.exhausted
 
-        told = {"seed": seed, "callback": after_generation, "copy_algorithm": False}
         try:
-            minimize(problem, algorithm, MeterTermination(meter), **told)
+            run(algorithm, problem, meter, seed, is_over)
         except (KeyboardInterrupt, SystemError) as error:
             if meter.best_x is None or not is_interrupt(error):
                 raise
@@ -135,3 +143,20 @@ def search(
     if meter.exhausted:
         return "budget used" if meter.target is None else "budget used, target not reached"
     return f"{identifier.name} stopped by itself"
+
+
+def run(
+    algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
+) -> None:
+    """Run an algorithm until it is over, which is asked after each generation; one of ours without pymoo's loop."""
+    if can_run_alone(algorithm):
+        run_alone(algorithm, problem, seed, is_over)
+        return
+
+    def after_generation(running: Algorithm) -> None:
+        if is_over():
+            running.termination.terminate()
+            running.termination.update(running)
+
+    told = {"seed": seed, "callback": after_generation, "copy_algorithm": False}
+    minimize(problem, algorithm, MeterTermination(meter), **told)

@@ -1,47 +1,19 @@
-"""The identifiers by name, and how a user's own becomes one."""
+"""The identifiers by name."""
 
-import inspect
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from pymoo.core.algorithm import Algorithm
-
-from armid.identifiers.pso import PaperPSO, checked_count
-from armid.model.errors import ArmidError
-
-
-@dataclass(frozen=True)
-class Identifier:
-    """Declare a method that finds parameters.
-
-    name: as studies spell it; build: budget in simulations -> a fresh algorithm of pymoo, options by name if it has
-    any; note: what it is, in words.
-    is_global: it searches the whole box; uses_gradient: it asks for derivatives; is_stochastic: a seed changes it.
-    """
-
-    name: str
-    build: Callable[..., Algorithm]
-    note: str = ""
-    is_global: bool = False
-    uses_gradient: bool = False
-    is_stochastic: bool = True
-
-    def with_options(self, options: Mapping[str, float | str]) -> "Identifier":
-        """Return the identifier with options of its own, such as `velocity_limit` of the swarm.
-
-        Raises ArmidError when it takes none; an unknown name or a bad value is refused when it is built.
-        """
-        if options and not takes_options(self.build):
-            raise ArmidError(f"identifier '{self.name}' takes no options, '{next(iter(options))}' was given")
-        return replace(self, build=partial(self.build, **options)) if options else self
-
-
-def takes_options(build: Callable[..., Algorithm]) -> bool:
-    """Tell whether a factory takes keywords beside the budget."""
-    kinds = [p.kind for p in inspect.signature(build).parameters.values()]
-    return inspect.Parameter.VAR_KEYWORD in kinds or len(kinds) > 1
+from armid.identifiers.cmaes import CmaesOptions, cmaes_method
+from armid.identifiers.identifier import Identifier
+from armid.identifiers.least_squares import LeastSquaresOptions, least_squares_method
+from armid.identifiers.nlopt_local import GradientOptions, LocalOptions, nlopt_method
+from armid.identifiers.of_pymoo import differential, genetic, pymoo_swarm
+from armid.identifiers.options import checked_count, options_of
+from armid.identifiers.pso import PaperPSO
+from armid.identifiers.search import Method
+from armid.identifiers.searching import Searching
+from armid.identifiers.uniform import UniformOptions, uniform_method
 
 
 def swarm(budget: int, **options: Any) -> PaperPSO:
@@ -55,48 +27,36 @@ def swarm(budget: int, **options: Any) -> PaperPSO:
     return PaperPSO(**({"n_particles": n_particles, "n_iterations": -(-budget // n_particles)} | options))
 
 
-def as_identifier(name: str, obj: Any) -> Identifier:
-    """Return an Identifier as it is, or make one of a subclass of pymoo's Algorithm or of a function of the budget.
-
-    Raises ArmidError for anything else, and for an algorithm that was built already: it keeps the state of its run.
-    """
-    if isinstance(obj, Identifier):
-        return obj
-    expected = "expected a subclass of pymoo's Algorithm or a function of the budget that returns one"
-    if isinstance(obj, Algorithm):
-        raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} built already, {expected}")
-    if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
-        return Identifier(name, partial(without_budget, obj), "a class of the user")
-    if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
-        return Identifier(name, partial(built, name, obj), "a function of the user")
-    raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
+def searching(name: str, kind: type, method: Callable[[Any], Method], budget: int, **options: Any) -> Searching:
+    """Return a search of ours as an algorithm; kind: dataclass of its options, which refuses bad ones."""
+    return Searching(method(options_of(kind, options, f"'{name}'")), budget)
 
 
-def accepts(function: Callable[..., Any], *arguments: object) -> bool:
-    """Say whether a function can be called with such arguments."""
-    try:
-        inspect.signature(function).bind(*arguments)
-    except (TypeError, ValueError):
-        return False
-    return True
+def ours(name: str, kind: type, method: Callable[[Any], Method], note: str, **capabilities: bool) -> Identifier:
+    """Return the identifier of a search of ours."""
+    return Identifier(name, partial(searching, name, kind, method), note, **capabilities)
 
 
-def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
-    """Return a fresh algorithm that does not want to know its budget."""
-    return algorithm()
+def of_nlopt(name: str, kind: type, note: str, **capabilities: bool) -> Identifier:
+    """Return the identifier of a local search of NLopt."""
+    return ours(name, kind, partial(nlopt_method, name), f"{note} (NLopt)", **capabilities)
 
 
-def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:
-    """Return what a user's function makes; refuse with ArmidError anything but an algorithm."""
-    algorithm = factory(budget)
-    if not isinstance(algorithm, Algorithm):
-        raise ArmidError(f"identifier '{name}' returned a {type(algorithm).__name__}, expected an Algorithm of pymoo")
-    return algorithm
+_IDENTIFIERS = (
+    Identifier("pso", swarm, "the paper's particle swarm (Eqs 8-9)", is_global=True),
+    Identifier("pymoo_pso", pymoo_swarm, "adaptive particle swarm (pymoo)", is_global=True),
+    Identifier("ga", genetic, "genetic algorithm (pymoo)", is_global=True),
+    Identifier("de", differential, "differential evolution (pymoo)", is_global=True),
+    ours("cmaes", CmaesOptions, cmaes_method, "CMA-ES, restarted with larger populations (cma)", is_global=True),
+    ours("random", UniformOptions, uniform_method, "uniform random search, to compare with", is_global=True),
+    of_nlopt("nelder_mead", LocalOptions, "simplex of Nelder and Mead"),
+    of_nlopt("bobyqa", LocalOptions, "quadratic models, BOBYQA"),
+    of_nlopt("sbplx", LocalOptions, "Nelder-Mead on subspaces, Subplex"),
+    of_nlopt("cobyla", LocalOptions, "linear models, COBYLA"),
+    of_nlopt("lbfgs", GradientOptions, "quasi-Newton steps, L-BFGS", uses_gradient=True),
+    of_nlopt("slsqp", GradientOptions, "sequential quadratic programmes, SLSQP", uses_gradient=True),
+    ours("least_squares", LeastSquaresOptions, least_squares_method, "trust region on the residual vector (scipy)",
+         uses_gradient=True, needs_residuals=True),
+)  # fmt: skip
 
-
-IDENTIFIERS: dict[str, Identifier] = {
-    identifier.name: identifier
-    for identifier in (
-        Identifier("pso", swarm, "the paper's particle swarm (Eqs 8-9)", is_global=True),
-    )
-}  # fmt: skip
+IDENTIFIERS: dict[str, Identifier] = {identifier.name: identifier for identifier in _IDENTIFIERS}

@@ -5,23 +5,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.algorithm import Algorithm
-from pymoo.core.evaluator import Evaluator
-from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
-from armid.model.errors import ArmidError, nearest
+from armid.identifiers.options import OF_PYMOO, OF_SETUP, checked, checked_count, refuse_unknown
+from armid.identifiers.population import SwarmEvaluator, as_population, box
+from armid.model.errors import ArmidError
 
 Array = NDArray[np.float64]
 
 OWN = (
     "n_particles", "n_iterations", "c1", "c2", "first_inertia", "last_inertia", "velocity_limit", "first_velocity",
 )  # fmt: skip
-OF_PYMOO = (
-    "termination", "output", "display", "callback", "archive", "return_least_infeasible", "save_history", "verbose",
-    "seed", "evaluator",
-)  # fmt: skip
-OF_SETUP = (*OF_PYMOO, "progress")
 
 
 class PaperPSO(Algorithm):  # type: ignore[misc]
@@ -54,7 +49,7 @@ class PaperPSO(Algorithm):  # type: ignore[misc]
         first_velocity: float = 0.2,
         **of_pymoo: Any,
     ) -> None:
-        refuse_unknown(of_pymoo, (*OWN, *OF_PYMOO))
+        refuse_unknown(of_pymoo, (*OWN, *OF_PYMOO), "the swarm")
         super().__init__(**({"evaluator": SwarmEvaluator()} | of_pymoo))
         self.n_particles = checked_count("n_particles", n_particles)
         self.n_iterations = checked_count("n_iterations", n_iterations)
@@ -68,7 +63,7 @@ class PaperPSO(Algorithm):  # type: ignore[misc]
 
     def setup(self, problem: Problem, **options: Any) -> Algorithm:
         """Make ready for a problem; options are pymoo's, and the unknown ones that pymoo would swallow are refused."""
-        refuse_unknown(options, OF_SETUP)
+        refuse_unknown(options, OF_SETUP, "the swarm")
         if options.get("termination", self.termination) is None:
             options["termination"] = ("n_gen", self.n_iterations)
         return super().setup(problem, **options)
@@ -140,68 +135,3 @@ class PaperPSO(Algorithm):  # type: ignore[misc]
             raise ArmidError(f"{n} candidates were told to the swarm, expected its {self.n_particles} particles")
         f = np.array([individual.F[0] for individual in infills], dtype=np.float64)
         return np.array([individual.X for individual in infills]), np.where(np.isnan(f), np.inf, f)
-
-
-class SwarmEvaluator(Evaluator):  # type: ignore[misc]
-    """Evaluate as pymoo's Evaluator does, with one pass over the individuals instead of one for each attribute."""
-
-    def eval(self, problem: Problem, pop: Population, *args: Any, **kwargs: Any) -> Population:
-        """Set F of individuals that nobody evaluated before; leave every other case to pymoo."""
-        plain = not args and kwargs.keys() <= {"algorithm"} and set(self.evaluate_values_of) == {"F", "G", "H"}
-        fresh = isinstance(pop, Population) and not any(individual.evaluated for individual in pop)
-        if not (plain and fresh) or problem.has_constraints():
-            return super().eval(problem, pop, *args, **kwargs)
-        x = np.array([individual.X for individual in pop])
-        out = problem.evaluate(x, return_values_of=["F"], return_as_dictionary=True, **kwargs)
-        for individual, value in zip(pop, out.pop("F"), strict=True):
-            individual.F = value
-            individual.evaluated = {"F", "G", "H", *out}
-        for name, values in out.items():
-            pop.set(name, values)
-        self.n_eval += len(pop)
-        if self.callback:
-            self.callback(pop)
-        return pop
-
-
-def as_population(x: Array, n_iter: int) -> Population:
-    """Return individuals at the candidates x, (n, n_parameters), as Population.new does, in a fraction of its time."""
-    blank = vars(Individual())
-    pop = np.empty(len(x), dtype=object).view(Population)
-    for i in range(len(x)):
-        pop[i] = individual = Individual.__new__(Individual)
-        own = {"_X": x[i], "data": {"n_gen": n_iter, "n_iter": n_iter}, "evaluated": set()}
-        individual.__dict__ = blank | own
-    return pop
-
-
-def box(problem: Problem) -> tuple[Array, Array]:
-    """Return the bounds of a problem; refuse with ArmidError one that this swarm cannot search."""
-    if problem.n_obj != 1 or problem.has_constraints():
-        raise ArmidError(
-            f"the problem has {problem.n_obj} objectives and {problem.n_constr} constraints, expected 1 and 0"
-        )
-    if not problem.has_bounds() or not np.isfinite([problem.xl, problem.xu]).all() or (problem.xl > problem.xu).any():
-        raise ArmidError(f"the problem's bounds are {problem.xl} and {problem.xu}, expected a finite box")
-    return problem.xl, problem.xu
-
-
-def checked(name: str, value: Any, least: float = 0.0, expected: str = "a number of at least 0") -> float:
-    """Return an option as a float; refuse with ArmidError what is no finite number or is below the least."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not least <= value < np.inf:
-        raise ArmidError(f"{name} is {value!r}, expected {expected}")
-    return float(value)
-
-
-def checked_count(name: str, value: Any) -> int:
-    """Return an option as an int; refuse with ArmidError what is no whole number above 0."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise ArmidError(f"{name} is {value!r}, expected a whole number above 0")
-    return int(value)
-
-
-def refuse_unknown(options: dict[str, Any], known: tuple[str, ...]) -> None:
-    """Raise ArmidError for an option that nobody knows, naming the nearest that is known."""
-    for name in options:
-        if name not in known:
-            raise ArmidError(f"the swarm has no option '{name}', {nearest(name, known)}")

@@ -34,11 +34,14 @@ class Meter:
     """Count simulations against a budget, whoever searches, and remember the best.
 
     budget: number of simulations; target: fitness at which a search may stop (None: it never may).
+    resume_from: log of an earlier run with the same settings and seed, whole or cut off anywhere. A problem answers
+    from it while the candidates agree with it bit for bit; at the first that differs the rest of it is dropped.
+    `recalled` says how many were answered.
     A failed candidate counts, but neither it nor a NaN is ever the best.
     Raises ArmidError for a budget that is no whole number above 0 and for a target that is NaN.
     """
 
-    def __init__(self, budget: int, target: float | None = None) -> None:
+    def __init__(self, budget: int, target: float | None = None, resume_from: Log | None = None) -> None:
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 1:
             raise ArmidError(f"the budget is {budget!r}, expected a whole number of simulations above 0")
         if target is not None and np.isnan(target):
@@ -49,6 +52,8 @@ class Meter:
         self.n_failed = 0
         self.best_x: Array | None = None
         self.best_f = float("inf")
+        self.recalled = 0
+        self._earlier = resume_from
         self._improvements: list[tuple[int, float]] = []
         self._X = np.empty((0, 0))
         self._F = np.empty(0)
@@ -72,6 +77,21 @@ class Meter:
     def grant(self, n: int) -> int:
         """Return how many of n candidates may still be simulated."""
         return max(0, min(int(n), self.left))
+
+    def recall(self, X: Array) -> Array:
+        """Return the fitness of the leading candidates that stand next in the log resumed from, (n_known,).
+
+        X: the next candidates, (n, n_parameters). A failed one has +inf.
+        """
+        if self._earlier is None:
+            return np.empty(0)
+        known, values, failed = (part[self.used : self.used + len(X)] for part in self._earlier)
+        agree = (known == X[: len(known)]).all(axis=1) if known.shape[1:] == X.shape[1:] else np.zeros(1, np.bool_)
+        n = len(agree) if agree.all() else int(np.argmin(agree))
+        if n < len(X):
+            self._earlier = None
+        self.recalled += n
+        return np.where(failed[:n], np.inf, values[:n])
 
     def record(self, X: ArrayLike, F: ArrayLike, failed: ArrayLike | None = None) -> None:
         """Append evaluations to the log.
@@ -115,6 +135,8 @@ class Meter:
         self._X[self.used : end], self._F[self.used : end], self._failed[self.used : end] = x, f, failed
 
     def _improve(self, x: Array, f: Array) -> None:
+        if not f.min() < self.best_f:
+            return
         before = np.minimum.accumulate(np.concatenate(([self.best_f], f)))[:-1]
         better = np.flatnonzero(f < before)
         self._improvements += [(self.used + int(i) + 1, float(f[i])) for i in better]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from armid.model import Manoeuvre, Model
 from armid.problem.space import Space
 from armid.record import Piece, Record
-from armid.simulation import Calibration, accuracy_against, calibrate, probes, simulate
+from armid.simulation import Calibration, Prepared, accuracy_against, calibrate, prepare, probes
 
 Array = NDArray[np.float64]
 
@@ -26,14 +27,20 @@ class Replay:
 
     def outputs(self, candidates: Array) -> Iterator[tuple[Piece, Array]]:
         """Yield each piece with the recorded signal of whole candidates in its window, (n_candidates, n_samples)."""
-        for piece, calibration in zip(self.pieces, self.calibrations, strict=True):
-            run = simulate(self.model, piece.manoeuvre, candidates, calibration.schedule, self.threads)
+        for piece, prepared in zip(self.pieces, self.prepared, strict=True):
+            run = prepared.run(candidates, self.threads)
             yield piece, run.output[:, piece.window] if piece.window.start else run.output
 
     def signal(self, candidates: Array) -> Array:
         """Return the signal in the windows of all pieces, end to end, shape (n_candidates, n_samples)."""
         parts = [output for _, output in self.outputs(candidates)]
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
+
+    @cached_property
+    def prepared(self) -> tuple[Prepared, ...]:
+        """What simulates each piece, made ready at the first call."""
+        pairs = zip(self.pieces, self.calibrations, strict=True)
+        return tuple(prepare(self.model, piece.manoeuvre, c.schedule) for piece, c in pairs)
 
     @property
     def measured(self) -> Array:
@@ -87,5 +94,3 @@ def replays(
 ) -> tuple[Replay, ...]:
     """Make several records ready to be simulated."""
     return tuple(replay_of(r, model, space, accuracy, threads) for r in records)
-
-

@@ -37,7 +37,8 @@ class Space:
 
     def complete(self, X: Array) -> Array:
         """Return whole candidates: X, shape (n_candidates, n_free), with the fixed values put in."""
-        whole = np.tile(self.fixed, (len(X), 1))
+        whole = np.empty((len(X), len(self.fixed)))
+        whole[:] = self.fixed
         whole[:, self.free] = X
         return whole
 

@@ -43,11 +43,15 @@ def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
 
     x_i = frac(i a), a_j = g**-j with g the root of g**(d + 1) = g + 1. Source: Roberts 2018, generalised golden ratio.
     """
+    return low + (high - low) * ((np.arange(1, n_probes + 1)[:, np.newaxis] * golden_steps(len(low))) % 1.0)
+
+
+def golden_steps(n: int) -> Array:
+    """Return the steps a_j of the Kronecker sequence of `probes` in n dimensions, shape (n,)."""
     ratio = 2.0
     for _ in range(60):
-        ratio = (1.0 + ratio) ** (1.0 / (len(low) + 1))
-    steps = ratio ** -np.arange(1.0, len(low) + 1.0)
-    return low + (high - low) * ((np.arange(1, n_probes + 1)[:, np.newaxis] * steps) % 1.0)
+        ratio = (1.0 + ratio) ** (1.0 / (n + 1))
+    return np.asarray(ratio ** -np.arange(1.0, n + 1.0))
 
 
 def difference(a: Simulation, b: Simulation) -> float:

@@ -1,9 +1,6 @@
 """Simulate a population of candidates."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,12 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from armid.model import ArmidError, Manoeuvre, Model
 from armid.simulation.compile import Kernel, compile_model
-from armid.simulation.refusal import UNCOMPILABLE, refusal
+from armid.simulation.groups import arranged, run
 
 Array = NDArray[np.float64]
 DIVERGED = 1e3
-# Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
-SHARES = 4
 
 
 @dataclass(frozen=True)
@@ -86,40 +81,55 @@ def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
     return np.ascontiguousarray(values) if values else np.zeros((1, 1))
 
 
-def arranged(candidates: Array, width: int, weights: Array | None) -> tuple[Array, NDArray[np.int64]]:
-    """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
-    n = len(candidates)
-    order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
-    places = np.full(n + -n % width, -1)
-    places[:n] = order
-    rows = np.empty((candidates.shape[1], len(places)))
-    rows[:, :n] = candidates[order].T
-    rows[:, n:] = rows[:, n - 1 : n]
-    return rows, places
+def held_inputs(model: Model, manoeuvre: Manoeuvre) -> NDArray[np.bool_]:
+    """Return which inputs keep the value of their last sample, (n_inputs,): as the plant says, else the record."""
+    holds = [i.hold or manoeuvre.hold for i in model.plant.inputs] or [""]
+    return np.array([hold == "zero" for hold in holds])
 
 
-@cache
-def pool_of(threads: int) -> ThreadPoolExecutor:
-    """Return the pool of so many threads; it stays, as starting threads takes as long as many simulations."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="armid")
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Simulate populations through one manoeuvre, everything but the candidates made ready once.
 
-
-def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_groups: int, threads: int) -> None:
-    """Fill the results group by group; threads take neighbouring groups.
-
-    Raises ArmidError when an equation cannot be compiled, which shows at the first call.
+    told: what the kernel is told between the candidates and where they go.
     """
-    edges = np.linspace(0, n_groups, min(SHARES * threads, n_groups) + 1).astype(int)
-    try:
-        if threads < 2 or n_groups < 2:
-            kernel(*given, 0, n_groups, *results)
-            return
-        pool = pool_of(threads)
-        parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in pairwise(edges)]
-        for part in parts:
-            part.result()
-    except UNCOMPILABLE as error:
-        raise refusal(error) from error
+
+    model: Model
+    kernel: Kernel
+    width: int
+    weights: Array | None
+    n_samples: int
+    told: tuple[Any, ...]
+    states: bool
+
+    def run(self, population: ArrayLike, threads: int = 1) -> Simulation:
+        """Simulate every candidate; arguments, result and errors as of `simulate`."""
+        model = self.model
+        candidates = as_population(model, population)
+        n = len(candidates)
+        rows, places = arranged(candidates, self.width, self.weights)
+        output = np.empty((n, self.n_samples))
+        switches = np.full((len(model.latches), rows.shape[1]), np.nan)
+        trace = np.empty((len(model.states), n, self.n_samples) if self.states else (0, 0, 0))
+        given = (rows.ravel(), rows.shape[1], *self.told, places)
+        run(self.kernel, given, (output, switches.ravel(), trace), rows.shape[1] // self.width, threads)
+        kept = dict(zip(model.states, trace, strict=True)) if self.states else {}
+        inverse = np.argsort(places[:n], kind="stable")
+        times = {name: row[inverse] for name, row in zip(model.latches, switches, strict=True)}
+        return Simulation(output, np.isnan(output[:, -1]), times, kept)
+
+
+def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(), states: bool = False) -> Prepared:
+    """Return what simulates populations through one manoeuvre as often as asked; arguments and errors as `simulate`."""
+    kernel, width = compile_model(model)
+    spans = (replace(schedule, plan=None) if states else schedule).spans(manoeuvre.n_samples)
+    told = (
+        np.array(model.constant_values(manoeuvre.constants) or [0.0]), input_values(model, manoeuvre),
+        float(manoeuvre.interval), manoeuvre.n_samples, schedule.substeps, schedule.refinement,
+        float(schedule.fresh_samples), spans, held_inputs(model, manoeuvre), float(manoeuvre.start_time),
+        DIVERGED * model.plant.scales.speed,
+    )  # fmt: skip
+    return Prepared(model, kernel, width, schedule.weights, manoeuvre.n_samples, told, states)
 
 
 def simulate(
@@ -134,23 +144,5 @@ def simulate(
 
     Raises ArmidError for a wrong shape, an unknown constant, a missing input, and an equation that cannot be compiled.
     """
-    candidates = as_population(model, population)
-    kernel, width = compile_model(model)
-    n, n_samples = len(candidates), manoeuvre.n_samples
-    rows, places = arranged(candidates, width, schedule.weights)
-    output = np.empty((n, n_samples))
-    switches = np.full((len(model.latches), rows.shape[1]), np.nan)
-    trace = np.empty((len(model.states), n, n_samples) if states else (0, 0, 0))
-    spans = (replace(schedule, plan=None) if states else schedule).spans(n_samples)
-    given = (
-        rows.ravel(), rows.shape[1], np.array(model.constant_values(manoeuvre.constants) or [0.0]),
-        input_values(model, manoeuvre), float(manoeuvre.interval), n_samples, schedule.substeps,
-        schedule.refinement, float(schedule.fresh_samples), spans, manoeuvre.hold == "zero",
-        float(manoeuvre.start_time), DIVERGED * model.plant.scales.speed,
-        places,
-    )  # fmt: skip
-    run(kernel, given, (output, switches.ravel(), trace), rows.shape[1] // width, threads)
-    kept = dict(zip(model.states, trace, strict=True)) if states else {}
-    inverse = np.argsort(places[:n], kind="stable")
-    times = {name: row[inverse] for name, row in zip(model.latches, switches, strict=True)}
-    return Simulation(output, np.isnan(output[:, -1]), times, kept)
+    as_population(model, population)
+    return prepare(model, manoeuvre, schedule, states).run(population, threads)

@@ -68,7 +68,7 @@ def simulate(population, n_padded, constants, inputs, interval, n_samples, subst
                     now = time + i * interval
                     {inputs_sample}
                     {fine_step}
-                    {y_out} = recorded(now + interval, {latches_n}{x_n}{u1}{fixed})
+                    {y_out} = recorded(now + interval, {latches_n}{x_n}{ur}{fixed})
                     {store_output}
                     if trace.shape[0] > 0:
                         keep_states(trace, places, s + i + 1, {x_n})
@@ -111,9 +111,12 @@ def loop_text(parts: Parts) -> str:
 
 
 def sample_lines(parts: Parts) -> list[str]:
-    """Return the lines that read the inputs at both ends of a sample interval."""
+    """Return the lines that read the inputs: at both ends of a sample interval, and at the sample that ends it.
+
+    A held input jumps at that sample: the motion has not seen its new value, the recorded signal does.
+    """
     return [
-        f"u0_{n} = inputs[{i}, s + i]; u1_{n} = u0_{n} if zero_hold else inputs[{i}, s + i + 1]"
+        f"u0_{n} = inputs[{i}, s + i]; ur_{n} = inputs[{i}, s + i + 1]; u1_{n} = u0_{n} if zero_hold[{i}] else ur_{n}"
         for i, n in enumerate(parts.inputs)
     ]
 

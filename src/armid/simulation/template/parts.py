@@ -49,7 +49,7 @@ class Parts:
             "k1s": listed("k1_", x), "fas": listed("fa_", x), "fbs": listed("fb_", x),
             **{v: listed(f"{v}_", x) for v in ("a", "b", "m", "d", "e")},
             **{v: target(f"{v}_", x) for v in ("k1", "k2", "k3", "k4", "fa", "fb")},
-            **{v: listed(f"{v}_", u) for v in ("ua", "um", "ub", "us", "uz", "u0", "u1")},
+            **{v: listed(f"{v}_", u) for v in ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur")},
             **{v: listed(f"{v}_", guards) for v in ("ga", "gb", "gm", "gd", "ge", "c")},
             "y_out": "y_recorded,", "y_out_value": "y_recorded",
         }  # fmt: skip

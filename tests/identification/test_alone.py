@@ -1,0 +1,124 @@
+"""A search run without pymoo's loop is the search that pymoo's loop runs: the same candidates, ends and errors."""
+
+import threading
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from pymoo.core.callback import Callback
+from pymoo.optimize import minimize
+
+from armid.fitness import FITNESS
+from armid.identification.identify import search
+from armid.identifiers import IDENTIFIERS, Identifier, Searching, can_run_alone, identifier_of, run_alone
+from armid.problem import IdentificationProblem, Meter, MeterTermination
+
+COMPOSED = ("pso+bobyqa", "cmaes+least_squares", "multistart:cobyla", "random+multistart:slsqp", "ga+cobyla+sbplx")
+ALONE = [n for n in (*IDENTIFIERS, *COMPOSED) if can_run_alone(identifier_of(n, IDENTIFIERS).build(100))]
+BUDGET = 150
+
+
+@pytest.fixture
+def posed(arm_space, lowering_replays) -> Any:
+    """Make the problem afresh: a meter and what it counts for."""
+
+    def make(budget: int = BUDGET, target: float | None = None) -> tuple[IdentificationProblem, Meter]:
+        meter = Meter(budget, target)
+        return IdentificationProblem(arm_space, lowering_replays, FITNESS["rmse"], meter), meter
+
+    return make
+
+
+def by_pymoo(problem: IdentificationProblem, meter: Meter, identifier: Identifier, seed: int) -> list[int]:
+    """Run it as any user of pymoo would; return what was used after each generation."""
+    used: list[int] = []
+    told = {"seed": seed, "callback": lambda _: used.append(meter.used), "copy_algorithm": False}
+    minimize(problem, identifier.build(meter.budget), MeterTermination(meter), **told)
+    return used
+
+
+def test_the_searches_of_ours_run_alone_and_pymoo_s_own_do_not() -> None:
+    assert set(IDENTIFIERS) - set(ALONE) == {"pso", "pymoo_pso", "ga", "de"}
+    assert set(COMPOSED) < set(ALONE)
+
+
+@pytest.mark.parametrize("name", [*IDENTIFIERS, *COMPOSED])
+@pytest.mark.parametrize("seed", [0, 3])
+def test_the_log_is_that_of_minimize(posed, name, seed) -> None:
+    (problem, meter), (other, theirs), used = posed(), posed(), []
+    identifier = identifier_of(name, IDENTIFIERS)
+    search(problem, meter, identifier, seed, lambda m: used.append(m.used))
+    generations = by_pymoo(other, theirs, identifier, seed)
+    for ours, expected in zip(meter.log(), theirs.log(), strict=True):
+        np.testing.assert_array_equal(ours, expected)
+    assert used == generations
+    assert not [t for t in threading.enumerate() if t.name == "armid search"]
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_it_ends_at_the_target_where_minimize_does(posed, name) -> None:
+    identifier = identifier_of(name, IDENTIFIERS)
+    _, first = whole = posed()
+    by_pymoo(*whole, identifier, 1)
+    target = float(np.median(first.trace().value))
+    (problem, meter), (other, theirs) = posed(target=target), posed(target=target)
+    assert search(problem, meter, identifier, 1, None) == "target reached"
+    by_pymoo(other, theirs, identifier, 1)
+    assert 0 < meter.used == theirs.used <= first.used
+    assert meter.best_f == theirs.best_f <= target
+
+
+@pytest.mark.parametrize("name", ALONE)
+@pytest.mark.parametrize("error", [ZeroDivisionError("mine"), KeyboardInterrupt(), StopIteration()], ids=repr)
+def test_an_error_of_the_problem_comes_out(posed, monkeypatch, name, error) -> None:
+    problem, meter = posed()
+    answered, left, after = problem.answered, [4], [0]
+
+    def failing(X: Any, residuals: bool = False) -> Any:
+        left[0] -= 1
+        if left[0] < 0:
+            after[0] += 1
+            raise error
+        return answered(X, residuals)
+
+    monkeypatch.setattr(problem, "answered", failing)
+    if name == "random":
+        left[0] = 1
+    with pytest.raises((type(error), RuntimeError)) as came:
+        run_alone(identifier_of(name, IDENTIFIERS).build(BUDGET), problem, 1, lambda: meter.exhausted)
+    # a StopIteration that passes a generator becomes a RuntimeError, Python says
+    assert error in (came.value, came.value.__cause__)
+    assert after == [1]
+
+
+def test_what_pymoo_s_loop_has_to_see_to_leaves_it_to_pymoo(posed) -> None:
+    class Told(Callback):  # type: ignore[misc]
+        calls = 0
+
+        def notify(self, algorithm: Any) -> None:
+            Told.calls += 1
+
+    class Mine(Searching):
+        pass
+
+    method = IDENTIFIERS["random"].build(100).method
+    assert can_run_alone(Searching(method, 100))
+    assert not can_run_alone(Mine(method, 100))
+    assert not can_run_alone(Searching(method, 100, callback=Told()))
+    assert not can_run_alone(Searching(method, 100, archive=None))
+
+
+def test_a_budget_within_a_generation_is_cut_off_exactly(posed) -> None:
+    identifier = IDENTIFIERS["random"].with_options({"n_candidates": 40})
+    problem, meter = posed(budget=101)
+    assert search(problem, meter, identifier, 1, None) == "budget used"
+    assert meter.used == len(meter.log().F) == 101
+
+
+@pytest.mark.parametrize("name", ["bobyqa", "least_squares", "pso+bobyqa"])
+def test_no_thread_is_started(posed, monkeypatch, name) -> None:
+    problem, meter = posed()
+    monkeypatch.setattr("armid.identifiers.thread.Thread.start", partial(pytest.fail, "a thread was started"))
+    search(problem, meter, identifier_of(name, IDENTIFIERS), 1, None)
+    assert meter.used > 10

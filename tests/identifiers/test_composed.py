@@ -1,0 +1,178 @@
+"""Chains, multistart and CMA-ES with restarts: who gets how many simulations, and where each phase starts."""
+
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
+from pymoo.algorithms.soo.nonconvex.de import DE
+from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
+from pymoo.core.algorithm import Algorithm
+from pymoo.optimize import minimize
+from searches import Bowl, identifier, ran
+
+from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
+from armid.identifiers.multistart import spread
+from armid.model import ArmidError
+
+Array = NDArray[np.float64]
+OWN = IDENTIFIERS | {
+    "mine": as_identifier("mine", NelderMead), "evolution": as_identifier("evolution", lambda budget: DE(pop_size=10)),
+    "adapted": as_identifier("adapted", CMAES),
+}  # fmt: skip
+
+
+def heights(problem: Bowl, X: Array) -> Array:
+    return np.asarray(((problem.unit(X) @ problem.A.T - problem.b) ** 2).sum(axis=1))
+
+
+def cut(problem: Bowl) -> tuple[Array, Array]:
+    """All that was asked for and its height."""
+    asked = np.concatenate(problem.batches)
+    return asked, heights(problem, asked)
+
+
+@pytest.mark.parametrize(("share", "end"), [(None, 100), (0.3, 60), ("0.3", 60), ([0.3], 60), (0.005, 1)])
+def test_the_first_phase_gets_its_share_exactly_and_the_second_starts_at_its_best(share: Any, end: int) -> None:
+    problem, alone = Bowl(), Bowl()
+    options = {} if share is None else {"share": share}
+    ran("random+bobyqa", problem, 200, **options, **{"random.n_candidates": 16})
+    minimize(alone, identifier("random", n_candidates=16).build(end), ("n_eval", end), seed=1)
+    asked, f = cut(problem)
+    np.testing.assert_array_equal(asked[:end], cut(alone)[0][:end])
+    assert len(problem.batches[-(-end // 16) - 1]) == (end - 1) % 16 + 1
+    start = problem.unit(asked[end])
+    # a quadratic model wants a step of room at the bounds
+    best = np.clip(problem.unit(asked[np.argmin(f[:end])]), 0.05, 0.95)
+    np.testing.assert_allclose(start, best, atol=1e-12)
+    assert f.min() < f[:end].min()
+
+
+def test_three_phases_and_the_budget_that_an_early_end_leaves() -> None:
+    problem = Bowl()
+    ran("random+bobyqa+nelder_mead", problem, 400, share="0.1:0.2", **{"random.n_candidates": 40})
+    sizes = [len(batch) for batch in problem.batches]
+    assert sizes[0] == 40
+    assert sizes[1:] == [1] * len(sizes[1:])
+    asked, f = cut(problem)
+    # bobyqa converges within its 80, the simplex takes over at the best so far: its first point is an old one
+    again = [i for i in range(60, 121) if (asked[:i] == asked[i]).all(axis=1).any()]
+    assert again
+    np.testing.assert_allclose(asked[again[0]], asked[np.argmin(f[: again[0]])], rtol=1e-12)
+
+
+def test_a_swarm_in_a_chain_has_the_inertia_schedule_of_its_share() -> None:
+    problem, alone = Bowl(), Bowl()
+    ran("pso+bobyqa", problem, 100, share=0.64, **{"pso.n_particles": 8, "pso.velocity_limit": 0.2})
+    seed = int(np.random.default_rng(1).integers(1, 2**31 - 1))
+    minimize(alone, identifier("pso", n_particles=8, velocity_limit=0.2).build(64), seed=seed)
+    np.testing.assert_array_equal(cut(problem)[0][:64], cut(alone)[0])
+
+
+@pytest.mark.parametrize(("name", "options", "sentence"), [
+    ("pso+bobqya", {}, "identifier 'bobqya' is not known: did you mean 'bobyqa'?"),
+    ("psoo", {}, "identifier 'psoo' is not known: did you mean 'pso'?"),
+    ("pso+", {}, "identifier '' is not known"),
+    ("bobyqa+pso", {}, "identifier 'pso' is global, in a chain it is expected to be the first"),
+    ("multistart:pso", {}, "identifier 'pso' is global, multistart: expects a local one"),
+    ("multistart:pso+bobyqa", {}, "identifier 'pso' is global"),
+    ("multistart:multistart:bobyqa", {}, "'multistart:bobyqa' is global"),
+    ("pso+evolution", {}, "'evolution' takes no start x0, in a chain it is expected to be the first"),
+    ("multistart:evolution", {}, "'evolution' takes no start x0, multistart: expects one that does"),
+    ("pso+bobyqa", {"velocity_limit": 0.2}, "'pso+bobyqa' has no option 'velocity_limit'"),
+    ("pso+bobyqa", {"pso.velocity_limt": 0.2}, "no option 'velocity_limt', did you mean 'velocity_limit'?"),
+    ("pso+bobyqa", {"psoo.c1": 0.2}, "'pso+bobyqa' has no option 'psoo.c1', did you mean 'pso.c1'?"),
+    ("pso+bobyqa", {"shares": 0.2}, "'pso+bobyqa' has no option 'shares', did you mean 'share'?"),
+    ("pso+bobyqa", {"share": 1.0}, "share is 1.0, expected 1 shares of the budget with a sum below 1"),
+    ("pso+bobyqa", {"share": "0.5:0.2"}, "share is '0.5:0.2', expected 1 shares"),
+    ("pso+bobyqa", {"share": "half"}, "share is 'half', expected a number above 0"),
+    ("pso+bobyqa", {"share": 0}, "share is 0, expected a number above 0 and at most 1"),
+    ("pso+bobyqa+sbplx", {"share": 0.5}, "share is 0.5, expected 2 shares"),
+    ("multistart:bobyqa", {"tolerance": 0.1}, "has no option 'tolerance', did you mean 'bobyqa.tolerance'?"),
+    ("multistart:bobyqa", {"bobyqa.tol": 0.1}, "'bobyqa' has no option 'tol'"),
+    ("mine+bobyqa", {"mine.size": 3}, "identifier 'mine' takes no options, 'size' was given"),
+])  # fmt: skip
+def test_refused_in_a_sentence(name: str, options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ArmidError) as refusal:
+        identifier_of(name, OWN).with_options(options).build(100)
+    assert sentence in str(refusal.value)
+
+
+def test_capabilities_of_the_composed_are_those_of_their_parts() -> None:
+    chain = identifier("random+multistart:least_squares+lbfgs")
+    assert (chain.is_global, chain.uses_gradient, chain.is_stochastic, chain.needs_residuals) == (True,) * 4
+    local = identifier("bobyqa+nelder_mead")
+    assert (local.is_global, local.uses_gradient, local.needs_residuals) == (False,) * 3
+    assert identifier("multistart:bobyqa").is_global
+    assert identifier_of("pso", OWN) is IDENTIFIERS["pso"]
+
+
+@pytest.mark.parametrize("name", ["evolution+bobyqa", "evolution+mine", "pso+mine+bobyqa", "multistart:mine",
+                                  "evolution+adapted"])  # fmt: skip
+def test_a_user_s_own_takes_part(name: str) -> None:
+    problem = Bowl()
+    algorithm: Algorithm = identifier_of(name, OWN).build(400)
+    result = minimize(problem, algorithm, ("n_eval", 400), seed=1, copy_algorithm=False)
+    asked, f = cut(problem)
+    assert result.F[0] == f.min() < 1.0
+    assert f.min() < f[:100].min()
+    if name == "evolution+mine":
+        np.testing.assert_allclose(asked[200], asked[np.argmin(f[:200])], rtol=1e-12)
+
+
+def test_options_reach_the_local_one_of_a_multistart_also_in_a_chain() -> None:
+    for name in ("multistart:bobyqa", "random+multistart:bobyqa"):
+        few, many = Bowl(), Bowl()
+        ran(name, few, 200, **{"bobyqa.tolerance": 0.0})
+        ran(name, many, 200, **{"bobyqa.tolerance": 0.02})
+        assert jumps(many) > jumps(few) + 3
+
+
+def jumps(problem: Bowl) -> int:
+    """How often a search moved by more than a third of the box in one step."""
+    steps = np.diff(problem.unit(np.array([batch[0] for batch in problem.batches])), axis=0)
+    return int((np.abs(steps).max(axis=1) > 1.0 / 3.0).sum())
+
+
+def test_starts_fill_the_box_evenly() -> None:
+    points = spread(np.random.default_rng(1), 4)
+    first = np.array([next(points) for _ in range(64)])
+    assert ((first >= 0.0) & (first < 1.0)).all()
+    for column in first.T:
+        assert np.histogram(column, 8, (0.0, 1.0))[0].min() >= 4
+        assert np.histogram(column, 4, (0.0, 1.0))[0].min() >= 13
+
+
+def test_cma_es_starts_again_with_twice_the_population() -> None:
+    problem = Bowl()
+    result = ran("cmaes", problem, 3000, n_candidates=8)
+    sizes = [len(batch) for batch in problem.batches]
+    assert list(dict.fromkeys(sizes))[:3] == [8, 16, 32]
+    assert sizes == sorted(sizes)
+    assert result.algorithm.evaluator.n_eval >= 3000
+    steady = Bowl()
+    ran("cmaes", steady, 1500, n_candidates=6, growth=1.0)
+    assert {len(batch) for batch in steady.batches} == {6}
+
+
+@pytest.mark.parametrize("name", ["cmaes", "cmaes+bobyqa"])
+def test_cma_es_is_silent_and_draws_from_nobody_else(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    random.seed(5)
+    np.random.seed(5)
+    before = random.getstate(), np.random.get_state()[1].copy()  # type: ignore[union-attr,index]
+    runs = []
+    for _ in range(2):
+        problem = Bowl()
+        ran(name, problem, 1000, seed=0)
+        runs.append(cut(problem)[0])
+    np.testing.assert_array_equal(*runs)
+    assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr() == ("", "")
+    assert random.getstate() == before[0]
+    np.testing.assert_array_equal(np.random.get_state()[1], before[1])  # type: ignore[index]

@@ -1,0 +1,174 @@
+"""Local searches: the very steps of NLopt, derivatives by differences, starts, failures."""
+
+import nlopt
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from searches import Bowl, identifier, ran
+
+from armid.identifiers.differences import CENTRAL, FORWARD, slopes, stencil
+from armid.identifiers.local import Height, NoFitnessError, pulled
+from armid.identifiers.nlopt_local import ALGORITHMS
+
+Array = NDArray[np.float64]
+FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")
+# A seed whose start is in the middle of the box, where no step has to turn.
+INNER = 6
+
+
+def nlopt_alone(name: str, problem: Bowl, start: Array, n: int) -> Array:
+    """The points that NLopt asks for when it calls the function itself, no thread and no pymoo around it."""
+    asked: list[Array] = []
+
+    def height(u: Array, gradient: Array) -> float:
+        asked.append(u.copy())
+        r = problem.A @ u - problem.b
+        if gradient.size:
+            gradient[:] = 2.0 * problem.A.T @ r / scale
+        return float(r @ r) / scale
+
+    first = problem.A @ start - problem.b
+    scale = float(first @ first)
+    search = nlopt.opt(getattr(nlopt, ALGORITHMS[name]), 3)
+    search.set_lower_bounds(np.zeros(3))
+    search.set_upper_bounds(np.ones(3))
+    search.set_initial_step(0.05)
+    search.set_maxeval(n)
+    search.set_min_objective(height)
+    search.optimize(start)
+    return np.array(asked)
+
+
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_asks_for_what_nlopt_alone_asks_for(name: str) -> None:
+    problem = Bowl()
+    ran(name, problem, 60)
+    asked = problem.unit(np.array([batch[0] for batch in problem.batches]))
+    alone = nlopt_alone(name, problem, asked[0], min(len(asked), 12 if name in FREE else 4))
+    np.testing.assert_allclose(asked[: len(alone)], alone, atol=1e-7 if name in FREE else 1e-5)
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_the_first_step_is_the_one_that_was_asked_for(name: str) -> None:
+    for step in (0.05, 0.2):
+        problem = Bowl()
+        ran(name, problem, 2, seed=INNER, initial_step=step)
+        first, second = problem.unit(np.concatenate(problem.batches)[:2])
+        assert np.abs(second - first).max() == pytest.approx(step, rel=1e-9)
+
+
+def test_a_seed_moves_the_start_and_nothing_else_does() -> None:
+    def start(seed: int) -> Array:
+        problem = Bowl()
+        ran("bobyqa", problem, 1, seed=seed)
+        return problem.batches[0][0]
+
+    np.testing.assert_array_equal(start(3), start(3))
+    assert not np.array_equal(start(3), start(4))
+
+
+@pytest.mark.parametrize("name", [*FREE, "lbfgs", "slsqp", "least_squares"])
+def test_a_start_without_fitness_is_drawn_again(name: str) -> None:
+    problem = Bowl(fail_above=0.1)
+    result = ran(name, problem, 200, seed=6)
+    starts = problem.unit(problem.batches[0])[0, 0], problem.unit(problem.batches[1])[0, 0]
+    assert starts[0] > 0.1
+    assert np.isfinite(result.F[0])
+    assert problem.unit(result.X)[0] <= 0.1
+
+
+def test_where_all_fails_the_budget_is_the_end() -> None:
+    result = ran("bobyqa", Bowl(fail_above=-1.0), 30)
+    assert result.algorithm.evaluator.n_eval == 30
+    assert result.X is None
+
+
+def test_a_start_on_the_bound_is_pulled_inside() -> None:
+    np.testing.assert_array_equal(pulled(np.array([0.0, 0.4, 1.0])), [0.001, 0.4, 0.999])
+
+
+def test_failures_get_a_finite_height_above_all_that_was_seen() -> None:
+    height = Height()
+    with pytest.raises(NoFitnessError):
+        height.of(np.inf)
+    assert [height.of(f) for f in (4.0, 1.0, 8.0)] == [1.0, 0.25, 2.0]
+    assert height.of(np.inf) == 2.0 * 2.0 - 0.25
+
+
+def quadratic(u: Array) -> Array:
+    """Two functions of three parameters, (n, 3) -> (n, 2), and their gradient at u by hand below."""
+    return np.column_stack([u[:, 0] ** 2 + 3.0 * u[:, 1] * u[:, 2], 2.0 * u[:, 0] - u[:, 2] ** 2])
+
+
+def gradient(u: Array) -> Array:
+    return np.array([[2.0 * u[0], 2.0], [3.0 * u[2], 0.0], [3.0 * u[1], -2.0 * u[2]]])
+
+
+@pytest.mark.parametrize("u", [(0.3, 0.6, 0.5), (1.0, 0.0, 0.9999), (0.0, 1.0, 5e-4)])
+def test_central_differences_are_exact_for_parabolas_also_at_bounds(u: tuple[float, ...]) -> None:
+    here = np.array(u)
+    beside = stencil(here, 1e-3, CENTRAL)
+    assert beside.points.shape == (6, 3)
+    assert ((beside.points >= 0.0) & (beside.points <= 1.0)).all()
+    assert (np.count_nonzero(beside.points != here, axis=1) == 1).all()
+    found = slopes(beside, quadratic(here[np.newaxis])[0], quadratic(beside.points))
+    np.testing.assert_allclose(found, gradient(here), atol=1e-9)
+
+
+def test_forward_differences_are_exact_for_lines_and_turn_inwards() -> None:
+    here = np.array([1.0, 0.2, 0.9995])
+    beside = stencil(here, 1e-3, FORWARD)
+    np.testing.assert_allclose(beside.offsets, [-1e-3, 1e-3, -1e-3])
+    lines = np.array([[1.0, -2.0, 3.0], [0.5, 0.0, 7.0]])
+    found = slopes(beside, lines @ here, beside.points @ lines.T)
+    np.testing.assert_allclose(found, lines.T, atol=1e-9)
+
+
+def test_failed_neighbours_leave_the_other_side_or_nothing() -> None:
+    here = np.array([0.3, 0.6, 0.5])
+    beside = stencil(here, 1e-4, CENTRAL)
+    values = quadratic(beside.points)
+    values[0], values[1], values[4] = np.nan, np.inf, np.nan
+    found = slopes(beside, quadratic(here[np.newaxis])[0], values)
+    expected = gradient(here)
+    np.testing.assert_allclose(found[0], expected[0], atol=2e-4)
+    np.testing.assert_array_equal(found[1], 0.0)
+    np.testing.assert_allclose(found[2], expected[2], atol=1e-8)
+    forward = stencil(here, 1e-4, FORWARD)
+    values = quadratic(forward.points)
+    values[2] = np.nan
+    np.testing.assert_array_equal(slopes(forward, quadratic(here[np.newaxis])[0], values)[2], 0.0)
+
+
+@pytest.mark.parametrize(("name", "kind", "size"), [
+    ("lbfgs", "central", 7), ("slsqp", "central", 7), ("lbfgs", "forward", 4), ("slsqp", "forward", 4),
+])  # fmt: skip
+def test_a_gradient_is_one_population_and_counted(name: str, kind: str, size: int) -> None:
+    problem = Bowl()
+    result = ran(name, problem, 60, differences=kind)
+    sizes = [len(batch) for batch in problem.batches]
+    # where a line search asks for no gradient, a single candidate will do
+    assert set(sizes) - {1} == {size}
+    assert sizes[0] == size
+    assert result.algorithm.evaluator.n_eval == sum(sizes)
+
+
+@pytest.mark.parametrize(("kind", "size"), [("forward", 3), ("central", 6)])
+def test_a_jacobian_is_one_population_and_counted(kind: str, size: int) -> None:
+    problem = Bowl()
+    result = ran("least_squares", problem, 60, differences=kind)
+    assert [len(batch) for batch in problem.batches[:4]] == [1, size, 1, size]
+    assert result.algorithm.evaluator.n_eval == sum(map(len, problem.batches))
+    # linear residuals: the first Gauss-Newton step is the solution
+    assert result.F[0] == pytest.approx(float(np.linalg.lstsq(problem.A, problem.b, rcond=None)[1][0]), rel=1e-9)
+
+
+def test_residual_vectors_do_not_stay_on_the_individuals() -> None:
+    result = ran("least_squares", Bowl(), 30)
+    assert "residuals" not in result.pop[0].data
+
+
+def test_a_tolerance_ends_a_search_earlier() -> None:
+    used = [ran("bobyqa", Bowl(), 300, tolerance=t).algorithm.evaluator.n_eval for t in (1e-2, 1e-9)]
+    assert used[0] < used[1] < 300
+    assert identifier("bobyqa", tolerance=0).build(10).budget == 10

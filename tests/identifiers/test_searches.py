@@ -1,0 +1,170 @@
+"""Every identifier of the catalogue, and some composed ones, as pymoo sees them."""
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from pymoo.optimize import minimize
+from pymoo.problems import get_problem
+from pymoo.util.display.single import SingleObjectiveOutput
+from searches import COMPOSED, Bowl, identifier, ran
+
+from armid.fitness import FITNESS
+from armid.identifiers import IDENTIFIERS
+from armid.identifiers.searching import Searching
+from armid.model import ArmidError
+
+ALL = (*IDENTIFIERS, *COMPOSED)
+ON_SCALARS = [name for name in ALL if "least_squares" not in name]
+OURS = [name for name in ALL if isinstance(identifier(name).build(10), Searching)]
+
+
+@pytest.mark.parametrize("name", ON_SCALARS)
+def test_works_on_pymoo_s_own_problem(name: str) -> None:
+    bests: list[float] = []
+    told: dict[str, Any] = {"seed": 1, "callback": lambda algorithm: bests.append(float(algorithm.opt[0].F[0]))}
+    problem = get_problem("rastrigin", n_var=3)
+    result = minimize(problem, identifier(name).build(250), ("n_eval", 250), **told)
+    assert 0 < result.algorithm.evaluator.n_eval < 250 + 80
+    assert np.all(np.abs(result.X) <= 5.12)
+    assert result.F[0] == bests[-1] == problem.evaluate(result.X)[0] < bests[0]
+    assert bests == sorted(bests, reverse=True)
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if "least_squares" in name])
+def test_least_squares_refuses_a_problem_without_residuals(name: str) -> None:
+    with pytest.raises(ArmidError, match="gives no residual vectors, least_squares expects one that does"):
+        ran(name, get_problem("rastrigin", n_var=3))
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_optimum_is_the_best_of_all_that_was_asked(name: str) -> None:
+    problem = Bowl()
+    result = ran(name, problem)
+    asked = np.concatenate(problem.batches)
+    residuals = problem.unit(asked) @ problem.A.T - problem.b
+    heights = (residuals**2).sum(axis=1)
+    assert result.F[0] == heights.min()
+    np.testing.assert_array_equal(result.X, asked[np.argmin(heights)])
+    assert result.algorithm.evaluator.n_eval == len(asked)
+
+
+LOCAL_OR_BETTER = [name for name in ALL if name not in ("pso", "pymoo_pso", "ga", "de", "random", "ga+cobyla+sbplx")]
+
+
+@pytest.mark.parametrize("name", LOCAL_OR_BETTER)
+def test_finds_what_linear_algebra_finds(name: str) -> None:
+    problem = Bowl()
+    expected = np.linalg.lstsq(problem.A, problem.b, rcond=None)[0]
+    assert ((expected > 0.05) & (expected < 0.95)).all()
+    found = problem.unit(ran(name, problem, 600).X)
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("name", LOCAL_OR_BETTER)
+def test_finds_an_optimum_on_the_bounds(name: str) -> None:
+    from scipy.optimize import lsq_linear
+
+    problem = Bowl((3.5, 1.0, 3.0, 2.5))
+    expected = lsq_linear(problem.A, problem.b, (0.0, 1.0), tol=1e-14).x
+    assert (expected > 1.0 - 1e-9).sum() == 2
+    found = ran(name, problem, 600)
+    np.testing.assert_allclose(problem.unit(found.X), expected, atol=1e-4)
+    assert all((batch >= problem.xl).all() and (batch <= problem.xu).all() for batch in problem.batches)
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_pymoo_s_trimmings(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    seen: list[int] = []
+    told: dict[str, Any] = {
+        "seed": 3, "save_history": True, "callback": lambda algorithm: seen.append(algorithm.evaluator.n_eval),
+    }  # fmt: skip
+    result = minimize(Bowl(), identifier(name).build(60), ("n_gen", 4), **told)
+    assert len(result.history) == len(seen) == 4
+    assert [h.evaluator.n_eval for h in result.history] == seen
+    bests = [h.opt[0].F[0] for h in result.history]
+    assert bests == sorted(bests, reverse=True)
+    assert capsys.readouterr().out == ""
+    with pytest.raises(ArmidError, match="it cannot go on"):
+        result.history[0].next()
+    shown = identifier(name).build(60)
+    shown.output = SingleObjectiveOutput()
+    minimize(Bowl(), shown, ("n_gen", 2), seed=3, verbose=True)
+    assert "f_min" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_identifiers_travel_to_other_processes_and_algorithms_copy_before_they_run(name: str) -> None:
+    kept = identifier(name)
+    algorithm = pickle.loads(pickle.dumps(kept)).build(100)
+    results = [minimize(Bowl(), a, ("n_eval", 100), seed=5).X for a in (copy.deepcopy(algorithm), algorithm)]
+    np.testing.assert_array_equal(*results)
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_asked_and_told_by_hand(name: str) -> None:
+    problem, again = Bowl(), Bowl()
+    algorithm = identifier(name).build(40).setup(problem, termination=("n_eval", 40), seed=2)
+    while algorithm.has_next():
+        infills = algorithm.ask()
+        algorithm.evaluator.eval(problem, infills, algorithm=algorithm)
+        algorithm.tell(infills=infills)
+    ran(name, again, 40, seed=2)
+    np.testing.assert_array_equal(np.concatenate(problem.batches), np.concatenate(again.batches))
+
+
+def test_what_minimize_would_swallow_is_refused() -> None:
+    with pytest.raises(ArmidError, match="no option 'sede', did you mean 'seed'"):
+        minimize(Bowl(), identifier("bobyqa").build(10), sede=3)
+    with pytest.raises(ArmidError, match="no option 'terminaton'"):
+        Searching(lambda task: iter(()), 10, terminaton=3)  # type: ignore[arg-type,return-value]
+    with pytest.raises(ArmidError, match="no problem yet"):
+        identifier("bobyqa").build(10).ask()
+    with pytest.raises(ArmidError, match="2 objectives"):
+        minimize(get_problem("zdt1"), identifier("cmaes").build(10))
+    asked = identifier("random", n_candidates=5).build(10).setup(Bowl(), seed=1)
+    with pytest.raises(ArmidError, match="2 candidates were told to the search, expected 5"):
+        asked.tell(infills=asked.ask()[:2])
+
+
+@pytest.mark.parametrize(("name", "options", "sentence"), [
+    ("bobyqa", {"initial_stp": 0.1}, "'bobyqa' has no option 'initial_stp', did you mean 'initial_step'?"),
+    ("bobyqa", {"initial_step": 0.0}, "initial_step is 0.0, expected a number above 0 and at most 1"),
+    ("nelder_mead", {"tolerance": -1}, "tolerance is -1, expected a number of at least 0"),
+    ("lbfgs", {"differences": "centrl"}, "differences is 'centrl', did you mean 'central'?"),
+    ("slsqp", {"step": 2}, "step is 2, expected a number above 0 and at most 1"),
+    ("least_squares", {"tolerance": 1e-20}, "tolerance is 1e-20, expected a number of at least 1e-15"),
+    ("cmaes", {"n_candidates": 2.5}, "n_candidates is 2.5, expected a whole number"),
+    ("cmaes", {"growth": 0.5}, "growth is 0.5, expected a number of at least 1"),
+    ("random", {"n": 5}, "'random' has no option 'n'"),
+    ("ga", {"popsize": 5}, "'ga' has no option 'popsize', did you mean 'pop_size'?"),
+    ("de", {"pop_size": 0}, "pop_size is 0, expected a whole number above 0"),
+    ("pymoo_pso", {"c3": 1.0}, "'pymoo_pso' has no option 'c3'"),
+])  # fmt: skip
+def test_bad_options_are_refused_in_a_sentence(name: str, options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ArmidError) as refusal:
+        identifier(name, **options).build(100)
+    assert sentence in str(refusal.value)
+
+
+def test_options_of_pymoo_s_algorithms_reach_them() -> None:
+    assert identifier("pymoo_pso", pop_size=7, w=0.5).build(100).pop_size == 7
+    assert identifier("ga", n_offsprings=3).build(100).n_offsprings == 3
+    assert identifier("de", pop_size=9).build(100).pop_size == 9
+
+
+def test_capabilities_are_true() -> None:
+    asks_residuals = {name for name in ALL if identifier(name).needs_residuals}
+    assert asks_residuals == {name for name in ALL if "least_squares" in name}
+    gradient = {name for name in IDENTIFIERS if IDENTIFIERS[name].uses_gradient}
+    assert gradient == {"lbfgs", "slsqp", "least_squares"}
+    assert {name for name in IDENTIFIERS if IDENTIFIERS[name].is_global} == {
+        "pso", "pymoo_pso", "ga", "de", "cmaes", "random",
+    }  # fmt: skip
+    for name in asks_residuals:
+        identifier(name).refuse(FITNESS["rmse"])
+        with pytest.raises(ArmidError, match=r"'similarity' has none: rmse or likelihood is expected"):
+            identifier(name).refuse(FITNESS["similarity"])
+    identifier("pso+bobyqa").refuse(FITNESS["similarity"])
