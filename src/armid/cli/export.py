@@ -1,0 +1,36 @@
+"""`armid export`: stored results in the formats of others."""
+
+from pathlib import Path
+
+import click
+
+from armid.cli.new_files import NewFiles, refuse_unwritable
+from armid.model import ArmidError
+
+
+@click.group("export")
+def export_group() -> None:
+    """Write stored results in the formats of other programs."""
+
+
+@export_group.command("ioh")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("out", metavar="OUT", type=click.Path(path_type=Path))
+def ioh_command(folder: Path, out: Path) -> None:
+    """Write the traces of a study as IOHprofiler files.
+
+    DIR holds study.sqlite; OUT is a new or an empty folder, for iohinspector (`DataManager.add_folder`) and
+    IOHanalyzer. Algorithm: the identifier, and its fitness where it ran on several. Function: a case under one noise,
+    window and fitness. Instance: the seed. The fitness is minimised; each run starts at evaluation 1 and logs its last.
+    """
+    from armid.study.export import export_ioh  # noqa: PLC0415 - pandas takes time to import
+    from armid.study.results import load_study  # noqa: PLC0415
+
+    if out.is_dir() and any(out.iterdir()):
+        raise ArmidError(f"{out} is not empty: a new folder is expected, since all that is in it would be loaded")
+    refuse_unwritable(out)
+    with NewFiles(out) as files:
+        n_runs = export_ioh(load_study(folder), files.path)
+        if not n_runs:
+            raise ArmidError(f"{folder} holds no trace of a finished run: nothing can be exported")
+    print(f"wrote {n_runs} runs in {len(files.names)} files to {out}")

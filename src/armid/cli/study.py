@@ -1,0 +1,80 @@
+"""`armid study`: run what is missing of a study."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from armid.cli.options import plugin_option
+
+if TYPE_CHECKING:
+    from armid.study.runner import Ending
+
+MOST_NAMED = 300
+
+
+@click.command("study")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--jobs", type=click.IntRange(1), help="Worker processes. [default: as many as processors]")
+@click.option("--dask", metavar="tcp://HOST:PORT", help="Scheduler of a Dask cluster, in place of own processes.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder of the results. [default: results/NAME]")
+@click.option("--time-limit", default=600.0, show_default=True, metavar="S",
+              help="A run that takes longer is stopped and counts as failed, s.")
+@click.option("--only", default="*", metavar="CASE/IDENTIFIER",
+              help="Run these only; * and ? stand for any letters, CASE alone for all identifiers.")
+@click.option("--retry", is_flag=True, help="Perform failed runs anew.")
+@plugin_option
+def study_command(
+    study: Path, jobs: int | None, dask: str | None, out: Path | None, time_limit: float, only: str, retry: bool,
+    plugins: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Run what is missing of STUDY, a TOML file of cases, identifiers, fitnesses and seeds.
+
+    Finished runs are kept in one SQLite file, whatever ends the program; the same command goes on where it was.
+    Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not.
+    """
+    from armid.study.progress import Watch  # noqa: PLC0415
+    from armid.study.runner import absolute, run  # noqa: PLC0415 - compiled code that other commands do not need
+    from armid.study.study import read_study  # noqa: PLC0415
+
+    with Watch() as watch:
+        ending = run(read_study(study, absolute(plugins)), jobs, dask, out, time_limit, only, retry, watch.update)
+    for line in words(ending):
+        print(line)
+    if ending.interrupted:
+        sys.exit(130)
+    if ending.counts.done:
+        show_table(ending.folder)
+
+
+def show_table(folder: Path) -> None:
+    """Print the main table of the report, the rest of which takes longer."""
+    from armid.cli.report import show  # noqa: PLC0415
+    from armid.study.report import Report  # noqa: PLC0415 - pandas takes time to import
+    from armid.study.report.build import main_table, state  # noqa: PLC0415
+    from armid.study.report.evidence import Evidence  # noqa: PLC0415
+    from armid.study.results import load_study  # noqa: PLC0415
+
+    evidence = Evidence(load_study(folder))
+    name, told = str(evidence.study["name"]), state(evidence.study, evidence)
+    show(Report(name, "", told, (), main_table(evidence), ()))
+
+
+def words(ending: "Ending") -> list[str]:
+    """Return what a reader must know of how it ended, one sentence each."""
+    from armid.study.progress import span  # noqa: PLC0415
+
+    counts, name = ending.counts, ending.study.name
+    speed = f", {ending.simulations / ending.seconds:,.0f} simulations/s" if ending.simulations else ""
+    lines = [f"{name}: {ending.finished} runs made in {span(ending.seconds)}{speed}; {counts.planned - counts.missing} "
+             f"of {counts.planned} are in {ending.folder}"]  # fmt: skip
+    if ending.interrupted:
+        lines.append("interrupted: every finished run is kept, the same command goes on")
+    elif counts.missing and ending.others:
+        others = ", ".join(map(str, ending.others))
+        lines.append(f"{counts.missing} runs are still with another runner (process {others})")
+    if counts.failed:
+        lines.append(f"{counts.failed} runs failed, the first: {ending.first_error[:MOST_NAMED]}")
+    return lines

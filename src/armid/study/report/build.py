@@ -1,0 +1,101 @@
+"""Build the report of a study from its stored results."""
+
+from typing import Any
+
+from armid.model import ArmidError
+from armid.study.metrics import Results
+from armid.study.report.evidence import Evidence
+from armid.study.report.general import (
+    best_fitness_section,
+    convergence_section,
+    errors_section,
+    ranks_section,
+    running_time_section,
+    runs_section,
+    success_section,
+)
+from armid.study.report.report import Report, Section
+from armid.study.report.special import cramer_rao_section, fitness_section, table1_section, table2_section
+from armid.study.tables import Table, overview, values
+
+BUILDERS = (
+    table1_section, table2_section, cramer_rao_section, fitness_section, success_section, running_time_section,
+    best_fitness_section, convergence_section, errors_section, ranks_section,
+)  # fmt: skip
+KIND = "identify"
+ALONE = "A seed decides the search alone; the noise is the records' own."
+PAIRED = "The same seed gives the same noise to all identifiers, so that they are compared in pairs."
+SYNTHETIC = (
+    "Synthetic: records are simulated from a known truth by the model that is identified, and white noise of the "
+    "stated level (standard deviation) is added; no measured data enters."
+)
+
+
+def report_of(results: Results) -> Report:
+    """Return tables and figures of a study as far as it was run; nothing is drawn yet.
+
+    Raises ArmidError when no run has ended, and for a study of another kind than "identify".
+    """
+    if results.study.get("kind", KIND) != KIND:
+        raise ArmidError(f"study '{results.study['name']}' is of kind '{results.study['kind']}', '{KIND}' is expected")
+    if results.runs.empty:
+        raise ArmidError(f"study '{results.study['name']}' has no finished run: nothing can be reported")
+    evidence = Evidence(results)
+    main = main_table(evidence)
+    made = [build(evidence) for build in BUILDERS] if not evidence.parameters.empty else []
+    sections = (Section("Overview", "", (main,)), *(s for s in made if s is not None), runs_section(evidence))
+    study = evidence.study
+    return Report(str(study["name"]), str(study.get("question", "")), state(study, evidence), facts(evidence), main,
+                  sections)  # fmt: skip
+
+
+def main_table(evidence: Evidence) -> Table:
+    """Return the table that is printed: errors where truths are known, else values."""
+    if evidence.knows_truth:
+        is_table1 = evidence.study.get("report") == "table1"
+        return overview(evidence.found, evidence.estimates, evidence.published if is_table1 else evidence.published[:0])
+    return values(evidence.found, evidence.estimates)
+
+
+def state(study: dict[str, Any], evidence: Evidence) -> str:
+    """Return how much of the study was run."""
+    planned, there = int(study["n_planned"]), len(evidence.found)
+    failed = int((evidence.found["status"] != "done").sum())
+    lost = f", {failed} of them failed" if failed else ""
+    if there < planned:
+        return f"NOT COMPLETE: {there} of {planned} runs have ended{lost}; every number below is of these."
+    return f"Complete: {there} of {planned} runs{lost}."
+
+
+def facts(evidence: Evidence) -> tuple[str, ...]:
+    """Return how it was made, one sentence each."""
+    study, found = evidence.study, evidence.found
+    budgets = sorted(set(found["budget"]))
+    effects = f" with {', '.join(study['effects'])}" if study.get("effects") else ""
+    return (
+        origin(study),
+        f"Plant: {study['plant']}{effects}. Fitness: {', '.join(dict.fromkeys(found['fitness']))}.",
+        f"{len(evidence.cases)} cases, {len(evidence.variants)} identifiers, {found['seed'].nunique()} seeds, "
+        f"noise and windows: {'; '.join(evidence.settings)}.",
+        f"Budget: {' and '.join(f'{b:g}' for b in budgets)} simulations a run; {found['used'].sum():,.0f} in all.",
+        PAIRED if found["noise_deg_s"].notna().any() else ALONE,
+        f"Versions: {versions(study)}.",
+    )
+
+
+def origin(study: dict[str, Any]) -> str:
+    """Return where the records come from."""
+    simulated = [c for c in study["cases"] if not c.get("campaign")]
+    campaigns = sorted({str(c["campaign"]) for c in study["cases"] if c.get("campaign")})
+    parts = []
+    if simulated:
+        parts.append(SYNTHETIC)
+    if campaigns:
+        known = any(c.get("truth") for c in study["cases"] if c.get("campaign"))
+        parts.append(f"Records of {', '.join(campaigns)}{' (their truth is known: synthetic)' if known else ''}.")
+    return " ".join(parts)
+
+
+def versions(study: dict[str, Any]) -> str:
+    """Return the packages that made the runs."""
+    return ", ".join(f"{name} {version}" for name, version in sorted(dict(study.get("versions") or {}).items()))

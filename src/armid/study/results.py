@@ -1,0 +1,166 @@
+"""Stored results of a study as tidy tables."""
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from armid.model import ArmidError
+from armid.study.outcome import DONE
+from armid.study.reading import existing_store, reading
+from armid.study.trace import RunTrace, unpacked
+
+RUNS = """
+SELECT p.run, p."case", p.identifier, p.fitness, p.noise_deg_s, p.window, p.seed, p.budget, i.used, i.n_failed, i.value,
+i.stopped, r.status, r.error, r.seconds, i.train_rmse, i.train_s, i.train_s1, i.train_s2, i.holdout_rmse, r.started_at,
+r.model, r.versions
+FROM plan p JOIN runs r USING (run) LEFT JOIN identified i USING (run) ORDER BY p.place
+"""
+PARAMETERS = """
+SELECT p."case", q.* FROM plan p JOIN parameters q USING (run) ORDER BY p.place, q.rowid
+"""
+TRACES = "SELECT t.run, t.names, t.trace FROM plan p JOIN traces t USING (run)"
+NUMBERS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s2", "holdout_rmse", "seconds")
+COUNTED = ("used", "n_failed")
+
+
+@dataclass(frozen=True, eq=False)
+class StudyResults:
+    """Hold what a study had found when it was loaded; traces are read from the store when they are asked for.
+
+    Only runs that the study asks for count: settings that are no longer in its file are left out.
+    study: name, question, kind, text (the TOML file as run), folder, cases (name, truth, published, bounds, units),
+    identifiers (labels in order), published, versions, n_planned, n_done, n_failed and more.
+    runs: one row a finished run. noise_deg_s: that the study added, NaN for records that are read. used, n_failed:
+    simulations. value: best fitness. train_rmse, holdout_rmse: SI. status: "done" or "failed", with the reason in
+    `error`. model, versions: hashes, see `text_of`.
+    parameters: one row a run and free parameter, SI. deviation: one sigma of the Cramer-Rao bound at the solution.
+    relative_error: abs(value - truth)/abs(truth), NaN where the truth is not known.
+    """
+
+    path: Path
+    study: dict[str, Any]
+    runs: pd.DataFrame
+    parameters: pd.DataFrame
+
+    @property
+    def traces(self) -> pd.DataFrame:
+        """One row an improvement: run, evaluation, value, and x_NAME for each parameter of the study."""
+        frames = [self._frame(trace) for trace in self.iter_traces()]
+        return pd.concat(frames, ignore_index=True) if frames else self._frame(None)
+
+    def trace_of(self, run: str) -> pd.DataFrame:
+        """Return the improvements of one run.
+
+        Raises ArmidError for a run that is not there or has failed.
+        """
+        for trace in self._traces(f"{TRACES} WHERE p.run = ?", (run,)):
+            return self._frame(trace)
+        raise ArmidError(f"{self.path} holds no trace of run '{run}': the id of a finished run is expected")
+
+    def iter_traces(self) -> Iterator[RunTrace]:
+        """Yield the traces one after the other, in the order of `runs`; no more than one is in memory."""
+        return self._traces(f"{TRACES} ORDER BY p.place", ())
+
+    def settings_of(self, run: str) -> dict[str, Any]:
+        """Return all that decided a run.
+
+        Raises ArmidError for a run that is not there.
+        """
+        with reading(self.path) as connection:
+            row = connection.execute("SELECT settings FROM settings WHERE run = ?", (run,)).fetchone()
+        if row is None:
+            raise ArmidError(f"{self.path} holds no run '{run}'")
+        settings: dict[str, Any] = json.loads(row[0])
+        return settings
+
+    def text_of(self, digest: str) -> str:
+        """Return the text whose hash a run names: the equations of its model, or the versions (JSON) it ran on.
+
+        Raises ArmidError for a hash that is not there.
+        """
+        with reading(self.path) as connection:
+            row = connection.execute("SELECT text FROM texts WHERE hash = ?", (digest,)).fetchone()
+        if row is None:
+            raise ArmidError(f"{self.path} holds no text of hash '{digest}'")
+        return str(row[0])
+
+    def _traces(self, query: str, values: tuple[str, ...]) -> Iterator[RunTrace]:
+        with reading(self.path) as connection:
+            for run, names, content in connection.execute(query, values):
+                yield unpacked(run, content, tuple(json.loads(names)))
+
+    def _frame(self, trace: RunTrace | None) -> pd.DataFrame:
+        """Return a trace as a table with a column for every parameter of the study, None: one without rows."""
+        if trace is None:
+            trace = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
+        columns = {"run": [trace.run] * len(trace.values), "evaluation": trace.evaluations, "value": trace.values}
+        for name in self.study["parameters"]:
+            known = name in trace.names
+            columns[f"x_{name}"] = trace.X[:, trace.names.index(name)] if known else np.full(len(trace.values), np.nan)
+        return pd.DataFrame(columns)
+
+
+def load_study(path: str | Path) -> StudyResults:
+    """Read the stored results of a study: the folder that holds study.sqlite, or that file. Nothing is changed.
+
+    Raises ArmidError for what is no store of a study.
+    """
+    file = existing_store(path)
+    with reading(file) as connection:
+        # one transaction: a runner that is at work changes nothing between the tables
+        connection.execute("BEGIN")
+        row = connection.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
+        if row is None:
+            raise ArmidError(f"{file} holds no study yet: let `armid study` begin it")
+        study: dict[str, Any] = json.loads(row[0])
+        study |= counted(connection) | {"versions": versions(connection), "folder": str(file.parent)}
+        study["parameters"] = list(dict.fromkeys(name for case in study["cases"] for name in case["bounds"]))
+        return StudyResults(file, study, runs_in(connection), parameters_in(connection, study))
+
+
+def runs_in(connection: sqlite3.Connection) -> pd.DataFrame:
+    """Return one row a finished run."""
+    runs = pd.read_sql_query(RUNS, connection)
+    runs[list(NUMBERS)] = runs[list(NUMBERS)].astype(np.float64)
+    runs[list(COUNTED)] = runs[list(COUNTED)].fillna(0).astype(np.int64)
+    return runs.fillna({"stopped": ""})
+
+
+def parameters_in(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:
+    """Return one row a run and free parameter, with the truth of its case beside."""
+    found = pd.read_sql_query(PARAMETERS, connection)
+    truths = {(case["name"], name): v for case in study["cases"] for name, v in case["truth"].items()}
+    keys = zip(found.pop("case"), found["parameter"], strict=True)
+    truth = np.array([truths.get(key, np.nan) for key in keys], dtype=np.float64)
+    for name in ("value", "low", "high", "deviation", "correlation_max"):
+        found[name] = found[name].astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.abs(found["value"] - truth) / np.abs(truth)
+    found.insert(4, "truth", truth)
+    found.insert(7, "relative_error", error)
+    return found.astype({"at_bound": bool})
+
+
+def counted(connection: sqlite3.Connection) -> dict[str, int]:
+    """Return how many runs are planned, done and failed."""
+    planned = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
+    status = "SELECT status, count(*) FROM plan JOIN runs USING (run) GROUP BY status"
+    ended = dict(connection.execute(status).fetchall())
+    done = ended.get(DONE, 0)
+    return {"n_planned": planned, "n_done": done, "n_failed": sum(ended.values()) - done}
+
+
+def versions(connection: sqlite3.Connection) -> dict[str, str]:
+    """Return package -> version; several where runs were made on several."""
+    query = "SELECT DISTINCT t.text FROM plan JOIN runs r USING (run) JOIN texts t ON t.hash = r.versions"
+    found: dict[str, list[str]] = {}
+    for (text,) in connection.execute(query):
+        for package, version in json.loads(text).items():
+            found.setdefault(package, []).append(version)
+    return {package: ", ".join(sorted(set(those))) for package, those in found.items()}

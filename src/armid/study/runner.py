@@ -1,0 +1,190 @@
+"""Run what is missing of a study."""
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from armid.identification.interrupt import ctrl_c_waits
+from armid.model import ArmidError, nearest
+from armid.study.crew import Crew, LocalCrew
+from armid.study.lane import Workplace
+from armid.study.outcome import Outcome
+from armid.study.plan import case_settings, planned_runs
+from armid.study.records import clean_records
+from armid.study.store import Counts, Store
+from armid.study.study import Study, description, read_study
+
+if TYPE_CHECKING:
+    from armid.study.results import StudyResults
+
+TIME_LIMIT_S = 600.0
+RESULTS = Path("results")
+# How long to listen for finished runs before Ctrl-C is looked for [s].
+LISTEN_S = 0.25
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Tell how a runner ended: where the store is, how far its study is, and what this runner did of it.
+
+    others: processes that are still at runs of the study.
+    """
+
+    study: Study
+    folder: Path
+    counts: Counts
+    finished: int
+    simulations: int
+    seconds: float
+    interrupted: bool
+    first_error: str
+    others: tuple[int, ...]
+
+
+Told = Callable[[Counts, Outcome | None], None]
+
+
+def run_study(
+    path: str | Path,
+    jobs: int | None = None,
+    dask: str | None = None,
+    out: str | Path | None = None,
+    plugins: Iterable[str] = (),
+    time_limit: float = TIME_LIMIT_S,
+    only: str = "*",
+    retry: bool = False,
+) -> "StudyResults":
+    """Run what is missing of a study and return all that its store holds.
+
+    path: the TOML file. jobs: worker processes (None: as many as processors). dask: address of a scheduler instead.
+    out: folder of the store (None: results/NAME). plugins: `FILE.py:attribute` of your own things, whose code is run.
+    time_limit: seconds after which a run is stopped and has failed. only: CASE/IDENTIFIER, patterns with * and ?.
+    retry: perform failed runs anew.
+
+    Raises ArmidError for a study that cannot be run, KeyboardInterrupt after Ctrl-C; finished runs are kept then.
+    """
+    from armid.study.results import load_study  # noqa: PLC0415 - pandas takes time to import, and workers need none
+
+    study = read_study(path, absolute(plugins))
+    ending = run(study, jobs, dask, out, time_limit, only, retry)
+    if ending.interrupted:
+        raise KeyboardInterrupt
+    return load_study(ending.folder)
+
+
+def run(
+    study: Study,
+    jobs: int | None = None,
+    dask: str | None = None,
+    out: str | Path | None = None,
+    time_limit: float = TIME_LIMIT_S,
+    only: str = "*",
+    retry: bool = False,
+    told: Told = lambda counts, outcome: None,
+) -> Ending:
+    """Run what is missing of a study that was read; arguments and errors as `run_study`.
+
+    told: called with the counts at the start once, then with each finished run. Ctrl-C ends it without an error.
+    """
+    began = time.monotonic()
+    chosen = pattern_of(only, study)
+    check_numbers(jobs, dask, time_limit)
+    check_motion(study)
+    folder = RESULTS / study.name if out is None else Path(out)
+    with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
+        store.plan(description(study), planned_runs(study))
+        if retry:
+            store.forget_failed()
+        counts = store.counts()
+        told(counts, None)
+        finished = simulations = 0
+        if counts.missing:
+            crew = crew_of(jobs, dask, Workplace(study.known.plugins, study.folder, time_limit), counts.missing)
+            try:
+                for outcome in performed(store, crew, interrupted):
+                    finished, simulations = finished + 1, simulations + outcome.used
+                    told(counts, outcome)
+            finally:
+                crew.close()
+        return Ending(
+            study, folder, store.counts(), finished, simulations, time.monotonic() - began, interrupted(),
+            store.first_error(), tuple(store.others()),
+        )  # fmt: skip
+
+
+def performed(store: Store, crew: Crew, interrupted: Callable[[], bool]) -> Iterable[Outcome]:
+    """Let the crew perform what is missing and keep each run as it comes; yield those that were new."""
+    is_all_given = False
+    while not interrupted():
+        wanted = 0 if is_all_given else crew.wanted()
+        if wanted:
+            tasks = store.claim(wanted)
+            is_all_given = not tasks
+            crew.give(tasks)
+        if not crew.held:
+            # a runner that has ended meanwhile may have left something
+            left = store.claim(1)
+            if not left:
+                return
+            is_all_given = False
+            crew.give(left)
+        for outcome in crew.wait(LISTEN_S):
+            if store.save(outcome):
+                yield outcome
+
+
+def crew_of(jobs: int | None, dask: str | None, workplace: Workplace, n_runs: int) -> Crew:
+    """Return who performs the runs."""
+    if dask is not None:
+        from armid.study.dask_crew import DaskCrew  # noqa: PLC0415 - distributed is an extra
+
+        return DaskCrew(dask, workplace)
+    from joblib import cpu_count  # noqa: PLC0415 - takes time to import
+
+    return LocalCrew(min(jobs or cpu_count(), n_runs), workplace)
+
+
+def check_numbers(jobs: int | None, dask: str | None, time_limit: float) -> None:
+    """Refuse what no crew can work with."""
+    if jobs is not None and jobs < 1:
+        raise ArmidError(f"jobs is {jobs}, a whole number of processes above 0 is expected")
+    if jobs is not None and dask is not None:
+        raise ArmidError("both jobs and a Dask cluster are given, one of them is expected")
+    if not 0.0 < time_limit < 1e9:
+        raise ArmidError(f"the time limit is {time_limit:g}, a number of seconds above 0 is expected")
+
+
+def check_motion(study: Study) -> None:
+    """Simulate each case's truth once, before anything is written: the model is compiled and the machine moves.
+
+    Raises ArmidError for a truth at which it does not.
+    """
+    for case in study.cases:
+        if case.source is None:
+            try:
+                clean_records(case_settings(study, case), case.model)
+            except ArmidError as error:
+                raise ArmidError(f"case '{case.name}', {error}") from error
+
+
+def pattern_of(only: str, study: Study) -> tuple[str, str]:
+    """Return the patterns of case and identifier; CASE alone means all identifiers.
+
+    Raises ArmidError for a pattern that meets nothing.
+    """
+    case, _, identifier = only.partition("/")
+    patterns = (case or "*", identifier or "*")
+    names = ([c.name for c in study.cases], [e.label for e in study.entries])
+    for what, pattern, known in zip(("case", "identifier"), patterns, names, strict=True):
+        if not any(name == pattern or fnmatchcase(name, pattern) for name in known):
+            raise ArmidError(f"only '{only}': no {what} is called '{pattern}', {nearest(pattern, known)}")
+    return patterns
+
+
+def absolute(plugins: Iterable[str]) -> tuple[str, ...]:
+    """Return plug-ins with whole paths, so that workers in other folders find them."""
+    split = (plugin.rpartition(":") for plugin in plugins)
+    return tuple(f"{Path(file).resolve()}:{attribute}" if file else attribute for file, _, attribute in split)

@@ -1,0 +1,51 @@
+"""A process that performs runs for another one: `python -m armid.study.worker FILE_DESCRIPTOR`."""
+
+import os
+import sys
+import threading
+import time
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from armid.model import ArmidError
+from armid.study.known import load_known
+from armid.study.perform import perform
+from armid.study.workshop import Workshop
+
+READY, REFUSED, FINISHED = "ready", "refused", "finished"
+# How often a worker looks whether the process that it works for still lives [s].
+LOOKS_EVERY_S = 1.0
+
+
+def work(connection: Connection) -> None:
+    """Receive plug-ins and folder, then perform one task after the other until the other end is closed."""
+    plugins, folder = connection.recv()
+    try:
+        workshop = Workshop(load_known(plugins), Path(folder))
+    except ArmidError as error:
+        connection.send((REFUSED, str(error)))
+        return
+    connection.send((READY, None))
+    while True:
+        connection.send((FINISHED, perform(connection.recv(), workshop)))
+
+
+def end_with(parent: int) -> None:
+    """End this process soon after the one that it works for has ended, also in the middle of a run."""
+    while os.getppid() == parent:
+        time.sleep(LOOKS_EVERY_S)
+    os._exit(1)
+
+
+def main(descriptor: int, parent: int) -> None:
+    """Work until the other end is closed."""
+    threading.Thread(target=end_with, args=(parent,), daemon=True).start()
+    try:
+        work(Connection(descriptor))
+    except (EOFError, OSError):
+        # the process that we work for has closed its end, or has ended
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))

@@ -1,0 +1,62 @@
+"""The small study written, run, and run by a process of its own."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from small_study import PLUGINS, STUDY
+
+from armid.study.results import StudyResults
+from armid.study.runner import run_study
+
+
+@pytest.fixture
+def write_study(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that writes the small study; identifiers: TOML in place of its own."""
+
+    def write(seeds: int = 2, more: str = "", change: tuple[str, str] = ("", ""), name: str = "small.toml") -> Path:
+        file = tmp_path / name
+        text = STUDY.format(seeds=seeds, more=more)
+        assert change[0] in text
+        file.write_text(text.replace(*change) if change[0] else text, encoding="utf-8")
+        return file
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def bad_identifiers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of identifiers that misbehave."""
+    file = tmp_path_factory.mktemp("plugins") / "bad_identifiers.py"
+    file.write_text(PLUGINS, encoding="utf-8")
+    return file
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
+    """Return a function that starts `armid study` in a process of its own."""
+    started = []
+
+    def popen(*arguments: object, **options: object) -> "subprocess.Popen[str]":
+        command = [sys.executable, "-m", "armid", "study", *map(str, arguments)]
+        told = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": os.environ}
+        process = subprocess.Popen(command, cwd=tmp_path, **(told | options))
+        started.append(process)
+        return process
+
+    yield popen
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture(scope="session")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
+    """The small study with six seeds, run by one process that nobody disturbed."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    (folder / "small.toml").write_text(STUDY.format(seeds=6, more=""), encoding="utf-8")
+    return run_study(folder / "small.toml", jobs=1, out=folder / "out")

@@ -1,0 +1,150 @@
+"""Full disks, folders that cannot be written, and identifiers that take their worker with them."""
+
+import os
+import resource
+import shutil
+import subprocess
+import time
+
+import pytest
+from small_study import RUNS_A_SEED, same_results
+
+from armid.model import ArmidError
+from armid.study.results import load_study
+from armid.study.runner import run_study
+from armid.study.store_file import FILE_NAME
+
+SEEDS = 6
+CHAIN = 'name = "pso+least_squares"'
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of its own with little room, which only root may make."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=260k", "tmpfs", str(folder)]
+    if shutil.which("mount") is None or subprocess.run(command, check=False, capture_output=True).returncode:
+        pytest.skip("a small file system cannot be mounted here")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def ended_with_one_sentence(process):
+    out, err = process.communicate(timeout=600)
+    assert (process.returncode, out) == (2, "")
+    assert err.startswith("armid: ")
+    assert err.count("\n") == 1
+    return err
+
+
+def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, small_disk, undisturbed):
+    file, out = write_study(SEEDS), small_disk / "out"
+    err = ended_with_one_sentence(start(file, "--out", out, "--jobs", 1))
+    assert "database or disk is full; what was finished before is kept" in err
+    kept = load_study(out)
+    assert 0 < len(kept.runs) < SEEDS * RUNS_A_SEED
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    assert start(file, "--out", out, "--jobs", 1).wait() == 0
+    assert same_results(load_study(out), undisturbed)
+
+
+def test_a_file_that_may_not_grow_is_told_and_harms_nothing(start, write_study, tmp_path, undisturbed):
+    file, out = write_study(SEEDS), tmp_path / "out"
+
+    def at_most():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+
+    err = ended_with_one_sentence(start(file, "--out", out, "--jobs", 1, preexec_fn=at_most))
+    assert "what was finished before is kept" in err
+    assert 0 < len(load_study(out).runs) < SEEDS * RUNS_A_SEED
+    assert start(file, "--out", out, "--jobs", 1).wait() == 0
+    assert same_results(load_study(out), undisturbed)
+
+
+@pytest.mark.skipif(not os.path.isdir("/sys/kernel"), reason="/sys is a folder in which nobody can write")
+def test_a_folder_that_cannot_be_written_is_told(start, write_study):
+    err = ended_with_one_sentence(start(write_study(), "--out", "/sys/kernel/armid"))
+    assert "/sys/kernel/armid cannot be used" in err
+
+
+def test_a_read_only_folder_can_be_read_and_is_told_when_written(start, write_study, small_disk, undisturbed):
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    shutil.copytree(undisturbed.path.parent, small_disk / "out")
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    try:
+        assert same_results(load_study(small_disk / "out"), undisturbed)
+        err = ended_with_one_sentence(start(write_study(7), "--out", small_disk / "out"))
+        assert FILE_NAME in err
+        assert "readonly" in err or "read-only" in err
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+
+
+@pytest.mark.slow
+def test_a_log_left_in_a_read_only_folder_is_read(start, write_study, small_disk):
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    out = small_disk / "out"
+    process = start(write_study(100), "--out", out, "--jobs", 1)
+    while not (out / f"{FILE_NAME}-wal").exists():
+        assert process.poll() is None
+        time.sleep(0.01)
+    assert start(write_study(100), "--out", out, "--jobs", 1, "--only", "row 1/random").wait() == 0
+    process.kill()
+    process.wait()
+    n = len(load_study(out).runs)
+    assert any(p.name.endswith("-wal") for p in out.iterdir())
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    try:
+        assert len(load_study(out).runs) == n > 0
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("raises", "ZeroDivisionError: nothing to divide by"),
+    ("leaves", "SystemExit: 3"),
+    ("segfaults", "the worker process ended by SIGSEGV, 2 times"),
+    pytest.param("hangs", "stopped at the time limit of 30 s", marks=pytest.mark.slow),
+])  # fmt: skip
+def test_an_identifier_that_misbehaves_fails_alone(write_study, tmp_path, bad_identifiers, undisturbed, name, words):
+    file = write_study(1, change=(CHAIN, f'name = "{name}"\nnoise_deg_s = 0.3'))
+    told = {"jobs": 2, "out": tmp_path / "out", "plugins": [f"{bad_identifiers}:{name}"], "only": "row 1",
+            "time_limit": 30.0 if name == "hangs" else 600.0}  # fmt: skip
+    found = run_study(file, **told)
+    failed = found.runs[found.runs["status"] == "failed"]
+    assert list(failed["identifier"]) == [name]
+    assert words in failed["error"].iloc[0]
+    done = found.runs[found.runs["status"] == "done"]["run"]
+    assert len(done) == RUNS_A_SEED / 2 - 2
+    assert set(done) < set(undisturbed.runs["run"])
+    assert found.study["n_failed"] == 1
+    # it has failed, and is not tried again unless someone asks for it
+    assert run_study(file, **told).runs.equals(found.runs)
+
+
+def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(write_study, tmp_path, bad_identifiers):
+    mine = tmp_path / "mine.py"
+    shutil.copy(bad_identifiers, mine)
+    file = write_study(1, change=(CHAIN, 'name = "raises"'))
+    told = {"jobs": 1, "out": tmp_path / "out", "plugins": [f"{mine}:raises"]}
+    first = run_study(file, **told)
+    retried = run_study(file, **told, retry=True)
+    assert list(retried.runs["run"]) == list(first.runs["run"])
+    kept = first.runs["status"] == "done"
+    assert retried.runs[kept].equals(first.runs[kept])
+    assert not retried.runs["started_at"].equals(first.runs["started_at"]) or retried.runs["seconds"].iloc[-1] > 0
+    with open(mine, "a", encoding="utf-8") as text:
+        text.write("\n# mended\n")
+    from armid.study.known import load_known
+
+    assert load_known(told["plugins"]).own("identifiers", "raises+bobyqa") != {}
+    changed = run_study(file, **told)
+    same = set(changed.runs["run"]) & set(first.runs["run"])
+    assert same == set(first.runs[kept]["run"])
+
+
+def test_a_worker_that_cannot_start_is_told(write_study, tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    with pytest.raises(ArmidError, match="a worker process cannot start: it ends with code 1"):
+        run_study(write_study(), jobs=1, out=tmp_path / "out")
