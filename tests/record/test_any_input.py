@@ -25,6 +25,7 @@ role = "train"
 start_angle_deg = -48.0
 target_angle_deg = 22.0
 shell = true
+supply_V = 28.0
 window_s = [0.0, 0.7]
 [records.constants]
 R = 0.5

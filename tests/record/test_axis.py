@@ -6,7 +6,6 @@ import pytest
 from armid.model import ArmidError, Input, Manoeuvre, Plant
 from armid.model.plants.driven_axis import driven_axis
 from armid.record import read_campaign
-from armid.record.pieces import smoothed
 
 DEGREE = np.pi / 180
 HOLDOUT = '\n[[records]]\nfile = "hold.csv"\nrole = "holdout"\n'
@@ -83,33 +82,15 @@ def test_restarts_cut_pieces_from_measured_states(write_axis, axis_columns):
         assert state["start_position"] == pytest.approx(axis_columns["position_m"][piece.start_index], abs=3e-7)
 
 
-def test_restarts_without_position_start_at_zero(write_axis, axis_columns):
+def test_an_axis_without_gravity_needs_no_position(write_axis, axis_columns):
     columns = {name: values for name, values in axis_columns.items() if name != "position_m"}
     record = read_campaign(write_axis("restart_s = 2.5\n", columns)).records[0]
-    assert [p.manoeuvre.constants["start_position"] for p in record.pieces] == [0.0, 0.0]
+    assert ["start_position" in p.manoeuvre.constants for p in record.pieces] == [False, False]
 
 
 def test_window_of_a_restarted_record_leaves_pieces_out(write_axis):
     record = read_campaign(write_axis("restart_s = 1.0\nwindow_s = [1.5, 2.005]\n")).records[0]
     assert [(p.start_index, p.window) for p in record.pieces] == [(1000, slice(500, 1000))]
-
-
-def test_smoothing_takes_the_noise_off_a_moving_start():
-    rng = np.random.default_rng(3)
-    times = np.arange(200) / 1000
-    first, middle = [], []
-    for _ in range(400):
-        speed = 1.0 + 5.0 * times + rng.normal(0, 0.1, times.size)
-        first.append(smoothed(speed, 0, 0.001, 1) - 1.0)
-        middle.append(smoothed(speed, 100, 0.001, 1) - 1.5)
-    # of 21 samples: sqrt(4/21) of the noise at the end of a straight line, sqrt(1/21) in its middle
-    assert np.std(first) == pytest.approx(0.1 * np.sqrt(4 / 21), rel=0.2)
-    assert np.std(middle) == pytest.approx(0.1 * np.sqrt(1 / 21), rel=0.2)
-    assert abs(np.mean(first)) < 0.01
-
-
-def test_slow_samples_are_not_smoothed():
-    assert smoothed(np.array([1.0, 5.0, 2.0, 8.0]), 1, 0.05, 1) == 5.0
 
 
 def test_named_inputs_win_and_degrees_become_radians(write, axis_columns):

@@ -27,6 +27,7 @@ role = "train"
 start_angle_deg = -48.0
 target_angle_deg = 22.0
 shell = true
+supply_V = 28.0
 {lower}
 
 [[records]]
@@ -88,17 +89,17 @@ def test_constants_are_laid_over_each_other(write_two):
     first, second = campaign.records
     assert first.constants["K_p"] == second.constants["K_p"] == 250.0
     assert (first.constants["R"], second.constants["R"]) == (0.5, 0.6)
-    assert "U" not in first.constants
-    assert second.constants["U"] == 24.0
+    assert (first.constants["U"], second.constants["U"]) == (28.0, 24.0)
     assert (first.constants["shell"], second.constants["shell"]) == (1.0, 0.0)
     assert second.constants["theta_C"] == pytest.approx(-40 * DEGREE)
     assert first.pieces[0].manoeuvre.constants == first.constants
 
 
 def test_a_required_key_may_be_a_constant(write, arm_columns):
-    folder = write('name="a"\nplant="shell_transfer_arm"\n[constants]\ntheta_C = -0.8\ntheta_D = 0.3\n[[records]]\n'
-                   'file="lower.csv"\nrole="train"\n')  # fmt: skip
-    assert read_campaign(folder).records[0].constants == {"theta_C": -0.8, "theta_D": 0.3}
+    constants = "theta_C = -0.8\ntheta_D = 0.3\nU = 28\nshell = 1\n"
+    folder = write(f'name="a"\nplant="shell_transfer_arm"\n[constants]\n{constants}[[records]]\nfile="lower.csv"\n'
+                   'role="train"\n')  # fmt: skip
+    assert read_campaign(folder).records[0].constants == {"theta_C": -0.8, "theta_D": 0.3, "U": 28.0, "shell": 1.0}
 
 
 @pytest.mark.parametrize("text", [

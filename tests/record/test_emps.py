@@ -50,7 +50,8 @@ def test_campaign_of_a_synthetic_set(emps, tmp_path):
     np.testing.assert_array_equal(record.columns["position_m"], set_["qm"].ravel())
     # away from the ends, where the filter has both sides, the velocity is true to a hundredth of a per cent
     np.testing.assert_allclose(record.measured[50:-50], 0.2 * np.cos(2 * times)[50:-50], atol=3e-5)
-    assert record.pieces[0].manoeuvre.constants["start_speed"] == pytest.approx(0.2, abs=1e-3)
+    # at the ends the filter has one side only
+    assert record.pieces[0].manoeuvre.constants["start_speed"] == pytest.approx(0.2, abs=2e-3)
     text = (tmp_path / "out" / "campaign.toml").read_text()
     assert "Butterworth low-pass of order 4 at 100 Hz" in text
     assert "Janot" in text

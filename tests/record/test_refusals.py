@@ -47,7 +47,7 @@ def assert_says(message, fragments):
 
 
 CSV = {
-    "missing speed": (csv("time_s,current_A"), ["lower.csv, line 1", "no speed column", "'current_A'",
+    "missing speed": (csv("time_s,current_A"), ["campaign/lower.csv, line 1", "no speed column", "'current_A'",
                                                 "angular_velocity_deg_s"]),
     "time alone": (csv("time_s", [r.split(",")[0] for r in ROWS]), ["lower.csv, line 1", "no speed column",
                                                                       "angular_velocity_deg_s"]),
@@ -102,6 +102,12 @@ TOML = {
                             ["campaign.toml, record 'lower.csv'", "'target_angel_deg'", "mean 'target_angle_deg'"]),
     "misspelt shared record key": (GOOD + "windows_s = [0.0, 0.7]", ["'windows_s'", "did you mean 'window_s'"]),
     "misspelt required key": (GOOD.replace("role =", "rol ="), ["'lower.csv'", "'rol'", "did you mean 'role'"]),
+    "supply not said": (GOOD.replace("supply_V = 28.0", ""),
+                        ["campaign/campaign.toml, record 'lower.csv'", "'supply_V' is missing", "U under [constants]"]),
+    "no word of the shell": (GOOD.replace("shell = true", ""), ["'shell' is missing", "true or false"]),
+    "no stroke": (GOOD.replace("22.0", "-48.0"), ["target_angle_deg is -48", "a motion is expected"]),
+    "fixed and bounded": (GOOD.replace("[[records]]", "[parameters.n]\nlow = 1.0\nfixed = 1.4\n[[records]]"),
+                          ["campaign/campaign.toml, parameters.n", "'fixed' and a bound", "expected"]),
     "missing name": (GOOD.replace('name = "c00"', ""), ["campaign.toml", "'name'", "missing"]),
     "missing records": ('name = "a"\nplant = "driven_axis"', ["campaign.toml", "'records'", "missing", "[[records]]"]),
     "no records": ('name = "a"\nplant = "driven_axis"\nrecords = []', ["'records'", "[]", "[[records]]"]),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Plant, nearest
-from armid.record.campaign_file import campaign_path, load_toml, record_path
+from armid.record.campaign_file import campaign_path, folder_name, load_toml, record_path
 from armid.record.columns import DEGREE
 from armid.record.override import overrides_of
 from armid.record.pieces import with_window
@@ -71,8 +71,9 @@ def read_campaign(
     Raises ArmidError with one sentence (file, line or key, found, expected) for whatever cannot be used.
     """
     toml = campaign_path(path)
-    where = toml.name
-    sheet = validated(CampaignSheet, load_toml(toml), where)
+    folder = folder_name(toml)
+    where = f"{folder}{toml.name}"
+    sheet = validated(CampaignSheet, load_toml(toml, where), where)
     if sheet.plant not in plants:
         raise unknown_name("plant", sheet.plant, plants, where)
     check_effects(sheet.effects, effects, where)
@@ -80,14 +81,14 @@ def read_campaign(
     entries = [validated(RecordSheet, entry, place(entry, i, where), keys) for i, entry in enumerate(sheet.records)]
     check_entries(entries, where)
     gyro_range = None if sheet.gyro_range_deg_s is None else sheet.gyro_range_deg_s * DEGREE
-    shared = Shared(sheet.constants, sheet.inputs, sheet.hold, gyro_range)
+    shared = Shared(folder, sheet.constants, sheet.inputs, sheet.hold, gyro_range)
     places = [f"{where}, record {shown(entry.file)}" for entry in entries]
     paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
     records = [
         read_record(file, entry, plants[sheet.plant], shared, at)
         for file, entry, at in zip(paths, entries, places, strict=True)
     ]
-    check_units(records)
+    check_units(records, folder)
     plant = scaled(plants[sheet.plant].for_unit(records[0].unit), records, where)
     return Campaign(
         name=sheet.name,
@@ -130,21 +131,21 @@ def check_entries(entries: Sequence[RecordSheet], where: str) -> None:
         raise ArmidError(f"{where}: no record has the role 'train', at least one is expected")
 
 
-def check_units(records: Sequence[Record]) -> None:
+def check_units(records: Sequence[Record], folder: str) -> None:
     """Refuse records of which one tells an angular and one a linear speed."""
     for record in records:
         if record.unit != records[0].unit:
-            raise ArmidError(f"{record.file}: the speed is in {record.unit}, {records[0].unit} is expected as in "
-                             f"{records[0].file}")  # fmt: skip
+            raise ArmidError(f"{folder}{record.file}: the speed is in {record.unit}, {records[0].unit} is expected "
+                             f"as in {records[0].file}")  # fmt: skip
 
 
 def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
-    """Return the plant with the sizes of effort and speed that its train records show.
+    """Return the plant with the sizes of effort and speed that its train records show, where it asks for that.
 
-    A plant from rest declares them. For an axis: effort = max |gain x drive|, the moment of gravity where the drive
-    rests, and speed = max |measured speed|; a holdout record has no say.
+    Effort = max |gain x drive|, the moment of gravity where the drive rests, and speed = max |measured speed|; a
+    holdout record has no say.
     """
-    if plant.from_rest:
+    if not plant.scales_from_records:
         return plant
     train = [r for r in records if r.role == "train"]
     speed = max(float(np.max(np.abs(r.measured))) for r in train)

@@ -26,27 +26,34 @@ def campaign_path(path: str | Path) -> Path:
     return Path(path) / NAME
 
 
-def load_toml(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file.
+def folder_name(toml: Path) -> str:
+    """Return what messages put before the files of a campaign: `c00/`."""
+    name = toml.parent.name or toml.parent.resolve().name
+    return f"{name if name.isprintable() else shown(name)}/" if name else ""
+
+
+def load_toml(path: Path, named: str = "") -> dict[str, Any]:
+    """Return the tables of a TOML file; named: how messages name it, "": by its own name.
 
     Raises ArmidError, with the line, for what is no UTF-8 text or no TOML.
     """
+    where = named or path.name
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise ArmidError(f"{path.name} cannot be read: {error.strerror or error}") from error
+        raise ArmidError(f"{where} cannot be read: {error.strerror or error}") from error
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
-        raise ArmidError(f"{path.name}, line {line}: not readable as text, TOML in UTF-8 is expected") from error
+        raise ArmidError(f"{where}, line {line}: not readable as text, TOML in UTF-8 is expected") from error
     try:
         return tomllib.loads(text)
     except RecursionError as error:
-        raise ArmidError(f"{path.name} is nested too deeply, plain tables of TOML are expected") from error
+        raise ArmidError(f"{where} is nested too deeply, plain tables of TOML are expected") from error
     except ValueError as error:
         # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
-        raise ArmidError(f"{path.name} is no valid TOML: {str(error)[:200]}") from error
+        raise ArmidError(f"{where} is no valid TOML: {str(error)[:200]}") from error
 
 
 def record_path(folder: Path, file: str, where: str) -> Path:

@@ -44,8 +44,8 @@ def time_column(table: Table) -> Array:
     return times
 
 
-def speed_column(table: Table) -> tuple[str, str]:
-    """Return the header of the recorded speed and its SI unit.
+def speed_column(table: Table, units: Sequence[str]) -> tuple[str, str]:
+    """Return the header of the recorded speed and its SI unit; units: those that the plant can record.
 
     Raises ArmidError unless exactly one of the known headers is there.
     """
@@ -54,7 +54,7 @@ def speed_column(table: Table) -> tuple[str, str]:
         raise ArmidError(f"{table.file}, line 1: {' and '.join(found)} are both there, exactly one speed column is "
                          "expected")  # fmt: skip
     if not found:
-        raise missing(table, "speed column", SPEEDS)
+        raise missing(table, "speed column", [name for name, (unit, _) in SPEEDS.items() if unit in units])
     return found[0], SPEEDS[found[0]][0]
 
 

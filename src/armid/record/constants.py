@@ -51,12 +51,15 @@ def key_value(key: ManoeuvreKey, value: object, where: str) -> float:
 
 
 def check_key(key: ManoeuvreKey, constants: Mapping[str, float], where: str) -> None:
-    """Refuse a manoeuvre without a required key, or outside the machine's travel."""
+    """Refuse a manoeuvre without a required key, outside the machine's travel, or without a motion."""
     if key.constant not in constants:
         if key.required:
-            raise ArmidError(f"{where}: key '{key.key}' is missing, {range_of(key)} is expected")
+            raise ArmidError(f"{where}: key '{key.key}' is missing, {range_of(key)} is expected, here or as "
+                             f"{key.constant} under [constants]")  # fmt: skip
         return
     value = constants[key.constant] / key.factor
+    if key.unlike and constants[key.constant] == constants.get(key.unlike):
+        raise ArmidError(f"{where}: {key.key} is {value:.9g}, where the record starts: a motion is expected")
     slack = ROUNDING * abs(value)
     low = key.low if key.low is not None else -LARGEST / abs(key.factor)
     high = key.high if key.high is not None else LARGEST / abs(key.factor)

@@ -13,16 +13,16 @@ FINEST_STEP = 1e-6
 ORDERS = range(3, 9)
 
 
-def noise_of(rest: Array, motion: Array, interval: float) -> Noise:
+def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = None) -> Noise:
     """Return the noise of a record.
 
     rest: samples before the motion [unit], (n_rest,); with fewer than 50 of them the differences of `motion` [unit],
-    (n_rows,), are used. interval: between the samples of rest [s]. A signal that moves in coarse steps has at least
-    the noise step/sqrt(12), also where rest shows none.
+    (n_rows,), are used. interval: between the samples of rest [s]. times: of the motion [s], (n_rows,), where they are
+    irregular. A signal that moves in coarse steps has at least the noise step/sqrt(12), also where rest shows none.
     """
     floor = quantisation_step(motion) / np.sqrt(12.0)
     if rest.size < FEWEST_REST_SAMPLES:
-        return Noise(max(difference_rms(motion), floor), None, 0.0, 1.0, motion.size, "differences")
+        return Noise(max(difference_rms(motion, times), floor), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
     deviations = rest - mean if np.ptp(rest) > 0 else np.zeros_like(rest)
@@ -48,20 +48,44 @@ def correlation_sum(deviations: Array) -> float:
     return float(np.sum(correlation[: small[0] if small.size else None]))
 
 
-def difference_rms(motion: Array) -> float:
+def difference_rms(motion: Array, times: Array | None = None) -> float:
     """Return the rms of what high differences leave of a motion [unit]; white noise is assumed.
 
     The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
     where the next order gives less than a tenth of it, it still saw the motion (low-passed noise falls less fast) and
     the next is taken. The median of the absolute values keeps the transients of the motion out.
+    times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
     """
     estimates = []
     for order in ORDERS:
-        differences = np.abs(np.diff(motion, n=order))
-        estimates.append(1.4826 * float(np.median(differences)) / np.sqrt(comb(2 * order, order)))
+        differences = even_differences(motion, order) if times is None else divided_differences(motion, times, order)
+        estimates.append(1.4826 * float(np.median(np.abs(differences))))
         if len(estimates) > 1 and estimates[-1] > 0.1 * estimates[-2]:
             return float(estimates[-2])
     return float(estimates[-1])
+
+
+def even_differences(values: Array, order: int) -> Array:
+    """Return the k-th differences, scaled so that white noise keeps its rms, shape (n - order,)."""
+    return np.asarray(np.diff(values, n=order) / np.sqrt(comb(2 * order, order)))
+
+
+def divided_differences(values: Array, times: Array, order: int) -> Array:
+    """Return what each order + 1 neighbours at irregular times hold beyond a polynomial of degree order - 1.
+
+    sum_j c_j x_j with c_j = 1 / prod_i (t_j - t_i) and sum c_j^2 = 1, so that white noise keeps its rms.
+    values, times [s]: shape (n,); returns (n - order,).
+    """
+    n, unit = values.size - order, float(np.median(np.diff(times)))
+    total, squares = np.zeros(n), np.zeros(n)
+    for j in range(order + 1):
+        weight = np.ones(n)
+        for i in range(order + 1):
+            if i != j:
+                weight *= unit / (times[j : j + n] - times[i : i + n])
+        total += weight * values[j : j + n]
+        squares += weight**2
+    return total / np.sqrt(squares)
 
 
 def quantisation_step(motion: Array) -> float:

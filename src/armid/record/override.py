@@ -16,7 +16,8 @@ def overrides_of(
     tables: [parameters] of the file; an effect's parameter is written [parameters."coulomb.level"] or
     [parameters.coulomb.level]. plant: with its scales set. effects: all that are known, used or not.
 
-    Raises ArmidError for an unknown parameter, an unknown key, and bounds of which low is not below high.
+    Raises ArmidError for an unknown parameter, an unknown key, bounds of which low is not below high, and bounds of a
+    parameter that is fixed.
     """
     known = known_parameters(plant, effects)
     overrides = {}
@@ -47,7 +48,12 @@ def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
 
 
 def check_bounds(override: Override, declared: Parameter, where: str) -> None:
-    """Refuse bounds that leave nothing between them, the declared one (SI) standing for one that is not given."""
+    """Refuse bounds that leave nothing between them, and bounds beside a fixed value, which would not count.
+
+    The declared bound (SI) stands for one that is not given.
+    """
+    if override.fixed is not None and (override.low, override.high) != (None, None):
+        raise ArmidError(f"{where}: 'fixed' and a bound are both there, a fixed value or bounds are expected")
     low = declared.low if override.low is None else override.low
     high = declared.high if override.high is None else override.high
     if not low < high:

@@ -8,35 +8,11 @@ from numpy.typing import NDArray
 
 from armid.model import ArmidError, Manoeuvre
 from armid.record.record import Piece, Record
+from armid.record.start import Track, state_at
 from armid.record.timing import FEWEST_SAMPLES
 
 Array = NDArray[np.float64]
-SMOOTHING_S = 0.02
 SLACK = 1e-3
-
-
-def smoothed(values: Array, index: int, interval: float, degree: int) -> float:
-    """Return the value at one sample, smoothed over 20 ms.
-
-    A polynomial (a straight line for a speed, a parabola for a position: a plain mean would lag behind the motion) is
-    fitted to the samples 10 ms before and after; at the ends of a record to the first or last 20 ms. Where 20 ms hold
-    too few samples to smooth, the measured value itself is returned.
-    """
-    width = int(min(SMOOTHING_S / interval + SLACK, values.size - 1))
-    low = min(max(index - width // 2, 0), values.size - 1 - width)
-    if width + 1 < degree + 2:
-        return float(values[index])
-    offsets = (np.arange(low, low + width + 1) - index) / width
-    terms = np.vander(offsets, degree + 1)
-    return float(np.linalg.lstsq(terms, values[low : low + width + 1])[0][-1])
-
-
-def start_state(speed: Array, position: Array | None, index: int, interval: float) -> dict[str, float]:
-    """Return the constants `start_position` and `start_speed` (SI) for a start at one sample of a record."""
-    return {
-        "start_position": 0.0 if position is None else smoothed(position, index, interval, 2),
-        "start_speed": smoothed(speed, index, interval, 1),
-    }
 
 
 def piece_length(restart_s: float, interval: float, n_samples: int, where: str) -> int:
@@ -54,9 +30,10 @@ def piece_length(restart_s: float, interval: float, n_samples: int, where: str) 
     return length
 
 
-def part(manoeuvre: Manoeuvre, measured: Array, start: int, length: int, state: Mapping[str, float]) -> Piece:
-    """Return the piece of `length` samples that starts at a sample from a state."""
+def part(manoeuvre: Manoeuvre, measured: Array, start: int, length: int, tracks: Mapping[str, Track]) -> Piece:
+    """Return the piece of `length` samples that starts at a sample, from the state there that the tracks tell."""
     stop = start + length
+    state, deviation = state_at(tracks, start)
     cut = replace(
         manoeuvre,
         n_samples=length,
@@ -64,15 +41,13 @@ def part(manoeuvre: Manoeuvre, measured: Array, start: int, length: int, state: 
         constants={**manoeuvre.constants, **state},
         inputs={name: values[start:stop] for name, values in manoeuvre.inputs.items()},
     )
-    return Piece(cut, measured[start:stop], slice(0, length), start)
+    return Piece(cut, measured[start:stop], slice(0, length), start, deviation)
 
 
-def restarted(manoeuvre: Manoeuvre, measured: Array, position: Array | None, length: int) -> tuple[Piece, ...]:
+def restarted(manoeuvre: Manoeuvre, measured: Array, tracks: Mapping[str, Track], length: int) -> tuple[Piece, ...]:
     """Return pieces of `length` samples, each from the measured state; an incomplete last one is dropped."""
     starts = range(0, measured.size - length + 1, length)
-    return tuple(
-        part(manoeuvre, measured, s, length, start_state(measured, position, s, manoeuvre.interval)) for s in starts
-    )
+    return tuple(part(manoeuvre, measured, s, length, tracks) for s in starts)
 
 
 def window_samples(record: Record, window_s: Sequence[float] | None, where: str) -> tuple[int, int]:

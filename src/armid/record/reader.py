@@ -19,12 +19,14 @@ from armid.record.columns import (
     time_column,
 )
 from armid.record.constants import record_constants
+from armid.record.grid import moved_onto_grid, onto_grid
 from armid.record.noise import noise_of, smallest_step
-from armid.record.pieces import is_constant, part, piece_length, restarted, start_state, with_window
-from armid.record.record import Record
+from armid.record.pieces import is_constant, part, piece_length, restarted, with_window
+from armid.record.record import Piece, Record
 from armid.record.schema import RecordSheet
+from armid.record.start import POSITION, SPEED, Track, track_of
 from armid.record.table import Table, read_table
-from armid.record.timing import Timing, onto_grid, timing_of
+from armid.record.timing import Timing, timing_of
 
 Array = NDArray[np.float64]
 SATURATED_SAMPLES = 5
@@ -32,8 +34,12 @@ SATURATED_SAMPLES = 5
 
 @dataclass(frozen=True)
 class Shared:
-    """Hold what the records of a campaign have in common: constants (SI), inputs, hold, gyro range [rad/s]."""
+    """Hold what the records of a campaign have in common: constants (SI), inputs, hold, gyro range [rad/s].
 
+    folder: what messages put before the name of a file.
+    """
+
+    folder: str
     constants: Mapping[str, float]
     inputs: Mapping[str, str]
     hold: str
@@ -48,22 +54,22 @@ def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: Shared, wh
 
     Raises ArmidError for all that makes the record unusable.
     """
-    table = read_table(path, sheet.file)
+    table = read_table(path, f"{shared.folder}{sheet.file}")
     times = time_column(table)
-    header, unit = speed_column(table)
+    header, unit = speed_column(table, [p.output_unit for p in (plant, *plant.variants)])
     plant, speed = sibling(plant, unit, table), speed_of(table, header)
-    timing = timing_of(times, plant.from_rest, sheet.file)
+    timing = timing_of(times, plant.from_rest, table.file)
     check_speed(speed, timing, shared.gyro_range, unit, table)
-    position = None if plant.from_rest else position_of(table, unit)
+    irregular = times[timing.first :] if timing.irregularity else None
     others = {name: values for name, values in table.columns.items() if name not in (TIME, header)}
     record = Record(
         file=sheet.file,
         role=sheet.role,
         unit=unit,
         manoeuvre=manoeuvre_of(plant, shared, sheet, table, timing, where=where),
-        measured=onto_grid(speed, times, timing),
+        measured=moved_onto_grid(speed, times, timing),
         rest=speed[: timing.first],
-        noise=noise_of(speed[: timing.first], speed[timing.first :], rest_interval(times, timing)),
+        noise=noise_of(speed[: timing.first], speed[timing.first :], rest_interval(times, timing), irregular),
         pieces=(),
         whole_pieces=(),
         earliest=timing.earliest,
@@ -72,8 +78,8 @@ def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: Shared, wh
         restart_s=sheet.restart_s,
         irregularity=timing.irregularity,
     )
-    on_grid = None if position is None else onto_grid(position, times, timing)
-    return with_window(started(record, plant, on_grid, where), sheet.window_s, where)
+    tracks = {} if plant.from_rest else tracks_of(record, plant, table, speed, timing)
+    return with_window(started(record, plant, tracks, where), sheet.window_s, where)
 
 
 def manoeuvre_of(
@@ -126,36 +132,55 @@ def check_speed(speed: Array, timing: Timing, gyro_range: float | None, unit: st
 
 
 def inputs_of(plant: Plant, sources: Mapping[str, str], table: Table, timing: Timing, hold: str) -> dict[str, Array]:
-    """Return input -> values on the grid, SI; an optional input without a column is 0 throughout."""
-    values = {i.name: np.zeros(timing.n_samples) for i in plant.inputs}
-    for name, header in sources.items():
-        values[name] = onto_grid(table.columns[header] * si_factor(header), table.columns[TIME], timing, hold)
+    """Return input -> values on the grid, SI; an optional input without a column has its default throughout."""
+    values = {}
+    for driven in plant.inputs:
+        header = sources.get(driven.name)
+        if header is None:
+            values[driven.name] = np.full(timing.n_samples, driven.default)
+            continue
+        column = table.columns[header] * si_factor(header)
+        values[driven.name] = onto_grid(column, table.columns[TIME], timing, driven.hold or hold)
     return values
 
 
-def started(record: Record, plant: Plant, position: Array | None, where: str) -> Record:
-    """Return the record with its pieces, each from the state at its first sample.
+def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: str) -> Record:
+    """Return the record with its pieces, each from the state that the tracks tell at its first sample.
 
-    position: [m or rad], (n_samples,), None where the file does not tell it: then every piece starts at 0.
-
-    Raises ArmidError for restarts of a plant that starts from rest, and where gravity needs a position.
+    Raises ArmidError for restarts of a plant that starts from rest.
     """
     manoeuvre, measured = record.manoeuvre, record.measured
-    if plant.from_rest:
-        if record.restart_s is not None:
-            raise ArmidError(f"{where}: restart_s is given, but plant '{plant.name}' starts at rest: a record without "
-                             "restarts is expected")  # fmt: skip
-        return replace(record, whole_pieces=(part(manoeuvre, measured, 0, measured.size, {}),))
-    if position is None and gravity_of(plant, manoeuvre.constants) != 0:
-        headers = " or ".join(name for name, (unit, _) in POSITIONS.items() if unit == record.unit)
-        raise ArmidError(f"{record.file}, line 1: gravity_moment is not 0, so the start needs a position: a column "
-                         f"{headers} is expected")  # fmt: skip
-    state = start_state(measured, position, 0, manoeuvre.interval)
-    record = replace(record, manoeuvre=replace(manoeuvre, constants={**manoeuvre.constants, **state}))
+    if plant.from_rest and record.restart_s is not None:
+        raise ArmidError(f"{where}: restart_s is given, but plant '{plant.name}' starts at rest: a record without "
+                         "restarts is expected")  # fmt: skip
     if record.restart_s is None:
-        return replace(record, whole_pieces=(part(manoeuvre, measured, 0, measured.size, state),))
-    length = piece_length(record.restart_s, manoeuvre.interval, measured.size, where)
-    return replace(record, whole_pieces=restarted(manoeuvre, measured, position, length))
+        pieces: tuple[Piece, ...] = (part(manoeuvre, measured, 0, measured.size, tracks),)
+    else:
+        length = piece_length(record.restart_s, manoeuvre.interval, measured.size, where)
+        pieces = restarted(manoeuvre, measured, tracks, length)
+    # the first piece starts where the record does
+    from_there = replace(manoeuvre, constants=pieces[0].manoeuvre.constants)
+    return replace(record, manoeuvre=from_there, whole_pieces=pieces)
+
+
+def tracks_of(record: Record, plant: Plant, table: Table, speed: Array, timing: Timing) -> dict[str, Track]:
+    """Return the signals from which the start constants that the plant declares are taken.
+
+    speed: as in the file, SI, (n_rows,).
+
+    Raises ArmidError where a position is needed and the file has none. An axis without gravity needs none: it starts at
+    its default.
+    """
+    declared = {c.name for c in plant.constants}
+    position, times = position_of(table, record.unit), table.columns[TIME]
+    tracks = {SPEED: track_of(speed, times, timing)} if SPEED in declared else {}
+    if POSITION in declared and position is not None:
+        tracks[POSITION] = track_of(position, times, timing)
+    elif POSITION in declared and ("gravity_moment" not in declared or gravity_of(plant, record.constants) != 0):
+        why = "gravity_moment is not 0" if "gravity_moment" in declared else f"plant '{plant.name}' declares it"
+        headers = " or ".join(name for name, (unit, _) in POSITIONS.items() if unit == record.unit)
+        raise ArmidError(f"{table.file}, line 1: the start needs a position, as {why}: a column {headers} is expected")
+    return tracks
 
 
 def gravity_of(plant: Plant, constants: Mapping[str, float]) -> float:

@@ -51,12 +51,15 @@ class Piece:
 
     manoeuvre: from the piece's first sample on. measured: [rad/s or m/s], (n_samples,), the same grid.
     window: the samples that fitness and errors see. start_index: sample of the record at which the piece begins.
+    start_deviation: constant (`start_position`, `start_speed`) -> standard deviation of its measured value, SI; empty
+    for a machine that starts from its declared state.
     """
 
     manoeuvre: Manoeuvre
     measured: Array
     window: slice
     start_index: int = 0
+    start_deviation: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def n_samples(self) -> int:

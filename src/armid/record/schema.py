@@ -2,11 +2,14 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from armid.model import ArmidError, nearest
 from armid.record.kinds import Kind, KindError, above_zero, any_table, list_of, number, one_of, part, table_of, text
 from armid.record.shown import shown
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 def key(kind: Kind, expected: str) -> dict[str, Any]:
@@ -65,7 +68,7 @@ class Override:
     fixed: float | None = field(default=None, metadata=BOUND)
 
 
-SheetT = TypeVar("SheetT", RecordSheet, CampaignSheet, Override)
+SheetT = TypeVar("SheetT", bound="DataclassInstance")
 
 
 def validated(sheet: type[SheetT], table: object, where: str, further: Collection[str] = ()) -> SheetT:

@@ -45,8 +45,8 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     """Find the even grid of a record.
 
     times: increasing [s], shape (n_rows,). from_rest: the grid begins at t = 0 exactly (samples before are rest), else
-    at the first sample. The interval is the slope of the times where they are even but for their rounding, else the
-    median interval. Warns with IrregularSamplingWarning when they are not.
+    at the first sample. The interval is the slope of the times where they are even but for rounding and jitter, else
+    the median interval. Warns with IrregularSamplingWarning when they are not.
 
     Raises ArmidError for fewer than 20 samples after the start, a plant from rest whose record starts late, intervals
     too short to be seconds, and times that are mostly gaps.
@@ -67,22 +67,6 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     if irregularity is not None:
         tell(irregularity, motion, interval, file)
     return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
-
-
-def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear") -> Array:
-    """Return a column on the even grid, shape (n_samples,), from values and times, both (n_rows,).
-
-    Samples that are on the grid are kept. Else between samples: a straight line, whose error is interval^2/8 times the
-    curvature and which never overshoots at the kinks of a record; `hold` "zero" keeps the last value instead.
-    """
-    if not timing.resampled:
-        return np.ascontiguousarray(values[timing.first :])
-    grid = timing.start + timing.interval * np.arange(timing.n_samples)
-    if hold == "zero":
-        # a sample counts from a thousandth of an interval before its time on, so that rounding does not delay it
-        rows = np.searchsorted(times, grid + EVEN * timing.interval, side="right") - 1
-        return np.ascontiguousarray(values[np.maximum(rows, 0)])
-    return np.asarray(np.interp(grid, times, values), dtype=np.float64)
 
 
 def first_row(times: Array) -> int:
@@ -108,8 +92,10 @@ def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
         raise ArmidError(f"{file}: the samples are {interval:.3g} s apart, at least {SHORTEST_INTERVAL:g} s is "
                          "expected")  # fmt: skip
     tolerance = max(EVEN * interval, 0.75 * printed_resolution(times, interval))
-    even = bool(np.max(np.abs(times - middle - interval * index)) <= tolerance)
-    return interval if even else float(np.median(np.diff(times))), tolerance, even
+    off = float(np.max(np.abs(times - middle - interval * index)))
+    even = off <= tolerance
+    # where only jitter is there, each row has its own sample of the grid
+    return interval if even or off < 0.5 * interval else float(np.median(np.diff(times))), tolerance, even
 
 
 def printed_resolution(times: Array, interval: float) -> float:
@@ -144,13 +130,13 @@ def tell(irregularity: Irregularity, times: Array, interval: float, file: str) -
 
 
 def grid_size(times: Array, start: float, interval: float, file: str) -> int:
-    """Return the number of grid samples up to the last measured one; refuse a grid that is mostly gaps."""
+    """Return the number of grid samples, the last at most half an interval off; refuse a grid that is mostly gaps."""
     length = float(times[-1]) - start
     size = length / interval
     if size > MOST_FILLING * times.size:
         raise ArmidError(f"{file}: {times.size} samples at a median interval of {interval:.3g} s leave most of "
                          f"{length:.6g} s unmeasured, a record without such gaps is expected")  # fmt: skip
-    return int(size + EVEN) + 1
+    return int(size + 0.5) + 1
 
 
 def check_number(n_samples: int, after: str, file: str) -> None:

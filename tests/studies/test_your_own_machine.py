@@ -1,0 +1,140 @@
+"""A stranger's machine: a plant outside of the package, irregular records, its own gains, sagging supply, drive off."""
+
+import json
+import re
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+from armid.cli.main import main
+from armid.contract import check_thing
+from armid.model import Model
+from armid.problem import replays, space_of
+from armid.record import IrregularSamplingWarning, read_campaign
+from armid.registry import load_registry
+
+TRUTH = {"inertia": 0.8, "motor_constant": 1.6, "boom_moment": 4.0, "load_friction.share": 0.15,
+         "output_lag.time_constant": 0.012}  # fmt: skip
+pytestmark = pytest.mark.filterwarnings("ignore::armid.record.IrregularSamplingWarning")
+
+
+@pytest.fixture(scope="module")
+def folder(root):
+    return root / "studies" / "your_own_machine"
+
+
+@pytest.fixture(scope="module")
+def plugin(folder):
+    return f"{folder / 'plant.py'}:boom"
+
+
+@pytest.fixture(scope="module")
+def identified(folder, plugin, tmp_path_factory):
+    """Return a function that identifies the campaign with some effects and returns the result."""
+
+    def run(effects):
+        out = tmp_path_factory.mktemp("boom")
+        command = ["identify", str(folder / "campaign"), "--plugin", plugin, "--identifier", "least_squares",
+                   "--fitness", "rmse", "--budget", "600", "--effects", effects, "--out", str(out)]  # fmt: skip
+        with pytest.raises(SystemExit) as left:
+            main(command)
+        assert left.value.code == 0
+        return json.loads((out / "result.json").read_text())
+
+    return run
+
+
+def test_the_plant_keeps_the_contract(plugin):
+    plant = load_registry([plugin]).plants["boom"]
+    assert [f"{f.name}: {f.sentence}" for f in check_thing("plants", "boom", plant) if not f.passed] == []
+
+
+def test_what_is_read(folder, plugin):
+    campaign = read_campaign(folder / "campaign", load_registry([plugin]).plants)
+    assert [len(campaign.train), len(campaign.holdout)] == [4, 2]
+    # what the plant declares stays, and so does its first input, which is no force
+    assert (campaign.plant.scales.effort, campaign.plant.scales.speed) == (15.0, 4.0)
+    gains = {r.file: (r.constants["kp"], r.constants["kd"]) for r in campaign.records}
+    assert gains["stiff.csv"] == (90.0, 3.0)
+    assert len(set(gains.values())) == 5
+    for record in campaign.records:
+        assert record.irregularity.share > 0.9
+        assert set(record.manoeuvre.inputs) == {"target", "supply", "drive_on"}
+        assert np.min(record.manoeuvre.inputs["supply"]) < 22.5
+        assert np.rad2deg(record.noise.rms) == pytest.approx(0.8, rel=0.12)
+    assert np.max(np.abs(campaign.records[0].manoeuvre.inputs["target"])) == pytest.approx(np.deg2rad(80.0), rel=1e-3)
+    off = campaign.records[3]
+    on = off.manoeuvre.inputs["drive_on"]
+    assert np.sum((on > 0) & (on < 1)) <= 1
+    # the impulse of the switch is where the file has it
+    rows = np.genfromtxt(folder / "campaign" / off.file, delimiter=",", names=True)
+    assert np.sum(on) * off.manoeuvre.interval == pytest.approx(rows["time_s"][rows["drive_on"] == 0][0], abs=2e-5)
+
+
+@pytest.mark.slow
+def test_the_right_effects_find_the_truth(identified):
+    result = identified("load_friction,output_lag")
+    for name, truth in TRUTH.items():
+        found = result["parameters"][name]
+        assert found["low"] < truth < found["high"], name
+        assert found["high"] - found["low"] < 0.03 * truth
+    assert result["error"]["holdout"]["chi2_per_sample"] < 1.0
+    assert not any(p["bound_active"] for p in result["parameters"].values())
+
+
+@pytest.mark.slow
+def test_without_them_the_answer_is_wrong_and_says_so(identified, capsys):
+    result = identified("")
+    motor = result["parameters"]["motor_constant"]
+    assert motor["low"] > 1.15 * TRUTH["motor_constant"]
+    assert result["error"]["holdout"]["chi2_per_sample"] > 30
+    assert "the model lacks something" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_the_loop_finds_both_and_no_more(folder, plugin, tmp_path):
+    command = ["close-loop", str(folder / "campaign"), "--plugin", plugin, "--threads", "1", "--out", str(tmp_path),
+               "--candidates", "load_friction,output_lag,viscous"]  # fmt: skip
+    with pytest.raises(SystemExit) as left:
+        main(command)
+    assert left.value.code == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert [step["effect"] for step in report["steps"]] == ["load_friction", "output_lag"]
+    assert report["verdict"] == "explained"
+
+
+@pytest.mark.slow
+def test_the_records_are_those_of_the_script(folder, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(folder)
+    import make_records
+
+    make_records.main(tmp_path)
+    assert (tmp_path / "campaign.toml").read_text() == (folder / "campaign" / "campaign.toml").read_text()
+    for entry in tomllib.loads((tmp_path / "campaign.toml").read_text())["records"]:
+        made, kept = (np.loadtxt(f / entry["file"], delimiter=",", skiprows=1) for f in (tmp_path, folder / "campaign"))
+        # the last digits are the solver's
+        np.testing.assert_allclose(made, kept, atol=0.021)
+    sys.modules.pop("make_records")
+
+
+def test_the_plant_moves_as_its_records_do(folder, plugin):
+    """At the truth, with both effects, no sample of a record is far off: the stand and the engine agree."""
+    registry = load_registry([plugin])
+    with pytest.warns(IrregularSamplingWarning):
+        campaign = read_campaign(folder / "campaign", registry.plants, registry.effects)
+    model = Model(campaign.plant) + registry.effects["load_friction"] + registry.effects["output_lag"]
+    space = space_of(model, fixed=TRUTH)
+    for replay in replays(campaign.records, model, space):
+        residual = replay.measured - replay.signal(space.complete(np.empty((1, 0))))[0]
+        assert np.max(np.abs(residual)) < 6 * replay.record.noise.rms
+
+
+def test_the_text_names_what_there_is(folder):
+    text = (folder / "README.md").read_text()
+    lines = len((folder / "plant.py").read_text().splitlines())
+    assert f"{lines} lines" in text
+    plant = (folder / "plant.py").read_text()
+    for name in re.findall(r"^def (\w+)|^    (\w+)=", plant, flags=re.M):
+        assert f"`{name[0] or name[1]}`" in text, name
