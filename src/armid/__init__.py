@@ -14,11 +14,19 @@ WHERE = {
     "armid.simulation": ("Schedule", "Simulation", "calibrate", "probes", "simulate"),
     "armid.record": ("Campaign", "Record", "read_campaign", "write_campaign"),
     "armid.fitness": ("FITNESS", "Fitness", "numerical_similarity", "similarity"),
-    "armid.problem": ("IdentificationProblem", "Meter", "MeterTermination", "Space", "replays", "space_of"),
-    "armid.identifiers": ("IDENTIFIERS", "Identifier", "PaperPSO"),
-    "armid.identifiability": ("Information", "information_at", "sensitivities"),
+    "armid.problem": (
+        "IdentificationProblem", "Meter", "MeterTermination", "Space", "replays", "residuals", "space_of",
+    ),
+    "armid.identifiers": ("IDENTIFIERS", "Identifier", "PaperPSO", "identifier_of"),
+    "armid.identifiability": (
+        "Examination", "Information", "Profile", "estimate", "examine", "information_at", "refine", "sensitivities",
+    ),
     "armid.identification": ("Identification", "identify"),
+    "armid.discrepancy": ("ClosedLoop", "close_loop", "report_of"),
     "armid.registry": ("Registry", "load_registry"),
+    "armid.study.results": ("StudyResults", "load_study"),
+    "armid.study.runner": ("run_study",),
+    "armid.study.study": ("Study", "read_study"),
 }  # fmt: skip
 HOME = {name: module for module, names in WHERE.items() for name in names}
 __all__ = sorted(HOME)  # noqa: PLE0605 - the names stand above

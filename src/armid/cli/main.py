@@ -8,10 +8,15 @@ import click
 
 from armid.cli.bench import bench_command
 from armid.cli.check import check_command
+from armid.cli.close_loop import close_loop_command
+from armid.cli.export import export_group
+from armid.cli.identifiability import identifiability_command
 from armid.cli.identify import identify_command
 from armid.cli.importing import import_group
 from armid.cli.listing import list_command
+from armid.cli.report import report_command
 from armid.cli.simulate import simulate_command
+from armid.cli.study import study_command
 from armid.model import ArmidError
 from armid.registry import place_in_plugin
 
@@ -28,7 +33,10 @@ def app() -> None:
     """
 
 
-for command in (simulate_command, identify_command, list_command, check_command, bench_command, import_group):
+for command in (
+    simulate_command, identify_command, close_loop_command, identifiability_command, list_command, check_command,
+    bench_command, study_command, report_command, import_group, export_group,
+):  # fmt: skip
     app.add_command(command)
 
 

@@ -1,0 +1,145 @@
+"""`armid close-loop`: what the declared model lacks, from the records of a campaign."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from armid.cli.new_files import NewFiles, refuse_unwritable
+from armid.cli.options import campaign_argument, effects_option, interval, intervals, model_of, numbers, plugin_option
+from armid.model import ArmidError, Effect, nearest
+
+if TYPE_CHECKING:
+    from armid.discrepancy import ClosedLoop
+
+
+@click.command("close-loop")
+@campaign_argument
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for report.md, report.json and the figures.")
+@effects_option
+@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for; else all that apply.")
+@click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
+@click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
+              help="Free a parameter, of the model or of a candidate, between bounds, SI. Repeatable.")
+@click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
+@click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0),
+              help="Seed of everything random; searches here start from evenly spread points, so that nothing is.")
+@click.option("--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations.")
+@plugin_option
+def close_loop_command(
+    campaign: Path, out: Path, effects: str, candidates: str, without: str, bounds: tuple[str, ...],
+    fix: tuple[str, ...], window: str, seed: int, threads: int, plugins: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Find the effects that the declared model lacks, and report the error before and after.
+
+    Identifies the declared model on the train records, tells whether what remains is more than noise, names the effect
+    that is missing (or says that it cannot), adds it and identifies again, until nothing earns its parameters. Records
+    held out are simulated after the last decision. Every verdict exits with 0.
+    """
+    from numpy.random import default_rng  # noqa: PLC0415 - other commands do not need it
+
+    from armid.discrepancy import close_loop  # noqa: PLC0415 - scipy and compiled code that other commands do not need
+    from armid.record import read_campaign  # noqa: PLC0415
+    from armid.registry import load_registry  # noqa: PLC0415
+
+    registry = load_registry(plugins)
+    read = read_campaign(campaign, registry.plants, registry.effects)
+    if window:
+        read = read.with_window(*interval(window, "--window"))
+    model = model_of(read, effects, registry)
+    wanted = looked_for(registry.effects, candidates, without)
+    given = intervals(bounds, "--bounds"), numbers(fix, "--fix")
+    refuse_unwritable(out)
+    with Status() as status:
+        found = close_loop(model, read, wanted, default_rng(seed), *given, threads=threads, told=status.tell)
+    report(found)
+    write(found, out)
+
+
+def looked_for(effects: dict[str, Effect], candidates: str, without: str) -> dict[str, Effect]:
+    """Return the effects that are candidates.
+
+    Raises ArmidError with the nearest valid name for one that is not known.
+    """
+    chosen = names_of(candidates, "--candidates", effects) or list(effects)
+    left_out = names_of(without, "--without", effects)
+    return {n: effects[n] for n in chosen if n not in left_out}
+
+
+def names_of(text: str, option: str, effects: dict[str, Effect]) -> list[str]:
+    """Return the names in a list of names, each of a known effect."""
+    names = [n.strip() for n in text.split(",") if n.strip()]
+    for name in names:
+        if name not in effects:
+            raise ArmidError(f"{option}: effect '{name}' is not known: {nearest(name, effects)}")
+    return names
+
+
+def report(found: "ClosedLoop") -> None:
+    """Print the table of steps, the parameters, and remarks."""
+    from rich.console import Console  # noqa: PLC0415 - takes time to import
+    from rich.table import Table  # noqa: PLC0415
+
+    from armid.discrepancy.report import error_headers, error_rows  # noqa: PLC0415
+    from armid.discrepancy.words import parameter_rows, remarks, step_headers, step_rows  # noqa: PLC0415
+
+    console = Console(width=None if sys.stdout.isatty() else 140)
+    tables: list[tuple[str, list[str], list[list[str]]]] = [
+        ("Steps", step_headers(found), step_rows(found)),
+        ("Parameters", ["parameter", "before", "after", "trusted"], parameter_rows(found)),
+        ("Errors", error_headers(found), error_rows(found)),
+    ]
+    for title, headers, rows in tables:
+        if rows:
+            shown = Table(*headers, title=title)
+            for row in rows:
+                shown.add_row(*row)
+            console.print(shown)
+    console.print(f"verdict: {found.verdict}", highlight=False)
+    for remark in remarks(found):
+        console.print(f"- {remark}", highlight=False, markup=False)
+
+
+def write(found: "ClosedLoop", out: Path) -> None:
+    """Write report.md, report.json and the figures, all or none."""
+    from armid.discrepancy import report_of  # noqa: PLC0415
+    from armid.discrepancy.figures import FIGURES  # noqa: PLC0415 - takes time to import
+    from armid.discrepancy.report import markdown  # noqa: PLC0415
+
+    with NewFiles(out) as files:
+        files.path("report.json").write_text(json.dumps(report_of(found), indent=2, allow_nan=False) + "\n")
+        files.path("report.md").write_text(markdown(found, list(FIGURES)))
+        for name, draw in FIGURES.items():
+            draw(found, files.path(name))
+    print(f"wrote {', '.join(files.names)} to {out}")
+
+
+class Status:
+    """Show on a terminal what is being done and for how long, nothing elsewhere."""
+
+    def __init__(self) -> None:
+        self.bar: Any = None
+
+    def __enter__(self) -> "Status":
+        if sys.stderr.isatty():
+            from rich.console import Console  # noqa: PLC0415
+            from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+
+            columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
+            self.bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self.task = self.bar.add_task("identifying the declared model (compiling at first)", total=None)
+            self.bar.start()
+        return self
+
+    def tell(self, sentence: str) -> None:
+        """Show what is being done."""
+        if self.bar is not None:
+            self.bar.update(self.task, description=sentence)
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.stop()

@@ -1,0 +1,81 @@
+"""Effects that these records cannot tell apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.discrepancy.fit import Fit, span
+from armid.discrepancy.library import Library, idle
+from armid.discrepancy.names import base
+from armid.discrepancy.select import criterion
+
+Array = NDArray[np.float64]
+# Rivals whose refits differ by less than this in the criterion and whose traces correlate above that are one group.
+WITHIN, ALIKE, MOST = 6.0, 0.95, 4
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Hold an effect that would take another's place: by how much the criterion is worse, and how alike the traces."""
+
+    name: str
+    gap: float
+    correlation: float
+
+
+@dataclass(frozen=True)
+class Group:
+    """Hold the effect of a step with its rivals within the criterion.
+
+    alike: those that leave the same trace. unlike: those that do not, but fit nearly as well.
+    """
+
+    name: str
+    alike: tuple[Rival, ...]
+    unlike: tuple[Rival, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effect and what it cannot be told from."""
+        return (self.name, *(r.name for r in self.alike))
+
+    @property
+    def too_big(self) -> bool:
+        """Whether so many effects would do that naming them says nothing."""
+        return len(self.alike) + len(self.unlike) >= MOST
+
+
+def group_of(fit: Fit, key: str, others: Sequence[Fit], library: Library) -> Group:
+    """Return the rivals of one effect of a model: models that differ in that effect alone, within the criterion."""
+    kept = {base(n) for n in fit.active if n != key}
+    mine = trace_of(fit, key)
+    best: dict[str, Rival] = {}
+    for other in others:
+        new = [n for n in other.active if base(n) not in kept]
+        if len(new) != 1 or len(other.active) != len(fit.active) or library.public(new[0]) == library.public(key):
+            continue
+        gap = criterion(other, fit.independent) - criterion(fit, fit.independent)
+        name = library.public(new[0])
+        if gap < WITHIN and (name not in best or gap < best[name].gap):
+            best[name] = Rival(name, float(gap), float(abs(mine @ trace_of(other, new[0]))))
+    rivals = sorted(best.values(), key=lambda r: r.gap)
+    alike = tuple(r for r in rivals if r.correlation > ALIKE)
+    return Group(library.public(key), alike, tuple(r for r in rivals if r not in alike))
+
+
+def trace_of(fit: Fit, key: str) -> Array:
+    """Return the change of the whitened signal by an effect, projected off the other free parameters, of length 1."""
+    model, space = fit.records.replays[0].model, fit.records.space
+    without = fit.candidate
+    for i, name in enumerate(space.names):
+        if name.partition(".")[0] == base(key) and model.parameters[name].null is not None:
+            without[i] = idle(model.parameters[name])
+    signals = fit.records.whole_signals(np.array([fit.candidate, without]))
+    own = [name.partition(".")[0] == base(key) for name in fit.values]
+    basis = span(fit.jacobian[:, ~np.array(own, dtype=np.bool_)]) if own else np.empty((signals.shape[1], 0))
+    change = signals[0] - signals[1]
+    free = change - basis @ (basis.T @ change)
+    length = float(np.linalg.norm(free))
+    return np.asarray(free / length) if length > 0.0 else np.asarray(free)

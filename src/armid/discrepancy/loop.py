@@ -1,0 +1,149 @@
+"""Close the loop: residual, missing effect, extended model, error before and after."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from armid.discrepancy.advise import Advice, advise
+from armid.discrepancy.diagnose import diagnose
+from armid.discrepancy.estimates import estimates, public_model, unseen
+from armid.discrepancy.evidence import evidence_of
+from armid.discrepancy.fit import Fit
+from armid.discrepancy.foresee import Rival
+from armid.discrepancy.group import Group, group_of
+from armid.discrepancy.library import Library, library_of
+from armid.discrepancy.names import base
+from armid.discrepancy.result import (
+    EXPLAINED,
+    NO_DISCREPANCY,
+    PARTLY,
+    TOO_ALIKE,
+    UNEXPLAINED,
+    ClosedLoop,
+    Judgement,
+    Step,
+)
+from armid.discrepancy.search import Level, Search
+from armid.discrepancy.select import criterion
+from armid.discrepancy.view import holdout_view, train_view
+from armid.identification import campaign_errors
+from armid.model import EFFECTS, Effect, Model
+from armid.record import Campaign, Record
+
+MOST_ADVICE = 5
+
+
+def close_loop(
+    model: Model,
+    campaign: Campaign,
+    candidates: Mapping[str, Effect] = EFFECTS,
+    rng: np.random.Generator | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    threads: int = 1,
+    told: Callable[[str], None] = lambda _: None,
+) -> ClosedLoop:
+    """Find what a declared model lacks on the train records of a campaign, and judge it on those held out.
+
+    Identify the declared model; test what remains against noise; score every candidate effect, refit the leading ones,
+    add those that earn their parameters; group what cannot be told apart. Holdout records are simulated after the last
+    decision. Nothing is random: searches start from evenly spread candidates, so that `rng` is not drawn from.
+    candidates: name -> effect; those whose ports the plant does not offer are left out. bounds, fixed: parameter -> SI,
+    of the model or of a candidate. told: called with a sentence before what takes long.
+
+    Raises ArmidError when every candidate of the declared model diverges, and for an unknown parameter.
+    """
+    evidence = evidence_of(campaign.train, model.plant)
+    library = library_of(model, candidates, evidence, campaign.parameters, bounds or {}, fixed or {}, threads, told)
+    search = Search(library)
+    levels = search.run()
+    chosen, groups, refused = settled(levels, search)
+    # Every decision on effects and parameters is made: holdout records are opened here and not before.
+    told("judging on the records held out")
+    path = [levels[0].best, *prefixes(chosen, search)]
+    bends = unseen(levels[0].best, search.trace(levels[0].best), library)
+    judged = [judge(fit, library, campaign.holdout, bends) for fit in path]
+    steps = tuple(step_of(key, judged[i + 1], groups[i], library) for i, key in enumerate(chosen.active))
+    verdict = verdict_of(judged[0], judged[-1], groups, refused)
+    rivals = rivals_of(levels, groups, refused)
+    return ClosedLoop(
+        campaign, float(np.mean([level.rms for level in evidence.levels])), verdict, judged[0], judged[-1], steps,
+        refused, advice_for(rivals, search, levels[-1].best, campaign.gyro_range, told), library, search,
+    )  # fmt: skip
+
+
+def settled(levels: Sequence[Level], search: Search) -> tuple[Fit, list[Group], Group | None]:
+    """Return the largest model none of whose effects could be one of too many, its groups, and what was refused."""
+    refused = None
+    for level in reversed(levels):
+        chosen = search.ordered(level.best)
+        groups = [group_of(chosen, key, level.fits[1:], search.library) for key in chosen.active]
+        big = [g for g in groups if g.too_big]
+        if not big:
+            return chosen, groups, refused
+        refused = refused or big[0]
+    return levels[0].best, [], refused
+
+
+def prefixes(chosen: Fit, search: Search) -> list[Fit]:
+    """Return the fits with the first effect, the first two, and so on, up to the chosen one."""
+    sizes = range(1, len(chosen.active))
+    return [search.reduced(chosen, chosen.active[:n]) for n in sizes] + ([chosen] if chosen.active else [])
+
+
+def judge(
+    fit: Fit, library: Library, holdout: tuple[Record, ...], bends: Mapping[str, Sequence[tuple[float, str]]]
+) -> Judgement:
+    """Return errors, parameters and tests of a fit on train and holdout; bends: see `unseen`."""
+    train, unseen = train_view(fit), holdout_view(fit, holdout, library)
+    diagnosis = diagnose(train)
+    unseen_diagnosis = None if unseen is None else diagnose(unseen)
+    train_error = campaign_errors(train.replays, fit.candidate)
+    assert train_error is not None
+    remains = diagnosis.significant or (unseen_diagnosis is not None and unseen_diagnosis.significant)
+    return Judgement(
+        fit, public_model(fit, library), estimates(fit, library, remains, bends), train, unseen, train_error,
+        None if unseen is None else campaign_errors(unseen.replays, fit.candidate), diagnosis, unseen_diagnosis,
+    )  # fmt: skip
+
+
+def step_of(key: str, after: Judgement, group: Group, library: Library) -> Step:
+    """Return the step that added an effect."""
+    effect = library.originals[base(key)]
+    return Step(effect.name, ", ".join(effect.adds), group.names[1:], False, after, group)
+
+
+def verdict_of(before: Judgement, after: Judgement, groups: Sequence[Group], refused: Group | None) -> str:
+    """Return the verdict in one word."""
+    if refused is not None:
+        return TOO_ALIKE
+    if not groups:
+        return UNEXPLAINED if before.diagnosis.significant else NO_DISCREPANCY
+    if after.significant:
+        return PARTLY
+    return TOO_ALIKE if any(len(g.names) > 1 or g.unlike for g in groups) else EXPLAINED
+
+
+def rivals_of(levels: Sequence[Level], groups: Sequence[Group], refused: Group | None) -> list[tuple[str, ...]]:
+    """Return the names in each group of more than one."""
+    whole = [*groups, *([refused] if refused is not None else [])]
+    return [(g.name, *(r.name for r in (*g.alike, *g.unlike))) for g in whole if g.alike or g.unlike]
+
+
+def advice_for(
+    groups: Sequence[tuple[str, ...]], search: Search, best: Fit, speed_limit: float | None, told: Callable[[str], None]
+) -> tuple[Advice, ...]:
+    """Return the manoeuvres that would tell the first group apart, best first; none where nothing is in doubt."""
+    if not groups:
+        return ()
+    told(f"looking for a manoeuvre that tells {' and '.join(groups[0][:4])} apart")
+    rivals = []
+    for name in groups[0][:4]:
+        fit = search.model_with(name, best)
+        if fit is not None:
+            rivals.append(Rival(name, fit.records, fit.z, criterion(fit, best.independent)))
+    if len(rivals) < 2:
+        return ()
+    level = best.records.evidence.levels[0]
+    found = advise(rivals, lambda signals: level.white(signals, [signals.shape[-1]]), speed_limit=speed_limit)
+    return found[:MOST_ADVICE]

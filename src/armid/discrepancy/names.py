@@ -1,0 +1,33 @@
+"""Keys of the candidates: one for each form of an effect, and a mark on those whose fixed shape was set free."""
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from armid.model import Effect
+
+T = TypeVar("T")
+LOOSE = "+"
+
+
+def base(key: str) -> str:
+    """Return a key without the mark."""
+    return key.removesuffix(LOOSE)
+
+
+def own_name(effect: str, parameter: str) -> str:
+    """Return the qualified name of an effect's parameter."""
+    return f"{effect}.{parameter}"
+
+
+def forms_of(effect: Effect) -> dict[str, Effect]:
+    """Return key -> form: the effect's name for its first form, name and word for the others."""
+    return {effect.name if e is effect else f"{effect.name}_{e.form}": e for e in effect.every_form}
+
+
+def renamed(given: Mapping[str, T], originals: Mapping[str, Effect]) -> dict[str, T]:
+    """Return what is told of parameters, repeated for the keys of every form that has a parameter of that name."""
+    found = dict(given)
+    for key, effect in originals.items():
+        names = {own_name(effect.name, p.name): own_name(key, p.name) for p in effect.parameters}
+        found |= {names[n]: value for n, value in given.items() if n in names}
+    return found

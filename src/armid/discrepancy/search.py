@@ -1,0 +1,205 @@
+"""Look for the effects that the records ask for: one more at a time, a few models of each size kept."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from armid.discrepancy.diagnose import diagnose
+from armid.discrepancy.fit import Fit, fit_from, fit_globally
+from armid.discrepancy.library import Library, idle
+from armid.discrepancy.names import LOOSE, base
+from armid.discrepancy.select import Verdict, compare, criterion
+from armid.discrepancy.trace import Score, accurate, refitted, traced
+from armid.discrepancy.view import train_view
+from armid.model import ArmidError
+
+MOST_EFFECTS = 6
+# Of one size so many models are extended: a strong second effect can mislead the choice of the first.
+BEAM = 3
+# Scores are a linear guess: refit at least and at most so many, and those within a factor of the best.
+FEWEST, MOST, WITHIN = 6, 12, 4.0
+# A drop of chi2 that one candidate in thousands reaches on noise: below it nothing is refitted.
+WORTH = 8.0
+# An addition whose statistic stays below this is not looked at further; one in ten thousand asks for 15.
+PROMISING = 12.0
+N_EXCHANGES = 3
+# Models within this factor of the least chi2 are told apart by the criterion; what they leave has about one character.
+COMPARABLE = 1.5
+# Where no test of what remains is more striking than this, all together, no second effect is looked for: it would need
+# more of the residual than the tests would overlook, and looking costs more than everything before.
+QUIET = 0.1
+# Of so many of the best the fixed shapes are set free: a rival must not lose by the width of a sign alone.
+N_LOOSENED = 4
+LOOSE_STARTS = (0.03, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Hold the models with one number of effects, best first.
+
+    verdict: of the best against the best of the level before, None for the first.
+    """
+
+    fits: tuple[Fit, ...]
+    verdict: Verdict | None = None
+
+    @property
+    def best(self) -> Fit:
+        """The model with the lowest criterion."""
+        return self.fits[0]
+
+
+@dataclass(eq=False)
+class Search:
+    """Extend models until nothing earns its parameters.
+
+    fits: every model that was fitted, by its effects. scores: of the candidates at each of them.
+    """
+
+    library: Library
+    fits: dict[frozenset[str], Fit] = field(default_factory=dict)
+    scores: dict[frozenset[str], list[Score]] = field(default_factory=dict)
+
+    def run(self) -> list[Level]:
+        """Return the levels: the declared model, then those whose best earned its place."""
+        declared = accurate(fit_globally(self.library.problem(()), ()), self.library)
+        self.fits[frozenset()] = declared
+        levels = [Level((declared,))]
+        while len(levels) <= MOST_EFFECTS:
+            level = self.next_level(levels[-1])
+            if level is None or level.verdict is None or not level.verdict.earned:
+                break
+            levels.append(level)
+        return levels
+
+    def next_level(self, last: Level) -> Level | None:
+        """Return the best models with one effect more, None where no candidate is worth a fit."""
+        size = len(last.best.active) + 1
+        if last.best.active and diagnose(train_view(last.best)).p > QUIET:
+            return None
+        self.extend(last.best)
+        if last.best.is_noise and not (self.of_size(size) and promising(last.best, self.of_size(size)[0])):
+            return None
+        for parent in last.fits[1:BEAM]:
+            self.extend(parent)
+        if not self.of_size(size):
+            return None
+        if not promising(self.of_size(size - 1)[0], self.of_size(size)[0]):
+            return None
+        for _ in range(N_EXCHANGES):
+            best = self.of_size(size)[0]
+            self.exchange(best)
+            for fit in self.of_size(size)[:N_LOOSENED]:
+                self.loosen(fit)
+            if self.of_size(size)[0] is best:
+                break
+        smaller, fits = self.of_size(size - 1)[0], self.of_size(size)
+        self.library.told(f"judging {self.shown(fits[0].active)}")
+        verdict = compare(smaller, fits[0], len(self.library.candidates), self.shapes(smaller, fits[0]))
+        return Level(tuple(fits), verdict)
+
+    def shown(self, active: Iterable[str]) -> str:
+        """Return effects as people read them."""
+        return " + ".join(self.library.public(n) for n in active)
+
+    def shapes(self, smaller: Fit, larger: Fit) -> int:
+        """Return how many shapes were searched for what is new in a model."""
+        new = [s.n_shapes for s in self.trace(smaller) if s.name in larger.active and s.name not in smaller.active]
+        return max(new, default=1)
+
+    def exchange(self, best: Fit) -> None:
+        """Take each effect of a model out and look what else would take its place."""
+        for name in best.active:
+            rest = tuple(n for n in best.active if n != name)
+            self.extend(self.reduced(best, rest))
+
+    def reduced(self, fit: Fit, rest: tuple[str, ...]) -> Fit:
+        """Return the fit with some effects only, from the values that they had."""
+        key = frozenset(rest)
+        if key not in self.fits:
+            records = self.library.problem(rest, fit.values)
+            declared, values = records.replays[0].model.parameters, fit.values
+            x = np.array([values.get(n, idle(declared[n])) for n in records.space.free_names])
+            self.fits[key] = accurate(fit_from(records, rest, [records.shares(x)]), self.library)
+        return self.fits[key]
+
+    def loosen(self, fit: Fit) -> None:
+        """Set the fixed shapes of each effect free, such as the speed over which the sign of friction is smoothed.
+
+        A declared width that is not the machine's leaves a residual that another effect would be taken for.
+        """
+        for name in fit.active:
+            key = frozenset(n + LOOSE if n == name else n for n in fit.active)
+            if name.endswith(LOOSE) or not self.library.loosened(name) or key in self.fits:
+                continue
+            active = tuple(n + LOOSE if n == name else n for n in fit.active)
+            records = self.library.problem(active, fit.values)
+            known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
+            z = records.shares(np.array([known[n] for n in records.space.free_names]))
+            free = [n in self.library.loosened(name) for n in records.space.free_names]
+            starts = [np.where(free, share, z) for share in LOOSE_STARTS]
+            self.fits[key] = fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts])
+
+    def extend(self, parent: Fit) -> None:
+        """Fit a model with each of the leading candidates added."""
+        for found in leading(parent, self.trace(parent)):
+            key = frozenset((*parent.active, found.name))
+            if key not in self.fits:
+                self.library.told(f"fitting {self.shown((*parent.active, found.name))}")
+                try:
+                    self.fits[key] = refitted(parent, found, self.library)
+                except ArmidError:
+                    continue
+
+    def trace(self, fit: Fit) -> list[Score]:
+        """Return the scores of the candidates at a fit, best first."""
+        key = frozenset(fit.active)
+        if key not in self.scores:
+            self.scores[key] = traced(fit, self.library)
+        return self.scores[key]
+
+    def ordered(self, fit: Fit) -> Fit:
+        """Return the fit with its effects in the order in which they would be added, the most telling first."""
+        order: list[str] = []
+        while len(order) < len(fit.active):
+            left = [n for n in fit.active if n not in order]
+            each = {n: self.reduced(fit, (*order, n)) if len(order) + 1 < len(fit.active) else fit for n in left}
+            order.append(min(left, key=lambda n: each[n].chi2))
+        return replace(fit, active=tuple(order))
+
+    def model_with(self, name: str, best: Fit) -> Fit | None:
+        """Return the best fit of the same size that holds an effect and differs from the best by no more than it."""
+        known = [f for f in self.of_size(len(best.active)) if name in map(self.library.public, f.active)]
+        near = [f for f in known if len(set(map(base, f.active)) - set(map(base, best.active))) <= 1]
+        return near[0] if near else None
+
+    def of_size(self, size: int) -> list[Fit]:
+        """Return the models with a number of effects, by their criterion, best first."""
+        fits = [f for key, f in self.fits.items() if len(key) == size]
+        return ranked(fits)
+
+
+def ranked(fits: Iterable[Fit]) -> list[Fit]:
+    """Return models by their criterion, best first, with the effective samples of the one with the least chi2."""
+    known = list(fits)
+    if not known:
+        return []
+    least = min(f.chi2 for f in known)
+    n_eff = max(f.independent for f in known if f.chi2 <= COMPARABLE * least)
+    return sorted(known, key=lambda f: criterion(f, n_eff))
+
+
+def leading(parent: Fit, scores: list[Score]) -> list[Score]:
+    """Return the scores that deserve a full fit."""
+    if not scores:
+        return []
+    worth = [s for s in scores if s.drop > WORTH * max(1.0, parent.chi2 / len(parent.residual))]
+    near = [s for s in worth if s.drop * WITHIN >= worth[0].drop]
+    return worth[: max(FEWEST, min(MOST, len(near)))]
+
+
+def promising(smaller: Fit, larger: Fit) -> bool:
+    """Tell whether an addition may come to be significant."""
+    n_eff = max(smaller.independent, larger.independent)
+    return bool(n_eff * np.log(smaller.chi2 / larger.chi2) > PROMISING)

@@ -1,0 +1,77 @@
+"""Tell whether a larger model earns its parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from armid.discrepancy.fit import Fit, fit_from
+from armid.discrepancy.library import with_evidence
+from armid.model import ArmidError
+
+Array = NDArray[np.float64]
+# Chance at which noise alone gets an effect added, all candidates together.
+FAMILYWISE = 1e-3
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Say why a model is preferred to a smaller one, or not.
+
+    gain: fall of the criterion. p: chance of the fall of chi2 from noise alone, corrected for the number of candidates
+    and of shapes. left_out: sums of squares on left-out parts, before and after.
+    """
+
+    gain: float
+    p: float
+    left_out: tuple[float, float]
+
+    @property
+    def earned(self) -> bool:
+        """Whether the larger model is significant, cheaper by the criterion, and no worse on what was left out."""
+        return self.p < FAMILYWISE and self.gain > 0.0 and self.left_out[1] <= self.left_out[0]
+
+
+def criterion(fit: Fit, independent: float) -> float:
+    """Return n_eff ln(chi2) + k ln(n_eff), the Bayesian criterion with effective samples; smaller is better.
+
+    independent: n_eff, the independent samples of the residual of the best model compared. Where that is noise, n_eff
+    is n and differences are those of chi2 + k ln n; where structure remains, few samples are independent and
+    chi2 counts in proportion to what remains: no term is added for ever to a residual that the library cannot explain.
+    """
+    return float(independent * np.log(fit.chi2) + fit.n_free * np.log(independent))
+
+
+def compare(smaller: Fit, larger: Fit, n_candidates: int, n_shapes: int) -> Verdict:
+    """Judge an addition; the left-out parts are fitted again only where the first two conditions hold."""
+    # What an effect yet to be found leaves is slow in the one model and may be fast in the other: the faster counts.
+    n_eff = max(smaller.independent, larger.independent)
+    ratio = n_eff * np.log(smaller.chi2 / larger.chi2)
+    gain = criterion(smaller, n_eff) - criterion(larger, n_eff)
+    # Shape parameters mean nothing at the null, so they count as a grid that was searched, not as degrees of freedom.
+    # The noise of slow signals is known from a rest of so many independent samples, hence F and not chi-square.
+    known = min((level.n_slow for level in larger.records.evidence.levels if level.known), default=n_eff)
+    p = min(1.0, n_candidates * n_shapes * float(f_distribution.sf(max(ratio, 0.0), 1, known)))
+    if p >= FAMILYWISE or gain <= 0.0:
+        return Verdict(float(gain), p, (np.nan, np.nan))
+    return Verdict(float(gain), p, (left_out(smaller), left_out(larger)))
+
+
+def left_out(fit: Fit) -> float:
+    """Return the sum of squares on each manoeuvre (or block of time), left out of the fit in turn.
+
+    Infinite where a fit without a part diverges on it.
+    """
+    return float(sum(left_out_part(fit, part) for part in fit.records.evidence.parts()))
+
+
+def left_out_part(fit: Fit, part: NDArray[np.int64]) -> float:
+    """Return the sum of squares on one part of a fit to the others."""
+    records = fit.records
+    try:
+        again = fit_from(with_evidence(records, records.evidence.without(part)), fit.active, [fit.z])
+    except ArmidError:
+        return float("inf")
+    square = float(np.sum(again.residual[part] ** 2))
+    return square if np.isfinite(square) else float("inf")

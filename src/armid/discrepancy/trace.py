@@ -1,0 +1,204 @@
+"""Score candidate effects at a fit: how far each would bring the residual down, were the records linear in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from armid.discrepancy.evidence import WhiteRecords
+from armid.discrepancy.fit import Fit, fit_from
+from armid.discrepancy.library import Library, idle
+
+Array = NDArray[np.float64]
+# Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
+LEVELS, LEVELS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
+SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
+WIDE = 5.0
+N_TRIED, N_STARTS = 8, 2
+# A fall of chi2 that is not noticed among so many candidates.
+UNSEEN = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Hold what a candidate would do to the residual of a fit.
+
+    drop: predicted fall of chi2. strength: predicted value of its leading parameter as a share of the way from the null
+    to the bound. p: chance of such a drop from noise alone, for one candidate, its grid of shapes counted. starts: free
+    parameters of the extended model from which to refit (shares of the range), best first. n_shapes: grid of shapes.
+    bends: by how much the effect could bend each free parameter unseen, relative to its value, (n_free,).
+    """
+
+    name: str
+    drop: float
+    strength: float
+    p: float
+    starts: tuple[Array, ...]
+    n_shapes: int
+    bends: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Ray:
+    """Hold one way to switch an effect on: values at full strength, those of the null, and the share that is tried."""
+
+    full: dict[str, float]
+    null: dict[str, float]
+    level: float
+
+    def at(self, share: float) -> dict[str, float]:
+        """Return the parameters of the effect at a share of its full strength."""
+        return {n: self.null[n] + share * (v - self.null[n]) if n in self.null else v for n, v in self.full.items()}
+
+
+def rays(records: WhiteRecords, model_name: str) -> tuple[list[Ray], int]:
+    """Return the grid over strengths and shapes of one effect, and the number of its shapes.
+
+    Strengths are the free parameters with a null value: each alone, and all together where there are several.
+    """
+    space, declared = records.space, records.replays[0].model.parameters
+    mine = [n for n in space.free_names if n.startswith(f"{model_name}.")]
+    null = {n: float(v) for n in mine if (v := declared[n].null) is not None}
+    bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine}
+    shapes = [n for n in mine if n not in null]
+    counts = SHAPES.get(len(shapes), (2,) * len(shapes))
+    grids = [grid(*bound[n], count) for n, count in zip(shapes, counts, strict=True)]
+    points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*grids)]
+    chosen = [(n,) for n in null] + ([tuple(null)] if len(null) > 1 else [])
+    found = []
+    for names, side, shape in product(chosen, (1, 0), points):
+        full = {n: float(bound[n][side]) if n in names else null[n] for n in null}
+        if all(full[n] != null[n] for n in names):
+            found += [Ray(shape | full, null, level) for level in (LEVELS_OF_SHAPES if shapes else LEVELS)]
+    return found, len(points)
+
+
+def grid(low: float, high: float, count: int) -> Array:
+    """Return points inside a range, even in the logarithm where the range is wide."""
+    shares = (np.arange(count) + 0.5) / count
+    if low > 0.0 and high > WIDE * low:
+        return np.asarray(low * (high / low) ** shares)
+    return np.asarray(low + (high - low) * shares)
+
+
+def score(current: Fit, name: str, library: Library) -> Score | None:
+    """Score one candidate at a fit; None where nothing can be said, as every strength diverges or changes nothing.
+
+    The secant from null to each strength, divided by it, stands for the sensitivity there; projected off the
+    sensitivities to the free parameters, so that what these can absorb does not count. All strengths and shapes run as
+    one population. The amplitude is clipped to the range of the effect.
+    """
+    records = library.problem((*current.active, name), current.values)
+    found, n_shapes = rays(records, name)
+    base = whole_candidate(records, current)
+    population = np.tile(base, (len(found) + 1, 1))
+    for row, ray in zip(population[1:], found, strict=True):
+        for n, value in ray.at(ray.level).items():
+            row[records.space.index(n)] = value
+    signals = records.whole_signals(population)
+    moved = (signals[1:] - signals[0]) / np.array([r.level for r in found])[:, np.newaxis]
+    drops, amplitudes = predicted(current, moved)
+    if not np.isfinite(moved).all(axis=1).any():
+        return None
+    bends = unseen_bends(current, moved[np.isfinite(moved).all(axis=1)])
+    order = np.argsort(-drops, kind="stable")[: N_TRIED // 2]
+    starts = [s for i in order for s in starts_at(records, current, found[i], moved[i], amplitudes[i])]
+    best = int(order[0])
+    ratio = log_ratio(current, float(drops[best]))
+    p = min(1.0, n_shapes * float(chi2_distribution.sf(ratio, 1)))
+    return Score(name, float(drops[best]), float(amplitudes[best]), p, tuple(starts), n_shapes, bends)
+
+
+def unseen_bends(current: Fit, moved: Array) -> Array:
+    """Return the largest relative change of each free parameter that strengths within the range could cause unseen.
+
+    A strength a adds a^2 q to chi2, q the squared length of the change of the signal beyond the reach of the
+    parameters; below UNSEEN it is not noticed, while the parameters make up for the rest.
+    moved: change of the whitened signal per full strength, (n_rays, n_samples).
+    """
+    if not current.n_free:
+        return np.empty(0)
+    answer = np.linalg.lstsq(current.jacobian, moved.T, rcond=1e-10)[0]
+    beyond = np.sum((moved - (current.jacobian @ answer).T) ** 2, axis=1)
+    share = np.minimum(1.0, np.sqrt(UNSEEN / np.maximum(beyond, 1e-12)))
+    largest = np.max(np.abs(answer) * share, axis=1) * current.records.span
+    return np.asarray(largest / np.maximum(np.abs(current.x), 1e-300))
+
+
+def predicted(current: Fit, moved: Array) -> tuple[Array, Array]:
+    """Return predicted drop of chi2 and amplitude of each ray, -inf where it diverged.
+
+    moved: change of the whitened signal per full strength, (n_rays, n_samples).
+    """
+    basis = current.basis
+    rest = current.residual - basis @ (basis.T @ current.residual)
+    free = moved - (moved @ basis) @ basis.T
+    square, slope = np.sum(free**2, axis=1), free @ rest
+    # A ray that the parameters absorb whole leaves rounding, which must not be divided by.
+    seen = np.isfinite(square) & (square > 1e-8 * np.sum(moved**2, axis=1))
+    amplitude = np.clip(np.divide(slope, square, out=np.zeros_like(slope), where=seen), 0.0, 1.0)
+    return np.where(seen, amplitude * (2.0 * slope - amplitude * square), -np.inf), amplitude
+
+
+def log_ratio(current: Fit, drop: float) -> float:
+    """Return n_eff ln(chi2 / (chi2 - drop)), the statistic of a drop (see `select.criterion`)."""
+    left = max(current.chi2 - drop, 1e-9 * current.chi2)
+    return float(current.independent * np.log(current.chi2 / left))
+
+
+def whole_candidate(records: WhiteRecords, current: Fit) -> Array:
+    """Return the current fit as a candidate of an extended problem, the new effect at its null."""
+    declared, values = records.replays[0].model.parameters, current.values
+    free = [values.get(n, idle(declared[n])) for n in records.space.free_names]
+    return np.asarray(records.space.complete(np.array([free]))[0])
+
+
+def starts_at(records: WhiteRecords, current: Fit, ray: Ray, moved: Array, amplitude: float) -> list[Array]:
+    """Return starts of a refit at a ray: predicted amplitude and tried level, the free parameters moved to match."""
+    return [moved_start(records, current, ray, moved, share) for share in (max(amplitude, 0.01), ray.level)]
+
+
+def moved_start(records: WhiteRecords, current: Fit, ray: Ray, moved: Array, share: float) -> Array:
+    """Return the extended candidate at a strength, with the linear answer of the free parameters to it."""
+    left = current.residual - share * moved
+    step = np.linalg.lstsq(current.jacobian, left, rcond=1e-8)[0] if current.n_free else np.empty(0)
+    shares = dict(zip(current.values, np.clip(current.z + step, 0.01, 0.99), strict=True))
+    added = ray.at(share)
+    space = records.space
+    z = [shares[n] if n in shares else (added[n] - space.low[i]) / (space.high[i] - space.low[i])
+         for n, i in ((n, space.index(n)) for n in space.free_names)]  # fmt: skip
+    return np.asarray(np.clip(np.array(z), 1e-3, 1.0 - 1e-3))
+
+
+def traced(current: Fit, library: Library) -> list[Score]:
+    """Return the scores of all candidates that are not in a fit, best first."""
+    names = [n for n in library.candidates if library.can_join(n, current.active)]
+    found = [score(current, n, library) for n in names]
+    return sorted((s for s in found if s is not None), key=lambda s: -s.drop)
+
+
+def refitted(current: Fit, found: Score, library: Library) -> Fit:
+    """Fit the extended model fully, from the best two of the starts of a score."""
+    records = library.problem((*current.active, found.name))
+    values = records.chi2(np.array(found.starts[:N_TRIED]))
+    order = np.argsort(values, kind="stable")[:N_STARTS]
+    starts = distinct([found.starts[i] for i in order])
+    return accurate(fit_from(records, (*current.active, found.name), starts), library)
+
+
+def accurate(fit: Fit, library: Library) -> Fit:
+    """Return the fit, made again with finer steps where it ended where the engine's are too coarse."""
+    finer = library.recalibrated(fit.active, fit.values)
+    return fit if finer is None else fit_from(finer, fit.active, [fit.z])
+
+
+def distinct(starts: Sequence[Array]) -> list[Array]:
+    """Return starts without those that are next to an earlier one."""
+    kept: list[Array] = []
+    for z in starts:
+        if all(np.max(np.abs(z - other)) > 0.02 for other in kept):
+            kept.append(z)
+    return kept

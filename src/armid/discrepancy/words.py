@@ -1,0 +1,163 @@
+"""What the closed loop found, in sentences."""
+
+import numpy as np
+
+from armid.discrepancy.diagnose import SIGNIFICANCE, Diagnosis, Finding
+from armid.discrepancy.estimates import Estimate
+from armid.discrepancy.result import (
+    EXPLAINED,
+    NO_DISCREPANCY,
+    PARTLY,
+    TOO_ALIKE,
+    UNEXPLAINED,
+    ClosedLoop,
+    Judgement,
+)
+from armid.display import SHOWN, shown
+
+# A shift of a parameter by more than this share of its value, and of its interval, is told.
+SHIFTED = 0.01
+MOST_TOLD = 3
+# Smaller chances than this are all the same.
+LEAST = 1e-12
+
+
+def conclusion(found: ClosedLoop) -> str:
+    """Return the verdict as one sentence."""
+    names = " + ".join(found.effects)
+    doubtful = [s for s in found.steps if s.alternatives]
+    texts = {
+        NO_DISCREPANCY: "What the declared model leaves is noise: nothing is missing that these records could show.",
+        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on train and holdout.",
+        PARTLY: f"The declared model lacks {names}, but a significant discrepancy remains: that is part of the story.",
+        UNEXPLAINED: "The declared model lacks something, but no effect of the library earns its parameters.",
+    }
+    if found.verdict != TOO_ALIKE:
+        return texts[found.verdict]
+    if found.refused is not None:
+        rivals = [r.name for r in (*found.refused.alike, *found.refused.unlike)]
+        return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
+                f"as well ({found.refused.name}, {', '.join(rivals[:6])}): none is named.")  # fmt: skip
+    said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in doubtful]
+    said += [f"{s.effect} fits hardly better than {' or '.join(r.name for r in s.group.unlike)}"
+             for s in found.steps if s.group.unlike]  # fmt: skip
+    return f"With {names} what remains is noise, but on these records {'; '.join(said)}."
+
+
+def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return whether there is a discrepancy and where, one sentence each."""
+    if not diagnosis.significant:
+        return [f"What remains cannot be told from noise (least chance of {len(diagnosis.findings)} tests together "
+                f"{diagnosis.p:.2g}, {SIGNIFICANCE:g} would be significant)."]  # fmt: skip
+    bound = "below " if diagnosis.p < LEAST else ""
+    said = [f"What remains is more than noise (chance {bound}{max(diagnosis.p, LEAST):.2g})."]
+    if not diagnosis.noise_known:
+        said.append("No rest was recorded, so that the noise is not known: the residual is tested against itself.")
+    said += [told(f) for kind in ("size", "repeats", "autocorrelation") for f in striking(diagnosis, kind, 1)]
+    for kind in ("record", "stage", "variable", "frequency"):
+        found = striking(diagnosis, "dependence" if kind == "variable" else kind, MOST_TOLD)
+        places = ", ".join(f"{f.where} ({f.ratio:.3g} times the noise)" for f in found)
+        said += [f"Where it is, by {kind}: {places}."] if found else []
+    return said
+
+
+def striking(diagnosis: Diagnosis, kind: str, most: int) -> list[Finding]:
+    """Return the significant findings of one kind, the largest first."""
+    found = [f for f in diagnosis.of_kind(kind) if f.p * len(diagnosis.findings) < SIGNIFICANCE]
+    return sorted(found, key=lambda f: -f.ratio)[:most]
+
+
+def told(finding: Finding) -> str:
+    """Return the sentence of a finding about the residual as a whole."""
+    return {
+        "size": f"Its mean square is {finding.ratio:.4g} times that of the noise.",
+        "repeats": f"Repeats of {finding.where} agree with each other {finding.ratio:.3g} times better than with the "
+        "model (mean squares, pure-error lack of fit).",
+        "autocorrelation": f"It is correlated in time: the Ljung-Box statistic over {finding.where} is "
+        f"{finding.ratio:.3g} times what noise gives.",
+    }[finding.kind]
+
+
+def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
+    """Return what the missing effects had bent: the declared parameters that moved."""
+    later = {e.name: e for e in after.estimates}
+    said = []
+    for old in before.estimates:
+        new = later[old.name]
+        if old.low is not None and old.value != new.value and abs(old.value - new.value) > SHIFTED * abs(new.value):
+            bent = (old.value - new.value) / abs(new.value) if new.value else np.inf
+            said.append(f"{old.name} was bent by {bent:+.2%}: {text_of(old)} before, {text_of(new)} after.")
+    return said
+
+
+def text_of(estimate: Estimate) -> str:
+    """Return a value with its interval in units that people read."""
+    value, name = shown(estimate.value, estimate.unit)
+    unit = "" if name == "1" else f" {name}"
+    if estimate.low is None or estimate.high is None:
+        return f"{value:.5g}{unit}"
+    low, high = shown(estimate.low, estimate.unit)[0], shown(estimate.high, estimate.unit)[0]
+    return f"{value:.5g}{unit} ({low:.5g} to {high:.5g})"
+
+
+def doubt_sentences(judged: Judgement) -> list[str]:
+    """Return why parameters are not to be trusted."""
+    reasons: dict[tuple[str, ...], list[str]] = {}
+    for e in judged.estimates:
+        if e.doubts and e.low is not None:
+            reasons.setdefault(e.doubts, []).append(e.name)
+    return [f"Not to be trusted: {', '.join(names)} ({'; '.join(why)})." for why, names in reasons.items()]
+
+
+def arrow(before: float | None, after: float | None, unit: str) -> str:
+    """Return an error before and after, in the unit that people read."""
+    if before is None or after is None:
+        return "none"
+    return f"{shown(before, unit)[0]:.4g} -> {shown(after, unit)[0]:.4g}"
+
+
+def step_rows(found: ClosedLoop) -> list[list[str]]:
+    """Return the rows of the table of steps: effect, port, alternatives, errors before and after, parameters."""
+    rows, last = [], found.before
+    for step in found.steps:
+        own = [e for e in step.after.estimates if e.name.startswith(f"{step.effect}.") and e.low is not None]
+        rows.append([
+            step.effect, step.port, ", ".join(step.alternatives) or "none",
+            arrow(last.train_error.rmse, step.after.train_error.rmse, found.campaign.unit),
+            arrow(holdout_rmse(last), holdout_rmse(step.after), found.campaign.unit),
+            "; ".join(f"{e.name.partition('.')[2]} {text_of(e)}" for e in own),
+        ])  # fmt: skip
+        last = step.after
+    return rows
+
+
+def holdout_rmse(judged: Judgement) -> float | None:
+    """Return the error on the records held out, None where there are none."""
+    return None if judged.holdout_error is None else judged.holdout_error.rmse
+
+
+def step_headers(found: ClosedLoop) -> list[str]:
+    """Return the headers of the table of steps."""
+    unit = SHOWN[found.campaign.unit][0]
+    return ["effect", "port", "or", f"train RMSE, {unit}", f"holdout RMSE, {unit}", "parameters (95 % interval)"]
+
+
+def parameter_rows(found: ClosedLoop) -> list[list[str]]:
+    """Return the rows of the table of parameters before and after."""
+    before = {e.name: e for e in found.before.estimates}
+    return [
+        [e.name, text_of(before[e.name]) if e.name in before else "", text_of(e),
+         "fixed" if e.low is None and "declared" in e.doubts[0] else "yes" if e.trusted else "no"]
+        for e in found.after.estimates
+    ]  # fmt: skip
+
+
+def remarks(found: ClosedLoop) -> list[str]:
+    """Return everything that a reader must know, one sentence each."""
+    said = [conclusion(found)]
+    if found.steps:
+        said += shift_sentences(found.before, found.after)
+    said += doubt_sentences(found.after)
+    said += [f"A record of this manoeuvre would separate {' and '.join(a.separates)} with a chance of {a.power:.0%}: "
+             f"{a.words}." for a in found.advice[:1]]  # fmt: skip
+    return said

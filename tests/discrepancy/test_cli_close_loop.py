@@ -1,0 +1,50 @@
+"""`armid close-loop` as a user meets it."""
+
+import json
+
+import pytest
+
+from armid.cli.main import main
+
+MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage")
+CANDIDATES = "coulomb,seal_friction,supply_sag,tilt,viscous"
+
+
+def run(*arguments):
+    """Return the exit code of a command."""
+    with pytest.raises(SystemExit) as left:
+        main(["close-loop", *map(str, arguments)])
+    return left.value.code
+
+
+@pytest.mark.slow
+def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
+    options = ("--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0")
+    campaign = stand(*options, *MANOEUVRES, "--effect", "supply_sag=0.010")
+    assert run(campaign, "--out", tmp_path / "out", "--candidates", CANDIDATES) == 0
+    printed = capsys.readouterr().out
+    assert "supply_sag" in printed
+    assert "verdict: explained" in printed
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["effects"] == ["supply_sag"]
+    text = (tmp_path / "out" / "report.md").read_text()
+    figures = ["residuals.png", "diagnosis.png", "ranking.png", "parameters.png", "autocorrelation.png"]
+    for name in figures:
+        assert f"]({name})" in text
+        assert (tmp_path / "out" / name).stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "sentence"),
+    [
+        ("--candidates", "colomb", "effect 'colomb' is not known: did you mean 'coulomb'?"),
+        ("--without", "tillt", "effect 'tillt' is not known: did you mean 'tilt'?"),
+        ("--bounds", "p0=3", "is not of the form LOW:HIGH"),
+    ],
+)
+def test_bad_option_is_one_sentence_and_writes_nothing(paper_arm_folder, tmp_path, capsys, option, value, sentence):
+    assert run(paper_arm_folder, "--out", tmp_path / "out", option, value) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()

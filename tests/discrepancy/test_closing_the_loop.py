@@ -1,0 +1,118 @@
+"""The loop on records of the independent test stand: it names what was put in, and nothing where nothing was."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armid.discrepancy import close_loop, report_of
+from armid.model import EFFECTS, ArmidError, Model
+from armid.record import read_campaign
+
+pytestmark = pytest.mark.slow
+# Few candidates, so that one model is compiled; coulomb and seal_friction leave the very same trace.
+NAMES = ("coulomb", "seal_friction", "supply_sag", "tilt", "viscous")
+CANDIDATES = {n: EFFECTS[n] for n in NAMES}
+COMMON = (
+    "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
+    "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",
+)  # fmt: skip
+KEYS = ["campaign", "plant", "unit", "noise_rms", "verdict", "effects", "error", "parameters", "steps", "advice"]
+ERRORS = ["rmse", "nrmse", "chi2_per_sample", "s", "s1", "s2"]
+TRUTH = {"p0": 3.2e6, "k": 0.9, "eta3": 0.6, "n": 1.2}
+
+
+@pytest.fixture(scope="module")
+def closed(stand):
+    """Return a function that closes the loop on a campaign with some effects; each is done once."""
+    known = {}
+
+    def run(*effects):
+        if effects not in known:
+            campaign = read_campaign(stand(*COMMON, *(("--effect", *effects) if effects else ())))
+            known[effects] = close_loop(Model(campaign.plant), campaign, CANDIDATES)
+        return known[effects]
+
+    return run
+
+
+def test_control_is_left_alone(closed):
+    found = closed()
+    assert found.verdict == "no_discrepancy"
+    report = report_of(found)
+    assert report["effects"] == report["steps"] == report["advice"] == []
+    assert report["error"]["before"] == report["error"]["after"]
+    assert report["parameters"]["before"] == report["parameters"]["after"]
+
+
+def test_missing_effect_is_named_and_the_parameters_come_right(closed):
+    found = closed("supply_sag=0.010")
+    assert found.effects == ("supply_sag",)
+    assert found.verdict == "explained"
+    assert found.before.holdout_error.chi2_per_sample > 2.0
+    assert found.after.holdout_error.chi2_per_sample < 1.1
+    for name, value in TRUTH.items():
+        assert found.parameters[name] == pytest.approx(value, rel=0.01)
+    assert found.parameters["supply_sag.resistance"] == pytest.approx(0.010, rel=0.05)
+    assert not any(e.trusted for e in found.before.estimates)
+
+
+def test_effects_that_leave_the_same_trace_are_one_group_and_get_advice(closed):
+    found = closed("coulomb=40")
+    assert found.verdict == "cannot_tell_apart"
+    assert len(found.steps) == 1
+    assert {found.steps[0].effect, *found.steps[0].alternatives} == {"coulomb", "seal_friction"}
+    assert found.advice
+    assert {"coulomb", "seal_friction"} >= set(found.advice[0].separates)
+
+
+def test_what_no_candidate_can_do_is_not_called_explained(closed):
+    found = closed("rocking_hz=8")
+    assert found.verdict in ("unexplained", "partly_explained", "cannot_tell_apart")
+    assert not any(e.trusted for e in found.after.estimates)
+
+
+def test_holdout_records_decide_nothing(closed):
+    found = closed("supply_sag=0.010")
+    rng = np.random.default_rng(1)
+    records = tuple(r if r.role == "train" else garbage(r, rng) for r in found.campaign.records)
+    again = close_loop(Model(found.campaign.plant), replace(found.campaign, records=records), CANDIDATES)
+    assert again.effects == found.effects
+    assert again.parameters == found.parameters
+    assert {k: f.chi2 for k, f in again.search.fits.items()} == {k: f.chi2 for k, f in found.search.fits.items()}
+    assert again.verdict != "explained"
+
+
+def garbage(record, rng):
+    """Return a record of noise."""
+    measured = rng.standard_normal(record.measured.shape)
+    pieces = tuple(replace(p, measured=measured[p.start_index :][: len(p.measured)]) for p in record.pieces)
+    return replace(record, measured=measured, rest=rng.standard_normal(record.rest.shape), pieces=pieces)
+
+
+@pytest.mark.parametrize("effects", [(), ("supply_sag=0.010",), ("coulomb=40",)], ids=["none", "one", "group"])
+def test_report_has_exactly_the_promised_keys(closed, effects):
+    report = json.loads(json.dumps(report_of(closed(*effects)), allow_nan=False))
+    assert list(report) == KEYS
+    for errors in (*report["error"].values(), *(s["error"] for s in report["steps"])):
+        assert list(errors) == ["train", "holdout"]
+        assert all(list(e) == ERRORS for e in errors.values())
+    for entries in (*report["parameters"].values(), *(s["parameters"] for s in report["steps"])):
+        assert all(list(e) == ["value", "unit", "low", "high", "trusted"] for e in entries.values())
+    for step in report["steps"]:
+        assert list(step) == ["effect", "port", "alternatives", "empirical", "error", "parameters"]
+    for advice in report["advice"]:
+        assert list(advice) == ["manoeuvre", "separates", "power"]
+
+
+def test_without_holdout_records_their_errors_are_null(closed):
+    campaign = closed().campaign
+    found = close_loop(Model(campaign.plant), replace(campaign, records=campaign.train), CANDIDATES)
+    assert report_of(found)["error"]["after"]["holdout"] is None
+
+
+def test_unknown_parameter_is_refused(closed):
+    campaign = closed().campaign
+    with pytest.raises(ArmidError, match=r"did you mean 'coulomb\.level'"):
+        close_loop(Model(campaign.plant), campaign, CANDIDATES, bounds={"coulomb.levl": (0.0, 1.0)})

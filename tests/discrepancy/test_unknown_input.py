@@ -1,0 +1,99 @@
+"""A force that nobody declared is recovered from the speed of an axis, without a form and with the right variable."""
+
+import numpy as np
+import pytest
+
+from armid.discrepancy.dependence import dependences, motions
+from armid.discrepancy.empirical import empirical_effect, is_empirical, shown_name
+from armid.discrepancy.stretch import stretches
+from armid.discrepancy.unknown_input import missing_signal
+from armid.model import Model
+from armid.problem import replays, space_of
+from armid.record import read_campaign, write_table
+
+MASS, NOISE = 2.0, 2e-4
+
+
+def spring(position):
+    """A force that engages beyond 0.3 m [N]."""
+    return -0.8 * np.maximum(0.0, position - 0.3)
+
+
+def motion(drive, missing, interval=0.005, substeps=20):
+    """Return speed and position on the samples (semi-implicit Euler, fine steps)."""
+    v, q, speeds, positions = 0.0, 0.0, [], []
+    for u, following in zip(drive, np.append(drive[1:], drive[-1]), strict=True):
+        speeds.append(v)
+        positions.append(q)
+        for i in range(substeps):
+            v += interval / substeps * (u + (following - u) * i / substeps + missing(q)) / MASS
+            q += interval / substeps * v
+    return np.array(speeds), np.array(positions)
+
+
+@pytest.fixture(scope="module")
+def axis(tmp_path_factory):
+    """Three records of an axis with an undeclared spring: model with the mass known, campaign, replays."""
+    folder = tmp_path_factory.mktemp("spring")
+    times, text = 0.005 * np.arange(400), 'name = "spring"\nplant = "driven_axis"\n'
+    rng = np.random.default_rng(5)
+    for i, rate in enumerate((3.0, 3.7, 4.6)):
+        drive = 4.0 * np.sin(rate * times)
+        speed, position = motion(drive, spring)
+        columns = {"time_s": times, "velocity_m_s": speed + NOISE * rng.standard_normal(400), "drive_N": drive}
+        write_table(folder / f"r{i}.csv", columns | {"position_m": position})
+        text += f'[[records]]\nfile = "r{i}.csv"\nrole = "train"\n'
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    campaign = read_campaign(folder)
+    model = Model(campaign.plant)
+    space = space_of(model, fixed={"mass": MASS})
+    return model, space, replays(campaign.train, model, space)
+
+
+@pytest.fixture(scope="module")
+def whole(axis):
+    model, space, ready = axis
+    return stretches(model, space, np.empty(0), ready, [NOISE] * 3, ["torque", "output"])
+
+
+def test_the_gain_of_a_force_is_its_impulse_over_the_mass(whole):
+    stretch = whole[0]
+    width = stretch.knots[1] - stretch.knots[0]
+    assert np.allclose(stretch.gains["torque"][-1, 5:-1] * NOISE, width / MASS, rtol=1e-3)
+    assert np.allclose(stretch.gains["output"][20:380].sum(axis=1) * NOISE, 1.0, rtol=1e-4)
+
+
+def test_the_missing_force_is_recovered_without_a_form(axis, whole):
+    found = missing_signal(whole, "torque")
+    assert found.share > 0.99
+    for stretch, signal in zip(whole, found.signals, strict=True):
+        times = stretch.piece.manoeuvre.times()
+        position = np.cumsum(stretch.replay.record.measured) * 0.005
+        truth = spring(np.interp(stretch.knots, times, position))
+        assert np.sqrt(np.mean((signal - truth)[3:-3] ** 2)) < 0.15 * np.ptp(truth)
+
+
+def test_the_variable_is_the_position_and_the_curve_is_the_spring(axis, whole):
+    model, _, _ = axis
+    ranked = dependences(motions(model, np.array([MASS]), whole))
+    best = ranked[0]
+    assert (best.port, best.variable, best.factor) == ("torque", "q", "1")
+    assert best.share > 0.95
+    knots = np.linspace(best.first, best.last, len(best.heights))
+    assert np.max(np.abs(best.heights - spring(knots))[1:]) < 0.25 * np.ptp(spring(knots))
+
+
+def test_the_empirical_term_starts_from_the_curve_and_claims_no_name(axis, whole):
+    model, _, ready = axis
+    best = dependences(motions(model, np.array([MASS]), whole))[0]
+    effect, start = empirical_effect(model, best)
+    assert is_empirical(effect)
+    assert shown_name(effect.name) == "unnamed:torque"
+    extended = model + effect
+    own = {name: start.get(name, p.fixed) for name, p in extended.parameters.items() if name != "mass"}
+    assert None not in own.values()
+    candidate = np.array([[MASS, *(float(v) for v in own.values())]])
+    after = replays([r.record for r in ready], extended, space_of(extended))
+    before = [np.std(r.measured - r.signal(np.array([[MASS]]))[0]) for r in ready]
+    rest = [np.std(r.measured - r.signal(candidate)[0]) for r in after]
+    assert max(rest) < 0.15 * max(before)
