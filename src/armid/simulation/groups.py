@@ -19,13 +19,13 @@ SHARES = 4
 def arranged(candidates: Array, width: int, weights: Array | None) -> tuple[Array, NDArray[np.int64]]:
     """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
     n = len(candidates)
-    # within one group the order saves nothing
-    by_weight = weights if n > width else None
-    order = np.arange(n) if by_weight is None else np.argsort(candidates @ by_weight, kind="stable")
+    if n <= width:
+        weights = None  # within one group the order saves nothing
+    order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
     places = np.full(n + -n % width, -1)
     places[:n] = order
     rows = np.empty((candidates.shape[1], len(places)))
-    rows[:, :n] = candidates.T if by_weight is None else candidates[order].T
+    rows[:, :n] = candidates.T if weights is None else candidates[order].T
     rows[:, n:] = rows[:, n - 1 : n]
     return rows, places
 
