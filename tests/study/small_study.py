@@ -101,6 +101,7 @@ NOT_COMPARED = ["seconds", "started_at"]
 
 def same_results(one: StudyResults, two: StudyResults) -> bool:
     """Tell whether two stores hold the same runs, parameters and traces, bit for bit."""
+    assert one.runs["error"].tolist() == two.runs["error"].tolist()
     runs = one.runs.drop(columns=NOT_COMPARED).equals(two.runs.drop(columns=NOT_COMPARED))
     parameters, traces = one.parameters.equals(two.parameters), one.traces.equals(two.traces)
     return runs and parameters and traces

@@ -77,8 +77,9 @@ def opened(path: Path) -> sqlite3.Connection:
 def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = False) -> None:
     """Refuse a file that is no store of this version."""
     try:
-        found = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
+        # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
         is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
+        found = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
     except sqlite3.DatabaseError as error:
         if error.sqlite_errorname != "SQLITE_NOTADB":
             raise
