@@ -34,6 +34,7 @@ THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_
 class Workplace:
     """Hold what a worker is told at its start, and how long a run may take [s]."""
 
+    kind: str
     plugins: tuple[str, ...]
     folder: Path
     time_limit: float
@@ -120,7 +121,7 @@ class Lane:
         self._connection, self._ready, self._since = ours, False, self._clock()
         # one that has died already is found by `hear`
         with suppress(OSError):
-            ours.send((self.workplace.plugins, str(self.workplace.folder)))
+            ours.send((self.workplace.kind, self.workplace.plugins, str(self.workplace.folder)))
 
     def _take(self, word: str, content: object) -> list[Outcome]:
         self._since = self._clock()

@@ -102,7 +102,8 @@ def run(
         told(counts, None)
         finished = simulations = 0
         if counts.missing:
-            crew = crew_of(jobs, dask, Workplace(study.known.plugins, study.folder, time_limit), counts.missing)
+            workplace = Workplace(study.sheet.kind, study.known.plugins, study.folder, time_limit)
+            crew = crew_of(jobs, dask, workplace, counts.missing)
             try:
                 for outcome in performed(store, crew, interrupted):
                     finished, simulations = finished + 1, simulations + outcome.used

@@ -8,6 +8,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from armid.model import ArmidError
+from armid.study.kind import KINDS
 from armid.study.known import load_known
 from armid.study.perform import perform
 from armid.study.workshop import Workshop
@@ -18,8 +19,10 @@ LOOKS_EVERY_S = 1.0
 
 
 def work(connection: Connection) -> None:
-    """Receive plug-ins and folder, then perform one task after the other until the other end is closed."""
-    plugins, folder = connection.recv()
+    """Receive kind, plug-ins and folder, then perform one task after the other until the other end is closed."""
+    kind, plugins, folder = connection.recv()
+    # what runs need is imported before the first: where that fails no worker starts, and no run is to blame
+    KINDS[kind].perform()
     try:
         workshop = Workshop(load_known(plugins), Path(folder))
     except ArmidError as error:
