@@ -1,5 +1,7 @@
 """The fitnesses by name."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,7 +11,8 @@ from armid.fitness.series import Array
 from armid.fitness.similarity import numerical_similarity, scored
 
 
-def dissimilarity(
+def one_less(
+    degree: int,
     measured: ArrayLike,
     simulated: ArrayLike,
     interval: float,
@@ -17,9 +20,12 @@ def dissimilarity(
     xi: float = 0.030,
     slope_threshold: float = 0.2,
 ) -> Array:
-    """Return 1 - S of Eq 10 per candidate, +inf for one that is not finite; arguments and errors as `similarity`."""
+    """Return 1 minus a similarity degree per candidate, +inf for one that is not finite.
+
+    degree: its place in what `similarity` returns; other arguments and errors as there.
+    """
     scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)
-    values: Array = 1.0 - scores[0]
+    values: Array = 1.0 - scores[degree]
     return values
 
 
@@ -28,19 +34,8 @@ def numerical_dissimilarity(measured: ArrayLike, simulated: ArrayLike) -> Array:
     return 1.0 - numerical_similarity(measured, simulated, failed=-np.inf)
 
 
-def shape_dissimilarity(
-    measured: ArrayLike,
-    simulated: ArrayLike,
-    interval: float,
-    epsilon: float = 0.03,
-    xi: float = 0.030,
-    slope_threshold: float = 0.2,
-) -> Array:
-    """Return 1 - S2 of Eq 14 per candidate, a step function; +inf, arguments and errors as `dissimilarity`."""
-    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)
-    values: Array = 1.0 - scores[2]
-    return values
-
+# 1 - S of Eq 10, and 1 - S2 of Eq 14, a step function
+dissimilarity, shape_dissimilarity = partial(one_less, 0), partial(one_less, 2)
 
 # Those whose value is 1 minus a degree that people know.
 SIMILARITIES = ("similarity", "numerical_similarity", "shape_similarity")

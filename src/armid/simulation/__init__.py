@@ -1,12 +1,11 @@
 """How the machine moves: compiled simulation of populations."""
 
-from armid.simulation.along import along, evaluated, flat, leaves
+from armid.simulation.along import along
 from armid.simulation.calibrate import FINE, STANDARD, Calibration, accuracy_against, calibrate, golden_steps, probes
 from armid.simulation.compile import cache_folder, compile_model
 from armid.simulation.simulate import Prepared, Schedule, Simulation, prepare, simulate
 
 __all__ = [
     "FINE", "STANDARD", "Calibration", "Prepared", "Schedule", "Simulation", "accuracy_against", "along",
-    "cache_folder", "calibrate", "compile_model", "evaluated", "flat", "golden_steps", "leaves", "prepare", "probes",
-    "simulate",
+    "cache_folder", "calibrate", "compile_model", "golden_steps", "prepare", "probes", "simulate",
 ]  # fmt: skip

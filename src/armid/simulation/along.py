@@ -1,6 +1,6 @@
 """What the quantities of a model do along a simulated motion: the very equations that were simulated, on arrays."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,36 +22,26 @@ def along(
     Raises ArmidError for a name that the model does not have.
     """
     run = simulate(model, manoeuvre, candidate[np.newaxis], schedule, states=True)
-    known = leaves(model, manoeuvre, candidate, manoeuvre.times())
-    known |= {flat(name): values[0] for name, values in run.states.items()}
-    known |= {flat(name): np.where(known["time"] >= when[0], 1.0, 0.0) for name, when in run.switch_times.items()}
-    return evaluated(model, known, names)
-
-
-def evaluated(model: Model, known: Mapping[str, Any], names: Sequence[str]) -> dict[str, Array]:
-    """Return names from what is known by key: parameters, constants, inputs, states, latches and `time` on a grid.
-
-    Raises ArmidError for a name that the model does not have.
-    """
-    values = dict(known)
+    times = manoeuvre.times()
+    values = leaves(model, manoeuvre, candidate) | {"time": times}
+    values |= {flat(name): state[0] for name, state in run.states.items()}
+    values |= {flat(name): np.where(times >= when[0], 1.0, 0.0) for name, when in run.switch_times.items()}
     keys = {name: key_of(model, name) for name in names}
     for node in model.graph.order(keys.values()):
         if node.kind == "port":
             values[node.key] = sum((values[t] for t in node.terms), np.zeros(1))
-        elif node.key not in values:
+        else:
             assert node.function is not None
             values[node.key] = node.function(**{a: values[k] for a, k in node.arguments})
-    shape = np.shape(values["time"])
-    return {name: np.broadcast_to(np.asarray(values[key], dtype=float), shape).copy() for name, key in keys.items()}
+    found = {name: np.asarray(values[key], dtype=float) for name, key in keys.items()}
+    return {name: np.broadcast_to(value, times.shape).copy() for name, value in found.items()}
 
 
-def leaves(model: Model, manoeuvre: Manoeuvre, candidate: Array, times: Array) -> dict[str, Any]:
-    """Return what is known without a simulation at some times, by key; inputs run straight between samples."""
+def leaves(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> dict[str, Any]:
+    """Return parameters, constants and inputs, by key."""
     known: dict[str, Any] = dict(zip(map(flat, model.parameters), map(float, candidate), strict=True))
     known |= dict(zip(model.constants, model.constant_values(manoeuvre.constants), strict=True))
-    grid = manoeuvre.times()
-    known |= {i.name: np.interp(times, grid, manoeuvre.inputs[i.name]) for i in model.plant.inputs}
-    return known | {"time": times}
+    return known | {i.name: np.asarray(manoeuvre.inputs[i.name], dtype=float) for i in model.plant.inputs}
 
 
 def flat(name: str) -> str:
