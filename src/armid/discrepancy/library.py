@@ -143,10 +143,11 @@ class Library:
         ready = []
         for record in records:
             pieces = tuple(p.until_window_end() for p in record.pieces)
-            for m in (p.manoeuvre for p in pieces):
-                if same(m) not in known:
-                    known[same(m)] = quickly_calibrated(model, m, spread)
-            ready.append(Replay(record, model, pieces, tuple(known[same(p.manoeuvre)] for p in pieces), self.threads))
+            keys = [p.manoeuvre.likeness() for p in pieces]
+            for key, piece in zip(keys, pieces, strict=True):
+                if key not in known:
+                    known[key] = quickly_calibrated(model, piece.manoeuvre, spread)
+            ready.append(Replay(record, model, pieces, tuple(known[key] for key in keys), self.threads))
         return tuple(ready)
 
 
@@ -174,12 +175,6 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array) -> Cal
         if error <= MARGIN * allowed and not (runs[n].failed & ~runs[2 * n].failed).any():
             break
     return Calibration(Schedule(n, weights=switch_weights(spread, runs[n])), error, bool(error <= allowed))
-
-
-def same(m: Manoeuvre) -> object:
-    """Return what two manoeuvres have in common when one calibration serves both."""
-    inputs = tuple((k, v.tobytes()) for k, v in sorted(m.inputs.items()))
-    return m.n_samples, m.interval, m.hold, tuple(sorted(m.constants.items())), inputs
 
 
 def idle(parameter: Parameter) -> float:

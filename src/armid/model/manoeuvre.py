@@ -31,3 +31,8 @@ class Manoeuvre:
     def shortened(self, n_samples: int) -> "Manoeuvre":
         """Return the manoeuvre cut after its first samples."""
         return replace(self, n_samples=n_samples, inputs={k: v[:n_samples] for k, v in self.inputs.items()})
+
+    def likeness(self) -> tuple[object, ...]:
+        """Return what two manoeuvres have in common when a machine answers both alike, hashable; not the start time."""
+        inputs = tuple((name, values.tobytes()) for name, values in sorted(self.inputs.items()))
+        return self.interval, self.n_samples, self.hold, tuple(sorted(self.constants.items())), inputs

@@ -63,16 +63,20 @@ def accuracy_for(record: Record, model: Model) -> str:
     return accuracy_against(record.noise.rms, model)
 
 
-def replay_of(record: Record, model: Model, space: Space, accuracy: str | None = None, threads: int = 1) -> Replay:
+def replay_of(
+    record: Record, model: Model, space: Space, accuracy: str | None = None, threads: int = 1,
+    known: dict[object, Calibration] | None = None,
+) -> Replay:  # fmt: skip
     """Calibrate the engine on candidates spread over the space and make a record ready to be simulated.
 
-    accuracy: "standard", "fine", or None: as the record's noise asks for.
+    accuracy: "standard", "fine", or None: as the record's noise asks for. known: calibrations of the same model and
+    space; those that are made are added.
     Raises ArmidError for an unknown accuracy.
     """
     spread = space.complete(probes(space.low[space.free], space.high[space.free]))
     wanted = accuracy or accuracy_for(record, model)
     pieces = tuple(p.until_window_end() for p in record.pieces)
-    known: dict[object, Calibration] = {}
+    known = {} if known is None else known
     calibrations = [calibrated(model, p.manoeuvre, spread, wanted, known) for p in pieces]
     return Replay(record, model, pieces, tuple(calibrations), threads)
 
@@ -81,9 +85,7 @@ def calibrated(
     model: Model, manoeuvre: Manoeuvre, spread: Array, accuracy: str, known: dict[object, Calibration]
 ) -> Calibration:
     """Return the calibration of a manoeuvre; the same manoeuvre is not calibrated twice."""
-    constants = tuple(sorted(manoeuvre.constants.items()))
-    inputs = tuple((k, v.tobytes()) for k, v in sorted(manoeuvre.inputs.items()))
-    key = (accuracy, manoeuvre.interval, manoeuvre.n_samples, manoeuvre.hold, constants, inputs)
+    key = (accuracy, *manoeuvre.likeness())
     if key not in known:
         known[key] = calibrate(model, manoeuvre, spread, accuracy)
     return known[key]
@@ -92,5 +94,6 @@ def calibrated(
 def replays(
     records: Sequence[Record], model: Model, space: Space, accuracy: str | None = None, threads: int = 1
 ) -> tuple[Replay, ...]:
-    """Make several records ready to be simulated."""
-    return tuple(replay_of(r, model, space, accuracy, threads) for r in records)
+    """Make several records ready to be simulated; a manoeuvre that several repeat is calibrated once."""
+    known: dict[object, Calibration] = {}
+    return tuple(replay_of(r, model, space, accuracy, threads, known) for r in records)
