@@ -17,7 +17,7 @@ WITHIN, ALIKE, MOST = 6.0, 0.95, 4
 
 
 @dataclass(frozen=True)
-class Rival:
+class Likeness:
     """Hold an effect that would take another's place: by how much the criterion is worse, and how alike the traces."""
 
     name: str
@@ -33,8 +33,8 @@ class Group:
     """
 
     name: str
-    alike: tuple[Rival, ...]
-    unlike: tuple[Rival, ...]
+    alike: tuple[Likeness, ...]
+    unlike: tuple[Likeness, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -51,7 +51,7 @@ def group_of(fit: Fit, key: str, others: Sequence[Fit], library: Library) -> Gro
     """Return the rivals of one effect of a model: models that differ in that effect alone, within the criterion."""
     kept = {base(n) for n in fit.active if n != key}
     mine = trace_of(fit, key)
-    best: dict[str, Rival] = {}
+    best: dict[str, Likeness] = {}
     for other in others:
         new = [n for n in other.active if base(n) not in kept]
         if len(new) != 1 or len(other.active) != len(fit.active) or library.public(new[0]) == library.public(key):
@@ -59,7 +59,7 @@ def group_of(fit: Fit, key: str, others: Sequence[Fit], library: Library) -> Gro
         gap = criterion(other, fit.independent) - criterion(fit, fit.independent)
         name = library.public(new[0])
         if gap < WITHIN and (name not in best or gap < best[name].gap):
-            best[name] = Rival(name, float(gap), float(abs(mine @ trace_of(other, new[0]))))
+            best[name] = Likeness(name, float(gap), float(abs(mine @ trace_of(other, new[0]))))
     rivals = sorted(best.values(), key=lambda r: r.gap)
     alike = tuple(r for r in rivals if r.correlation > ALIKE)
     return Group(library.public(key), alike, tuple(r for r in rivals if r not in alike))

@@ -5,26 +5,10 @@ derivative by tau at the null, which a filter that is switched off below some ti
 Source: Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 5 (first-order low-pass).
 """
 
-import numpy as np
-
 from armid.model.effect import Effect, State
+from armid.model.effects.output_lag import lagging_rate, settled
+from armid.model.effects.output_lag import output as feedback
 from armid.model.parameter import Parameter
-
-
-def feedback(time_constant, lagging, omega):
-    """Speed that the control sees less the true one [rad/s]."""
-    return time_constant / np.maximum(time_constant, 1e-3) * (lagging - omega)
-
-
-def lagging_rate(time_constant, lagging, omega):
-    """Rate of the filter's output [rad/s2], (omega - lagging) / time_constant."""
-    return (omega - lagging) / np.maximum(time_constant, 1e-3)
-
-
-def settled(omega):
-    """Return the speed: the filter has settled."""
-    return omega
-
 
 tachometer_lag = Effect(
     name="tachometer_lag",
