@@ -1,5 +1,7 @@
 """Local searches: the very steps of NLopt, derivatives by differences, starts, failures."""
 
+from contextlib import suppress
+
 import nlopt
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from searches import Bowl, identifier, ran
 
 from armid.identifiers.differences import CENTRAL, FORWARD, slopes, stencil
 from armid.identifiers.local import Height, NoFitnessError, pulled
-from armid.identifiers.nlopt_local import ALGORITHMS
+from armid.identifiers.nlopt_local import ALGORITHMS, Calls, optimised
 
 Array = NDArray[np.float64]
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")
@@ -172,3 +174,34 @@ def test_a_tolerance_ends_a_search_earlier() -> None:
     used = [ran("bobyqa", Bowl(), 300, tolerance=t).algorithm.evaluator.n_eval for t in (1e-2, 1e-9)]
     assert used[0] < used[1] < 300
     assert identifier("bobyqa", tolerance=0).build(10).budget == 10
+
+
+class EnoughError(Exception):
+    """Raised by an objective that has had enough."""
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_an_error_of_the_objective_arrives_whatever_nlopt_makes_of_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((4, 4))
+    A = A @ A.T * 10.0 ** rng.uniform(0, 4)
+    centre, start = rng.uniform(0.2, 0.8, 4), rng.uniform(0.1, 0.9, 4)
+    for enough in range(80, 145, 3):
+        called: list[int] = []
+
+        def value(u: Array, _: Array, enough: int = enough, called: list[int] = called) -> float:
+            called.append(1)
+            if len(called) > enough:
+                raise EnoughError
+            return float((u - centre) @ A @ (u - centre))
+
+        search, calls = nlopt.opt(nlopt.LN_BOBYQA, 4), Calls(value)
+        search.set_lower_bounds(np.zeros(4))
+        search.set_upper_bounds(np.ones(4))
+        search.set_initial_step(0.05)
+        search.set_xtol_abs(1e-10)
+        search.set_min_objective(calls)
+        # of these stops NLopt loses the error of a few, and Python raises a SystemError in its place
+        with suppress(EnoughError):
+            optimised(search, start, calls)
+            assert len(called) <= enough

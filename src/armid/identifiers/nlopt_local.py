@@ -77,13 +77,24 @@ def descend(name: str, options: LocalOptions, cube: Cube, seed: int, ask: Asker,
     calls = Calls(objective(options, cube, ask))
     search.set_min_objective(calls)
     try:
-        with suppress(*NO_PROGRESS):
-            search.optimize(start)
-        if calls.error is not None:
-            raise calls.error
+        optimised(search, start, calls)
     finally:
         # its frames hold NLopt's object and that the calls, a circle that no garbage collector sees
         calls.error = None
+
+
+def optimised(search: nlopt.opt, start: Array, calls: "Calls") -> None:
+    """Let NLopt run, and raise what a call raised, however NLopt took it."""
+    try:
+        with suppress(*NO_PROGRESS):
+            search.optimize(start)
+    except SystemError:
+        # BOBYQA, told to stop in a step that it tries once more, returns a result all the same; Python, which finds a
+        # result and an error, raises this in place of the error
+        if calls.error is None:
+            raise
+    if calls.error is not None:
+        raise calls.error
 
 
 class Calls:
