@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from armid.discrepancy.dependence import dependences, motions
-from armid.discrepancy.empirical import empirical_effect, is_empirical, shown_name
+from armid.discrepancy.empirical import empirical_effect
+from armid.discrepancy.names import is_empirical, shown_name
 from armid.discrepancy.stretch import stretches
 from armid.discrepancy.unknown_input import missing_signal
 from armid.model import Model
@@ -87,7 +88,7 @@ def test_the_empirical_term_starts_from_the_curve_and_claims_no_name(axis, whole
     model, _, ready = axis
     best = dependences(motions(model, np.array([MASS]), whole))[0]
     effect, start = empirical_effect(model, best)
-    assert is_empirical(effect)
+    assert is_empirical(effect.name)
     assert shown_name(effect.name) == "unnamed:torque"
     extended = model + effect
     own = {name: start.get(name, p.fixed) for name, p in extended.parameters.items() if name != "mass"}

@@ -23,14 +23,16 @@ N_BLOCKS = 4
 class Dependence:
     """Say that a signal at a port is factor x curve(variable), the curve straight between evenly spaced knots.
 
-    factor: "1", "direction" (sign of the speed) or "drive_effort". share: share of the squared residual beyond the
-    reach of the free parameters that it removes from records (or blocks of time) left out of its fit. heights: of the
-    curve at its knots from `first` to `last` [unit of the variable], fitted on all train records, (n_knots,).
+    factor: "1", "direction" (sign of the speed) or "drive_effort". removed: share of the squared residual beyond the
+    reach of the free parameters that it removes; share: of records (or blocks of time) left out of its fit, below 0
+    where it makes their prediction worse. heights: of the curve at its knots from `first` to `last` [unit of the
+    variable], fitted on all train records, (n_knots,).
     """
 
     port: str
     variable: str
     factor: str
+    removed: float
     share: float
     first: float
     last: float
@@ -101,10 +103,10 @@ def told_apart(variables: dict[str, Array]) -> list[str]:
 
 
 def dependences(moved: Sequence[Motion]) -> list[Dependence]:
-    """Return every port, variable and factor, the one that predicts left-out records best first."""
+    """Return every port, variable and factor, the one that removes most first."""
     ports, pairs = moved[0].stretch.gains, [(v, f) for v in moved[0].variables for f in moved[0].factors if v != f]
     found = [dependence(moved, port, variable, factor) for port in ports for variable, factor in pairs]
-    return sorted(found, key=lambda d: -d.share)
+    return sorted(found, key=lambda d: -d.removed)
 
 
 def dependence(moved: Sequence[Motion], port: str, variable: str, factor: str) -> Dependence:
@@ -117,7 +119,8 @@ def dependence(moved: Sequence[Motion], port: str, variable: str, factor: str) -
     sums = [Sums.of(design[g == n], residual[g == n]) for g in (groups(moved),) for n in np.unique(g)]
     n_free = moved[0].stretch.jacobian.shape[1]
     heights = solved(Sums.total(sums), n_free)[n_free:]
-    return Dependence(port, variable, factor, left_out_share(sums, n_free), first, last, heights)
+    removed, share = removed_share(Sums.total(sums), n_free), left_out_share(sums, n_free)
+    return Dependence(port, variable, factor, removed, share, first, last, heights)
 
 
 def weights(motion: Motion, variable: str, factor: str, first: float, last: float) -> Array:
@@ -166,6 +169,12 @@ class Sums:
         """Return |residual - design coefficients|^2."""
         fitted = float(coefficients @ self.gram @ coefficients)
         return self.square - 2.0 * float(coefficients @ self.slope) + fitted
+
+
+def removed_share(sums: Sums, n_free: int) -> float:
+    """Return the share of the squared residual that a fit removes, the free parameters fitted again on both sides."""
+    before = sums.first(n_free).rest(solved(sums.first(n_free), n_free))
+    return 1.0 - sums.rest(solved(sums, n_free)) / before if before > 0.0 else 0.0
 
 
 def left_out_share(sums: Sequence[Sums], n_free: int) -> float:

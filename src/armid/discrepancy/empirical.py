@@ -7,19 +7,8 @@ import numpy as np
 
 from armid.discrepancy.curve import curve, directed, driven
 from armid.discrepancy.dependence import N_KNOTS, Dependence
+from armid.discrepancy.names import UNNAMED
 from armid.model import Effect, Model, Parameter
-
-PREFIX = "unnamed_"
-
-
-def is_empirical(effect: Effect | str) -> bool:
-    """Tell whether an effect is an unnamed term."""
-    return (effect if isinstance(effect, str) else effect.name).startswith(PREFIX)
-
-
-def shown_name(name: str) -> str:
-    """Return the name of an effect as reports show it: `unnamed:torque` for an empirical term."""
-    return f"unnamed:{name.removeprefix(PREFIX).split('_by_')[0]}" if is_empirical(name) else name
 
 
 def empirical_effect(model: Model, found: Dependence) -> tuple[Effect, dict[str, float]]:
@@ -34,10 +23,15 @@ def empirical_effect(model: Model, found: Dependence) -> tuple[Effect, dict[str,
     shape = {"first": found.first, "last": found.last} | width
     fixed = [Parameter(name, "1", v - 1.0, v + 1.0, fixed=v, note="of the curve's range") for name, v in shape.items()]
     note = f"empirical: no name is claimed; a curve over {found.variable}, times {found.factor}"
-    effect = Effect(f"{PREFIX}{found.port}_by_{found.variable.replace('.', '_')}", (*parameters, *fixed),
-                    {found.port: function}, note=note, binds=binds)  # fmt: skip
+    effect = Effect(key_of(found), (*parameters, *fixed), {found.port: function}, note=note, binds=binds)
     _ = model + effect
     return effect, {f"{effect.name}.h{i}": float(h) for i, h in enumerate(found.heights)}
+
+
+def key_of(found: Dependence) -> str:
+    """Return the name under which a term is compiled."""
+    times = "" if found.factor == "1" else f"_times_{found.factor}"
+    return f"{UNNAMED}{found.port}_by_{found.variable.replace('.', '_')}{times}"
 
 
 def unit_of(model: Model, found: Dependence) -> str:

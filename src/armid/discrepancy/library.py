@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.discrepancy.evidence import Evidence, WhiteRecords, white_records
-from armid.discrepancy.names import LOOSE, base, forms_of, own_name, renamed
+from armid.discrepancy.names import LOOSE, base, forms_of, own_name, renamed, shown_name
 from armid.model import ArmidError, Effect, Manoeuvre, Model, Parameter
 from armid.problem import Replay, Space, space_of
 from armid.record import Override, Record
@@ -52,7 +52,7 @@ class Library:
 
     def public(self, key: str) -> str:
         """Return the name of the effect that a key stands for, whatever its form."""
-        return self.originals[base(key)].name
+        return shown_name(self.originals[base(key)].name)
 
     def can_join(self, key: str, active: Sequence[str]) -> bool:
         """Tell whether a candidate is not in a model yet, in any form."""

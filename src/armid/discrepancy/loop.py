@@ -6,13 +6,14 @@ import numpy as np
 
 from armid.discrepancy.advise import Advice, advise
 from armid.discrepancy.diagnose import diagnose
+from armid.discrepancy.empirical import key_of
 from armid.discrepancy.estimates import estimates, public_model, unseen
 from armid.discrepancy.evidence import evidence_of
 from armid.discrepancy.fit import Fit
 from armid.discrepancy.foresee import Rival
-from armid.discrepancy.group import Group, group_of
+from armid.discrepancy.group import Group, Likeness, group_of
 from armid.discrepancy.library import Library, library_of
-from armid.discrepancy.names import base
+from armid.discrepancy.names import SHOWN_AS, base, is_empirical, shown_name
 from armid.discrepancy.result import (
     EXPLAINED,
     NO_DISCREPANCY,
@@ -25,6 +26,7 @@ from armid.discrepancy.result import (
 )
 from armid.discrepancy.search import Level, Search
 from armid.discrepancy.select import criterion
+from armid.discrepancy.term import Term, empirical_term
 from armid.discrepancy.view import holdout_view, train_view
 from armid.identification import campaign_errors
 from armid.model import EFFECTS, Effect, Model
@@ -46,8 +48,9 @@ def close_loop(
     """Find what a declared model lacks on the train records of a campaign, and judge it on those held out.
 
     Identify the declared model; test what remains against noise; score every candidate effect, refit the leading ones,
-    add those that earn their parameters; group what cannot be told apart. Holdout records are simulated after the last
-    decision. Nothing is random: searches start from evenly spread candidates, so that `rng` is not drawn from.
+    add those that earn their parameters; group what cannot be told apart; where none will do, recover the missing
+    signal without a form and add an empirical term. Holdout records are simulated after the last decision. Nothing is
+    random: searches start from evenly spread candidates, so that `rng` is not drawn from.
     candidates: name -> effect; those whose ports the plant does not offer are left out. bounds, fixed: parameter -> SI,
     of the model or of a candidate. told: called with a sentence before what takes long.
 
@@ -57,18 +60,24 @@ def close_loop(
     library = library_of(model, candidates, evidence, campaign.parameters, bounds or {}, fixed or {}, threads, told)
     search = Search(library)
     levels = search.run()
-    chosen, groups, refused = settled(levels, search)
+    named, groups, refused = settled(levels, search)
+    declared, chosen = levels[0].best, named
+    missing, term = (None, None) if refused is not None else empirical_term(declared, named, search)
+    if term is not None:
+        chosen, search, library = term.fit, term.search, term.search.library
+        kept = [g for g, key in zip(groups, named.active, strict=True) if key in chosen.active]
+        groups = [*kept, group_of_term(term)]
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
-    path = [levels[0].best, *prefixes(chosen, search)]
-    bends = unseen(levels[0].best, search.trace(levels[0].best), library)
+    path = [declared, *prefixes(chosen, search)]
+    bends = unseen(declared, search.trace(declared), library)
     judged = [judge(fit, library, campaign.holdout, bends) for fit in path]
     steps = tuple(step_of(key, judged[i + 1], groups[i], library) for i, key in enumerate(chosen.active))
-    verdict = verdict_of(judged[0], judged[-1], groups, refused)
-    rivals = rivals_of(levels, groups, refused)
+    verdict = verdict_of(judged[0], judged[-1], steps, refused)
+    rivals = rivals_of(groups, refused)
     return ClosedLoop(
         campaign, float(np.mean([level.rms for level in evidence.levels])), verdict, judged[0], judged[-1], steps,
-        refused, advice_for(rivals, search, levels[-1].best, campaign.gyro_range, told), library, search,
+        refused, advice_for(rivals, search, levels[-1].best, campaign.gyro_range, told), library, search, missing, term,
     )  # fmt: skip
 
 
@@ -109,25 +118,32 @@ def judge(
 
 def step_of(key: str, after: Judgement, group: Group, library: Library) -> Step:
     """Return the step that added an effect."""
-    effect = library.originals[base(key)]
-    return Step(effect.name, ", ".join(effect.adds), group.names[1:], False, after, group)
+    effect, empirical = library.originals[base(key)], is_empirical(base(key))
+    return Step(library.public(key), ", ".join(effect.adds), group.names[1:], empirical, after, group)
 
 
-def verdict_of(before: Judgement, after: Judgement, groups: Sequence[Group], refused: Group | None) -> str:
-    """Return the verdict in one word."""
+def group_of_term(term: Term) -> Group:
+    """Return the group of an empirical term: the ports at which a curve would do as well."""
+    names = dict.fromkeys(shown_name(key_of(d)) for d in term.others)
+    return Group(shown_name(key_of(term.dependence)), tuple(Likeness(n, 0.0, 1.0) for n in names), ())
+
+
+def verdict_of(before: Judgement, after: Judgement, steps: Sequence[Step], refused: Group | None) -> str:
+    """Return the verdict in one word; a term without a name never explains."""
     if refused is not None:
         return TOO_ALIKE
-    if not groups:
+    if not steps:
         return UNEXPLAINED if before.diagnosis.significant else NO_DISCREPANCY
-    if after.significant:
+    if after.significant or any(s.empirical for s in steps):
         return PARTLY
-    return TOO_ALIKE if any(len(g.names) > 1 or g.unlike for g in groups) else EXPLAINED
+    return TOO_ALIKE if any(s.alternatives or s.group.unlike for s in steps) else EXPLAINED
 
 
-def rivals_of(levels: Sequence[Level], groups: Sequence[Group], refused: Group | None) -> list[tuple[str, ...]]:
-    """Return the names in each group of more than one."""
+def rivals_of(groups: Sequence[Group], refused: Group | None) -> list[tuple[str, ...]]:
+    """Return the names of effects in each group of more than one."""
     whole = [*groups, *([refused] if refused is not None else [])]
-    return [(g.name, *(r.name for r in (*g.alike, *g.unlike))) for g in whole if g.alike or g.unlike]
+    found = [(g.name, *(r.name for r in (*g.alike, *g.unlike))) for g in whole if g.alike or g.unlike]
+    return [names for names in found if not names[0].startswith(SHOWN_AS)]
 
 
 def advice_for(

@@ -7,11 +7,23 @@ from armid.model import Effect
 
 T = TypeVar("T")
 LOOSE = "+"
+# What the names of empirical terms begin with: no effect of a library may claim it.
+UNNAMED, SHOWN_AS = "unnamed_", "unnamed:"
 
 
 def base(key: str) -> str:
     """Return a key without the mark."""
     return key.removesuffix(LOOSE)
+
+
+def is_empirical(name: str) -> bool:
+    """Tell whether a name stands for an empirical term, which claims no physical effect."""
+    return name.startswith(UNNAMED)
+
+
+def shown_name(name: str) -> str:
+    """Return the name of an effect as reports show it: `unnamed:torque` for an empirical term at that port."""
+    return f"{SHOWN_AS}{name.removeprefix(UNNAMED).split('_by_')[0]}" if is_empirical(name) else name
 
 
 def own_name(effect: str, parameter: str) -> str:

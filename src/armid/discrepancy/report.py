@@ -7,6 +7,7 @@ from armid.discrepancy.words import (
     conclusion,
     diagnosis_sentences,
     doubt_sentences,
+    missing_sentences,
     parameter_rows,
     shift_sentences,
     step_headers,
@@ -33,6 +34,8 @@ def markdown(found: ClosedLoop, figures: Sequence[str]) -> str:
         lines += section("After, on the train records", bullets(diagnosis_sentences(found.after.diagnosis)))
     if found.after.holdout_diagnosis is not None:
         lines += section("After, on the records held out", bullets(diagnosis_sentences(found.after.holdout_diagnosis)))
+    if found.missing is not None:
+        lines += section("What is missing, without a name", bullets(missing_sentences(found.missing)))
     headers = ["effect", "predicted fall of chi2", "chance from noise"]
     lines += section("Leading candidates", table(headers, score_rows(found)))
     if found.advice:

@@ -12,7 +12,9 @@ from armid.discrepancy.estimates import Estimate
 from armid.discrepancy.fit import Fit
 from armid.discrepancy.group import Group
 from armid.discrepancy.library import Library
+from armid.discrepancy.missing import Missing
 from armid.discrepancy.search import Search
+from armid.discrepancy.term import Term
 from armid.discrepancy.view import View
 from armid.identification import Errors
 from armid.model import Model
@@ -68,7 +70,8 @@ class ClosedLoop:
 
     verdict: "no_discrepancy", "explained", "partly_explained", "unexplained" or "cannot_tell_apart". before, after: the
     declared model, and the model with the effects that earned their place. refused: a group too big to be a finding,
-    None where there is none. library, search: everything that was tried.
+    None where there is none. library, search: everything that was tried. missing: the signal that the named effects
+    leave unexplained, None where they leave nothing; term: the empirical term for it, None where none earned its place.
     """
 
     campaign: Campaign
@@ -81,6 +84,8 @@ class ClosedLoop:
     advice: tuple[Advice, ...]
     library: Library
     search: Search
+    missing: Missing | None
+    term: Term | None
 
     @property
     def effects(self) -> tuple[str, ...]:

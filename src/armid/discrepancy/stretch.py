@@ -17,6 +17,8 @@ KNOT_S, MOST_KNOTS = 0.02, 240
 # A test signal may move the output by this share of the speed scale: far above rounding, hardly beyond linearity.
 MOVES = 1e-4
 SIZES = 10.0 ** np.arange(-12.0, 10.0)
+PROBE = "probe_"
+ALIKE = 0.9999
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ def bump_at(port: str) -> Effect:
         Parameter("size", "1", -1.0, 1.0, null=0.0), Parameter("centre", "s", 0.0, 1.0),
         Parameter("width", "s", 1e-3, 1.0),
     )  # fmt: skip
-    return Effect("missing", parameters, {port: bump}, note="a triangle in time")
+    return Effect(f"{PROBE}{port}", parameters, {port: bump}, note="a triangle in time")
 
 
 def stretches(
@@ -59,18 +61,33 @@ def stretches(
     """Return every piece of the train records with its residual, sensitivities and gains.
 
     x: free parameters, SI, (n_free,); levels: what residuals of each record are divided by [its unit].
-    A port at which no signal moves the output has no gain. Each port costs one compiled model.
+    A port at which no signal moves the output has no gain. All ports together cost one compiled model.
     """
     candidate = space.complete(x[np.newaxis])[0]
     pairs = enumerate(zip(replays, levels, strict=True))
     whole = [piece_stretch(r, level, i, k, space, x) for i, (r, level) in pairs for k in range(len(r.pieces))]
+    extended = Model(model.plant, (*model.effects, *(bump_at(port) for port in ports)))
     for port in ports:
-        extended = model + bump_at(port)
-        size = fitting_size(extended, whole[0], candidate)
+        probe = Probe(extended, candidate, f"{PROBE}{port}")
+        size = fitting_size(probe, whole[0])
         if size is not None:
             for stretch in whole:
-                stretch.gains[port] = gain_of(extended, stretch, candidate, size) / levels[stretch.group]
+                stretch.gains[port] = gain_of(probe, stretch, size) / levels[stretch.group]
+    drop_alike(whole)
     return whole
+
+
+def drop_alike(whole: Sequence[Stretch]) -> None:
+    """Drop the ports whose signals do what those of an earlier port do, a factor aside: nothing tells them apart."""
+    kept: list[Array] = []
+    for port in list(whole[0].gains):
+        every = np.concatenate([s.gains[port].ravel() for s in whole])
+        unit = every / (np.linalg.norm(every) or 1.0)
+        if any(abs(float(unit @ other)) > ALIKE for other in kept):
+            for stretch in whole:
+                del stretch.gains[port]
+        else:
+            kept.append(unit)
 
 
 def piece_stretch(replay: Replay, level: float, group: int, index: int, space: Space, x: Array) -> Stretch:
@@ -90,28 +107,37 @@ def piece_stretch(replay: Replay, level: float, group: int, index: int, space: S
     )  # fmt: skip
 
 
-def with_bumps(candidate: Array, size: float | Array, centre: float | Array, width: float) -> Array:
-    """Return a candidate with a test signal for each size or centre, (n, n_parameters + 3)."""
-    sizes, centres = np.broadcast_arrays(np.atleast_1d(size), np.atleast_1d(centre))
-    rows = np.tile(np.concatenate([candidate, [0.0, 0.0, width]]), (len(sizes), 1))
-    rows[:, -3], rows[:, -2] = sizes, centres
-    return rows
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """Hold a model with a test signal at each port, and which of them is meant; candidate: of the model without."""
+
+    model: Model
+    candidate: Array
+    name: str
+
+    def rows(self, size: float | Array, centre: float | Array, width: float) -> Array:
+        """Return a candidate of the model with the test signal for each size or centre, (n, n_parameters)."""
+        sizes, centres = np.broadcast_arrays(np.atleast_1d(size), np.atleast_1d(centre))
+        names = list(self.model.parameters)
+        rows = np.tile(np.append(self.candidate, np.zeros(len(names) - len(self.candidate))), (len(sizes), 1))
+        rows[:, [i for i, n in enumerate(names) if n.startswith(PROBE) and n.endswith(".width")]] = width
+        rows[:, names.index(f"{self.name}.size")], rows[:, names.index(f"{self.name}.centre")] = sizes, centres
+        return rows
 
 
-def fitting_size(extended: Model, stretch: Stretch, candidate: Array) -> float | None:
+def fitting_size(probe: Probe, stretch: Stretch) -> float | None:
     """Return the largest power of ten of a test signal whose effect on the output is still small, None without any."""
     knots = stretch.knots
-    rows = with_bumps(candidate, np.append(0.0, SIZES), float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
-    run = simulate(extended, stretch.piece.manoeuvre, rows, stretch.schedule)
+    rows = probe.rows(np.append(0.0, SIZES), float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
+    run = simulate(probe.model, stretch.piece.manoeuvre, rows, stretch.schedule)
     moved = np.abs(run.output[1:] - run.output[0]).max(axis=1)
-    small = np.isfinite(moved) & (moved <= MOVES * extended.plant.scales.speed) & (moved > 0.0)
+    small = np.isfinite(moved) & (moved <= MOVES * probe.model.plant.scales.speed) & (moved > 0.0)
     return float(SIZES[small][-1]) if small.any() else None
 
 
-def gain_of(extended: Model, stretch: Stretch, candidate: Array, size: float) -> Array:
+def gain_of(probe: Probe, stretch: Stretch, size: float) -> Array:
     """Return d signal / d missing signal at each knot, (n_samples, n_knots), forward differences."""
     width = float(stretch.knots[1] - stretch.knots[0])
-    sizes = np.append(0.0, np.full(len(stretch.knots), size))
-    rows = with_bumps(candidate, sizes, np.append(0.0, stretch.knots), width)
-    output = simulate(extended, stretch.piece.manoeuvre, rows, stretch.schedule).output[:, stretch.piece.window]
+    rows = probe.rows(np.append(0.0, np.full(len(stretch.knots), size)), np.append(0.0, stretch.knots), width)
+    output = simulate(probe.model, stretch.piece.manoeuvre, rows, stretch.schedule).output[:, stretch.piece.window]
     return np.asarray((output[1:] - output[0]).T / size)

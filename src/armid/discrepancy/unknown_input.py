@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 STRENGTHS = 10.0 ** np.arange(-8.0, 6.0, 0.5)
 # Beside the squared second differences (up to 16): keeps straight lines from being free.
 LITTLE = 1e-6
+# Smaller eigenvalues of the normal equations, relative to the largest, are rounding.
+ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,31 +43,34 @@ def missing_signal(whole: Sequence[Stretch], port: str) -> MissingSignal:
     r, g = without(basis, residual), without(basis, columns)
     scale = np.sqrt(np.mean(np.sum(g**2, axis=0))) or 1.0
     rough = block_diagonal([np.diff(np.eye(len(s.knots)), 2, axis=0) for s in whole])
-    turn, triangle = np.linalg.qr(g / scale)
-    strength, signal = smoothest(triangle, turn.T @ r, rough, float(r @ r), len(r))
+    strength, signal = smoothest(g.T @ g / scale**2, g.T @ r / scale, rough, float(r @ r), len(r))
     rest = r - g @ signal / scale
     edges = np.cumsum([len(s.knots) for s in whole])[:-1]
     share = 1.0 - float(rest @ rest) / float(r @ r)
     return MissingSignal(port, tuple(np.split(signal / scale, edges)), share, strength)
 
 
-def smoothest(triangle: Array, turned: Array, rough: Array, total: float, n: int) -> tuple[float, Array]:
+def smoothest(normal: Array, slope: Array, rough: Array, total: float, n: int) -> tuple[float, Array]:
     """Return strength and solution with the least generalised cross-validation score, n |rest|^2 / (n - freedom)^2.
 
-    triangle, turned: the factor R and Q^T r of the residual's least-squares problem; total: |r|^2; n: samples.
+    normal, slope: G^T G and G^T r of the residual's least-squares problem; total: |r|^2; n: samples.
     In c = L^-T b with L L^T = D^T D + a little, the smoothing is plain ridge: one decomposition serves all strengths.
     """
     lower = np.linalg.cholesky(rough.T @ rough + LITTLE * np.eye(rough.shape[1]))
-    left, values, right = np.linalg.svd(np.linalg.solve(lower, triangle.T).T, full_matrices=False)
-    seen = left.T @ turned
-    outside = max(total - float(seen @ seen), 0.0)
+    inner = np.linalg.solve(lower, np.linalg.solve(lower, normal).T)
+    values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+    seen = values > ROUNDING * values[-1]
+    values, vectors = values[seen], vectors[:, seen]
+    along = vectors.T @ np.linalg.solve(lower, slope)
+    squares = along**2 / values
+    outside = max(total - float(squares.sum()), 0.0)
     scores = []
     for strength in STRENGTHS:
-        kept = values**2 / (values**2 + strength)
-        rest = outside + float(np.sum(((1.0 - kept) * seen) ** 2))
+        kept = values / (values + strength)
+        rest = outside + float(np.sum((1.0 - kept) ** 2 * squares))
         scores.append(n * rest / (n - min(float(kept.sum()), 0.9 * n)) ** 2)
     strength = float(STRENGTHS[int(np.argmin(scores))])
-    return strength, np.linalg.solve(lower.T, right.T @ (values / (values**2 + strength) * seen))
+    return strength, np.linalg.solve(lower.T, vectors @ (along / (values + strength)))
 
 
 def parameter_basis(whole: Sequence[Stretch]) -> Array:

@@ -4,6 +4,8 @@ import numpy as np
 
 from armid.discrepancy.diagnose import SIGNIFICANCE, Diagnosis, Finding
 from armid.discrepancy.estimates import Estimate
+from armid.discrepancy.missing import Missing
+from armid.discrepancy.names import SHOWN_AS
 from armid.discrepancy.result import (
     EXPLAINED,
     NO_DISCREPANCY,
@@ -17,31 +19,58 @@ from armid.display import SHOWN, shown
 
 # A shift of a parameter by more than this share of its value, and of its interval, is told.
 SHIFTED = 0.01
-MOST_TOLD = 3
+MOST_TOLD, MOST_PORTS = 3, 5
+TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
 # Smaller chances than this are all the same.
 LEAST = 1e-12
 
 
 def conclusion(found: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
+    if found.verdict == TOO_ALIKE:
+        return doubtful(found)
+    if found.term is not None:
+        return partly_empirical(found)
     names = " + ".join(found.effects)
-    doubtful = [s for s in found.steps if s.alternatives]
-    texts = {
+    return {
         NO_DISCREPANCY: "What the declared model leaves is noise: nothing is missing that these records could show.",
         EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on train and holdout.",
         PARTLY: f"The declared model lacks {names}, but a significant discrepancy remains: that is part of the story.",
         UNEXPLAINED: "The declared model lacks something, but no effect of the library earns its parameters.",
-    }
-    if found.verdict != TOO_ALIKE:
-        return texts[found.verdict]
+    }[found.verdict]
+
+
+def doubtful(found: ClosedLoop) -> str:
+    """Return which effects would do as well."""
     if found.refused is not None:
         rivals = [r.name for r in (*found.refused.alike, *found.refused.unlike)]
         return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
                 f"as well ({found.refused.name}, {', '.join(rivals[:6])}): none is named.")  # fmt: skip
-    said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in doubtful]
+    said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
     said += [f"{s.effect} fits hardly better than {' or '.join(r.name for r in s.group.unlike)}"
              for s in found.steps if s.group.unlike]  # fmt: skip
-    return f"With {names} what remains is noise, but on these records {'; '.join(said)}."
+    return f"With {' + '.join(found.effects)} what remains is noise, but on these records {'; '.join(said)}."
+
+
+def partly_empirical(found: ClosedLoop) -> str:
+    """Return what the empirical term stands for."""
+    assert found.term is not None
+    named = " + ".join(found.effects[:-1])
+    lacking = f"The declared model lacks {named}, and beside it" if named else "The declared model lacks"
+    dependence = found.term.dependence
+    return (f"{lacking} something that no effect of the library explains: {found.effects[-1]} is an empirical curve "
+            f"over {dependence.variable}{TIMES[dependence.factor]} at port {dependence.port}, which claims no physical "
+            "name.")  # fmt: skip
+
+
+def missing_sentences(missing: Missing) -> list[str]:
+    """Return at which port the missing signal is, and on what it depends."""
+    ports = ", ".join(f"{s.port} {max(s.share, 0.0):.0%}" for s in missing.signals[:MOST_PORTS])
+    said = [f"A signal without a form would remove this share of the residual at port: {ports}."]
+    best = {d.variable: d for d in reversed(missing.dependences)}
+    ranked = sorted(best.values(), key=lambda d: -d.share)[:MOST_PORTS]
+    curves = ", ".join(f"{d.variable}{TIMES[d.factor]} at {d.port} {max(d.share, 0.0):.0%}" for d in ranked)
+    return [*said, f"On what it depends, by the share that a curve predicts on parts left out of its fit: {curves}."]
 
 
 def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -104,7 +133,8 @@ def doubt_sentences(judged: Judgement) -> list[str]:
     """Return why parameters are not to be trusted."""
     reasons: dict[tuple[str, ...], list[str]] = {}
     for e in judged.estimates:
-        if e.doubts and e.low is not None:
+        # The heights of an empirical curve mean nothing one by one.
+        if e.doubts and e.low is not None and not e.name.startswith(SHOWN_AS):
             reasons.setdefault(e.doubts, []).append(e.name)
     return [f"Not to be trusted: {', '.join(names)} ({'; '.join(why)})." for why, names in reasons.items()]
 
@@ -157,6 +187,8 @@ def remarks(found: ClosedLoop) -> list[str]:
     said = [conclusion(found)]
     if found.steps:
         said += shift_sentences(found.before, found.after)
+    if found.missing is not None:
+        said += missing_sentences(found.missing)
     said += doubt_sentences(found.after)
     said += [f"A record of this manoeuvre would separate {' and '.join(a.separates)} with a chance of {a.power:.0%}: "
              f"{a.words}." for a in found.advice[:1]]  # fmt: skip

@@ -1,6 +1,6 @@
 """Which parameters are searched, between which bounds, and what the others are."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,6 +61,13 @@ class Space:
         if not np.isfinite(value):
             raise ArmidError(f"'{name}' is fixed at {value}: a finite number is expected")
         return replace(self, fixed=put(self.fixed, i, value))
+
+    def only(self, names: Collection[str]) -> "Space":
+        """Return the space of some of the parameters, in the order that they have here."""
+        kept = np.array([n in names for n in self.names], dtype=np.bool_)
+        named = tuple(n for n in self.names if n in names)
+        units = tuple(u for u, k in zip(self.units, kept, strict=True) if k)
+        return Space(named, units, self.low[kept], self.high[kept], self.fixed[kept])
 
     def index(self, name: str) -> int:
         """Return the place of a parameter; refuse an unknown name with ArmidError."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from armid.discrepancy.figures.autocorrelation import autocorrelation_figure
 from armid.discrepancy.figures.diagnosis import diagnosis_figure
+from armid.discrepancy.figures.missing import missing_figure
 from armid.discrepancy.figures.ranking import ranking_figure
 from armid.discrepancy.figures.residuals import residual_figure
 from armid.discrepancy.figures.shifts import shift_figure
@@ -17,3 +18,10 @@ FIGURES: dict[str, Callable[[ClosedLoop, Path], None]] = {
     "parameters.png": shift_figure,
     "autocorrelation.png": autocorrelation_figure,
 }
+
+MISSING = {"missing.png": missing_figure}
+
+
+def figures_of(found: ClosedLoop) -> dict[str, Callable[[ClosedLoop, Path], None]]:
+    """Return the figures that a result has: that of a missing signal only where one was sought."""
+    return FIGURES | (MISSING if found.missing is not None else {})

@@ -15,12 +15,13 @@ def torque(theta, sine, cosine, waves):
     return sine * np.sin(waves * theta) + cosine * np.cos(waves * theta)
 
 
+# A wave as long as the motion is no ripple, and could stand for anything that depends on position: hence from 20.
 torque_ripple = Effect(
     name="torque_ripple",
     parameters=(
         Parameter("sine", "effort", -0.2, 0.2, null=0.0, note="amplitude of the sine"),
         Parameter("cosine", "effort", -0.2, 0.2, null=0.0, note="amplitude of the cosine"),
-        Parameter("waves", "1/speed/s", 5.0, 500.0, nominal=50.0, note="2 pi per period of position"),
+        Parameter("waves", "1/speed/s", 20.0, 500.0, nominal=50.0, note="2 pi per period of position"),
     ),
     adds={"torque": torque},
     note="torque that repeats with position",
