@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from armid.discrepancy.result import ClosedLoop
 from armid.discrepancy.words import (
+    advice_sentence,
     conclusion,
     diagnosis_sentences,
     doubt_sentences,
@@ -39,8 +40,9 @@ def markdown(found: ClosedLoop, figures: Sequence[str]) -> str:
     headers = ["effect", "predicted fall of chi2", "chance from noise"]
     lines += section("Leading candidates", table(headers, score_rows(found)))
     if found.advice:
+        lines_of_advice = [advice_sentence(found.advice[0]), ""]
         rows = [[a.words, " and ".join(a.separates), f"{a.power:.0%}"] for a in found.advice]
-        lines += section("The next record", table(["manoeuvre", "separates", "power"], rows))
+        lines += section("The next record", lines_of_advice + table(["manoeuvre", "separates", "power"], rows))
     lines += section("Figures", [line for name in figures for line in (f"![{name}]({name})", "")])
     return "\n".join(lines).rstrip() + "\n"
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from armid.discrepancy.advise import Advice
 from armid.discrepancy.diagnose import SIGNIFICANCE, Diagnosis, Finding
 from armid.discrepancy.estimates import Estimate
 from armid.discrepancy.missing import Missing
@@ -21,6 +22,8 @@ from armid.display import SHOWN, shown
 SHIFTED = 0.01
 MOST_TOLD, MOST_PORTS = 3, 5
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
+# A manoeuvre that separates rivals with a smaller chance is no advice.
+HOPELESS = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
 
@@ -190,6 +193,13 @@ def remarks(found: ClosedLoop) -> list[str]:
     if found.missing is not None:
         said += missing_sentences(found.missing)
     said += doubt_sentences(found.after)
-    said += [f"A record of this manoeuvre would separate {' and '.join(a.separates)} with a chance of {a.power:.0%}: "
-             f"{a.words}." for a in found.advice[:1]]  # fmt: skip
-    return said
+    return [*said, *(advice_sentence(a) for a in found.advice[:1])]
+
+
+def advice_sentence(best: Advice) -> str:
+    """Return what the most telling manoeuvre would do."""
+    names = " and ".join(best.separates)
+    if best.power < HOPELESS:
+        return (f"No manoeuvre that this machine can make is likely to separate {names}: the best, {best.words}, has a "
+                f"chance of {best.power:.0%}.")  # fmt: skip
+    return f"A record of this manoeuvre would separate {names} with a chance of {best.power:.0%}: {best.words}."
