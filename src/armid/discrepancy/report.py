@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
+from armid.discrepancy.conclusion import conclusion
 from armid.discrepancy.result import ClosedLoop
 from armid.discrepancy.words import (
     advice_sentence,
-    conclusion,
     diagnosis_sentences,
     doubt_sentences,
     missing_sentences,

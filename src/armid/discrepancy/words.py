@@ -3,67 +3,21 @@
 import numpy as np
 
 from armid.discrepancy.advise import Advice
+from armid.discrepancy.conclusion import TIMES, conclusion
 from armid.discrepancy.diagnose import SIGNIFICANCE, Diagnosis, Finding
 from armid.discrepancy.estimates import Estimate
 from armid.discrepancy.missing import Missing
 from armid.discrepancy.names import SHOWN_AS
-from armid.discrepancy.result import (
-    EXPLAINED,
-    NO_DISCREPANCY,
-    PARTLY,
-    TOO_ALIKE,
-    UNEXPLAINED,
-    ClosedLoop,
-    Judgement,
-)
+from armid.discrepancy.result import ClosedLoop, Judgement
 from armid.display import SHOWN, shown
 
 # A shift of a parameter by more than this share of its value, and of its interval, is told.
 SHIFTED = 0.01
 MOST_TOLD, MOST_PORTS = 3, 5
-TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
 # A manoeuvre that separates rivals with a smaller chance is no advice.
 HOPELESS = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
-
-
-def conclusion(found: ClosedLoop) -> str:
-    """Return the verdict as one sentence."""
-    if found.verdict == TOO_ALIKE:
-        return doubtful(found)
-    if found.term is not None:
-        return partly_empirical(found)
-    names = " + ".join(found.effects)
-    return {
-        NO_DISCREPANCY: "What the declared model leaves is noise: nothing is missing that these records could show.",
-        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on train and holdout.",
-        PARTLY: f"The declared model lacks {names}, but a significant discrepancy remains: that is part of the story.",
-        UNEXPLAINED: "The declared model lacks something, but no effect of the library earns its parameters.",
-    }[found.verdict]
-
-
-def doubtful(found: ClosedLoop) -> str:
-    """Return which effects would do as well."""
-    if found.refused is not None:
-        rivals = [r.name for r in (*found.refused.alike, *found.refused.unlike)]
-        return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
-                f"as well ({found.refused.name}, {', '.join(rivals[:6])}): none is named.")  # fmt: skip
-    said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
-    said += [f"{s.effect} fits hardly better than {' or '.join(r.name for r in s.group.unlike)}"
-             for s in found.steps if s.group.unlike]  # fmt: skip
-    return f"With {' + '.join(found.effects)} what remains is noise, but on these records {'; '.join(said)}."
-
-
-def partly_empirical(found: ClosedLoop) -> str:
-    """Return what the empirical term stands for."""
-    assert found.term is not None
-    named = " + ".join(found.effects[:-1])
-    lacking = f"The declared model lacks {named}, and beside it" if named else "The declared model lacks"
-    dependence = found.term.dependence
-    return (f"{lacking} something that no effect of the library explains: {found.effects[-1]} is an empirical curve "
-            f"over {dependence.variable}{TIMES[dependence.factor]} at port {dependence.port}, which claims no physical "
-            "name.")  # fmt: skip
 
 
 def missing_sentences(missing: Missing) -> list[str]:
