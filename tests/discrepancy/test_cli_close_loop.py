@@ -32,6 +32,15 @@ def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
     for name in figures:
         assert f"]({name})" in text
         assert (tmp_path / "out" / name).stat().st_size > 10_000
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert page.count("<svg") == 5 + 4 + 4
+    for wanted in ("Explained: The declared model lacked supply_sag", "+     supply_sag.supply = ", "armid close-loop ",
+                   "What supply_sag would explain", "Error on the records held out"):  # fmt: skip
+        assert wanted in page, wanted
+    with pytest.raises(SystemExit) as left:
+        main(["report", str(tmp_path / "out")])
+    assert left.value.code == 0
+    assert (tmp_path / "out" / "report.html").read_text() == page
 
 
 @pytest.mark.parametrize(

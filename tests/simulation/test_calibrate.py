@@ -1,6 +1,7 @@
 """How finely time is cut: as finely as the error asks for."""
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -31,6 +32,19 @@ def test_a_finer_accuracy_takes_more_steps(arm: Model, manoeuvres: dict[str, Man
     assert fine.error < standard.error
     assert standard.reached
     assert fine.reached
+
+
+def test_a_long_record_is_calibrated_in_parts(
+    arm: Model, manoeuvres: dict[str, Manoeuvre], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spread = probes(*box_of(arm))
+    whole = calibrate(arm, manoeuvres["lower"], spread, spans=False)
+    monkeypatch.setattr(import_module("armid.simulation.calibrate"), "MOST_VALUES", 1000)
+    parts = calibrate(arm, manoeuvres["lower"], spread)
+    assert parts.schedule.substeps == whole.schedule.substeps
+    assert parts.schedule.plan is None
+    assert parts.reached
+    assert whole.error <= parts.error <= 3.0 * whole.error
 
 
 def test_the_error_is_honest(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:

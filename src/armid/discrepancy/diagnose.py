@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import f as f_distribution
 
-from armid.discrepancy.fit import span
+from armid.discrepancy.bins import binned, square_along, stretched
 from armid.discrepancy.view import View
 
 Array = NDArray[np.float64]
 # Chance of a false alarm, all tests together.
 SIGNIFICANCE = 0.01
-N_BINS, LAGS = 12, 40
+LAGS = 40
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
 # Neighbouring ordinates of a tapered periodogram tell partly the same; a band needs so many of the rest.
 INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
@@ -138,37 +138,18 @@ def dependence_tests(view: View) -> Iterator[Finding]:
     for name, values in view.variables.items():
         if name != "time" and np.ptp(values) > 0.0:
             yield structure(view, "dependence", name, binned(values))
-    yield structure(view, "dependence", "time in the record", stretched(view))
+    yield structure(view, "dependence", "time in the record", stretched(view.evidence.edges))
 
 
 def structure(view: View, kind: str, where: str, columns: Array) -> Finding:
     """Test a residual for a part along some columns (not yet whitened), (n_samples, n_columns)."""
     white = view.evidence.white(view.evidence.by_record(columns.T)).T
-    basis = span(white - view.basis @ (view.basis.T @ white))
-    square = float(np.sum((basis.T @ view.residual) ** 2)) / scale(view)
+    along, rank = square_along(white - view.basis @ (view.basis.T @ white), view.residual)
+    square = along / scale(view)
     if not view.evidence.known:
         # Neighbours tell the same: of the residual's own scatter only the independent samples count.
         square *= view.evidence.independent(view.residual) / len(view.residual)
-    rank = basis.shape[1]
     return Finding(kind, where, square / rank, float(f_distribution.sf(square / rank, rank, doubt(view))))
-
-
-def binned(values: Array) -> Array:
-    """Return indicators of bins that hold about equally many samples, (n_samples, n_bins)."""
-    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, N_BINS + 1)))
-    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
-    return indicators(place)
-
-
-def stretched(view: View) -> Array:
-    """Return indicators of twelve stretches of time of each record."""
-    parts = [np.arange(n) * N_BINS // max(n, 1) for n in np.diff(view.evidence.edges)]
-    return indicators(np.concatenate([p + i * N_BINS for i, p in enumerate(parts)]))
-
-
-def indicators(place: NDArray[np.int64]) -> Array:
-    """Return a column for each value, 1 where it is taken."""
-    return np.asarray(place[:, np.newaxis] == np.unique(place), dtype=np.float64)
 
 
 def band_tests(view: View) -> Iterator[Finding]:

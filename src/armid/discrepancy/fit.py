@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
+from armid.discrepancy.descend import descend
 from armid.discrepancy.evidence import WhiteRecords
-from armid.identifiability.refine import fit as least_squares_fit
 from armid.model import ArmidError
 from armid.simulation import probes
 
@@ -74,7 +74,16 @@ class Fit:
     @cached_property
     def basis(self) -> Array:
         """Orthonormal basis of what the free parameters can absorb, (n_samples, rank)."""
-        return span(self.jacobian)
+        return self._decomposed[0]
+
+    @cached_property
+    def answer(self) -> Array:
+        """How the free parameters answer to a change of the whitened signal, (n_free, n_samples)."""
+        return self._decomposed[1]
+
+    @cached_property
+    def _decomposed(self) -> tuple[Array, Array]:
+        return decomposed(self.jacobian)
 
     def column_names(self) -> list[str]:
         """Return which key each free parameter belongs to, the name of the parameter where it is the plant's own."""
@@ -83,12 +92,20 @@ class Fit:
 
 def span(columns: Array) -> Array:
     """Return an orthonormal basis of columns; directions below 1e-7 of the largest are rounding."""
+    return decomposed(columns)[0]
+
+
+def decomposed(columns: Array) -> tuple[Array, Array]:
+    """Return an orthonormal basis of columns (see `span`), and their pseudoinverse, (n_columns, n_rows)."""
     scale = np.linalg.norm(columns, axis=0)
-    good = columns[:, scale > 0.0] / scale[scale > 0.0]
-    if not good.shape[1]:
-        return np.empty((len(columns), 0))
-    left, values, _ = np.linalg.svd(good, full_matrices=False)
-    return np.asarray(left[:, values > 1e-7 * values[0]])
+    seen = scale > 0.0
+    inverse = np.zeros((columns.shape[1], len(columns)))
+    if not seen.any():
+        return np.empty((len(columns), 0)), inverse
+    left, values, right = np.linalg.svd(columns[:, seen] / scale[seen], full_matrices=False)
+    good = values > 1e-7 * values[0]
+    inverse[seen] = (right[good].T / values[good]) @ left[:, good].T / scale[seen, np.newaxis]
+    return np.asarray(left[:, good]), inverse
 
 
 def fit_from(records: WhiteRecords, active: Sequence[str], starts: Sequence[Array]) -> Fit:
@@ -98,12 +115,10 @@ def fit_from(records: WhiteRecords, active: Sequence[str], starts: Sequence[Arra
     """
     if not records.space.free.any():
         return evaluated(records, active, np.empty(0))
-    good = [z for z in starts if np.isfinite(records.residual(z)).all()]
+    good = [z for z, chi2 in zip(starts, records.chi2(np.array(starts)), strict=True) if np.isfinite(chi2)]
     if not good:
         raise ArmidError("each start of a fit diverged: other bounds are expected")
-    found = [least_squares_fit(records, z, TOLERANCE) for z in good]
-    best = found[0] if len(found) == 1 else found[int(np.argmin(records.chi2(np.array(found))))]
-    return evaluated(records, active, best)
+    return evaluated(records, active, descend(records, good, TOLERANCE))
 
 
 def evaluated(records: WhiteRecords, active: Sequence[str], z: Array) -> Fit:

@@ -62,9 +62,11 @@ def close_loop(
     levels = search.run()
     named, groups, refused = settled(levels, search)
     declared, chosen = levels[0].best, named
-    missing, term = (None, None) if refused is not None else empirical_term(declared, named, search)
+    # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
+    answered = refused is not None and not diagnose(train_view(levels[-1].best)).significant
+    missing, term = (None, None) if answered else empirical_term(declared, named, search)
     if term is not None:
-        chosen, search, library = term.fit, term.search, term.search.library
+        chosen, search, library, refused = term.fit, term.search, term.search.library, None
         kept = [g for g, key in zip(groups, named.active, strict=True) if key in chosen.active]
         groups = [*kept, group_of_term(term)]
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
@@ -124,8 +126,8 @@ def step_of(key: str, after: Judgement, group: Group, library: Library) -> Step:
 
 def group_of_term(term: Term) -> Group:
     """Return the group of an empirical term: the ports at which a curve would do as well."""
-    names = dict.fromkeys(shown_name(key_of(d)) for d in term.others)
-    return Group(shown_name(key_of(term.dependence)), tuple(Likeness(n, 0.0, 1.0) for n in names), ())
+    names = dict.fromkeys(shown_name(key_of(d.port)) for d in term.others)
+    return Group(shown_name(key_of(term.dependence.port)), tuple(Likeness(n, 0.0, 1.0) for n in names), ())
 
 
 def verdict_of(before: Judgement, after: Judgement, steps: Sequence[Step], refused: Group | None) -> str:

@@ -1,18 +1,19 @@
 """Where the library ends: the signal that a model lacks, recovered at each port without a form."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.discrepancy.dependence import Dependence, Motion, dependences, motions
 from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit
-from armid.discrepancy.library import Library
-from armid.discrepancy.names import base
-from armid.discrepancy.stretch import Stretch, stretches
+from armid.discrepancy.library import Library, idle
+from armid.discrepancy.stretch import PROBE, Stretch, stretches
 from armid.discrepancy.unknown_input import MissingSignal, missing_signal
 
+Array = NDArray[np.float64]
 # A signal without a form is sought at so many knots in all: its cost grows with their square.
 MOST_KNOTS = 600
 
@@ -39,25 +40,25 @@ class Missing:
 def missing_from(lacking: Fit, library: Library) -> Missing:
     """Recover the missing signal at every port of a fitted model, and on what it depends there.
 
-    Each port costs a simulation for every knot of every piece.
+    library: with the test signals (see `with_terms`). Each port costs a simulation for every knot of every piece.
     """
-    records = narrow(lacking, library)
+    records, x = posed_in(library, lacking, ())
     model, levels = records.replays[0].model, [level.rms for level in records.evidence.levels]
-    whole = stretches(model, records.space, lacking.x, records.replays, levels, list(model.plant.ports))
+    ports = [p for p in model.plant.ports if f"{PROBE}{p}" in library.candidates]
+    whole = stretches(model, records.space, x, records.replays, levels, ports)
     shown = spread(whole)
-    moved = motions(model, records.space.complete(lacking.x[np.newaxis])[0], whole)
+    moved = motions(model, records.space.complete(x[np.newaxis])[0], whole)
     signals = sorted((missing_signal(shown, port) for port in whole[0].gains), key=lambda s: -s.share)
     kept = tuple(m for m in moved if any(m.stretch is s for s in shown))
     return Missing(lacking, kept, tuple(signals), tuple(dependences(moved)))
 
 
-def narrow(lacking: Fit, library: Library) -> WhiteRecords:
-    """Return the problem of a fit for a model that holds its effects and no other candidates: quicker to compile."""
-    names = [n.partition(".")[0] for n in lacking.records.space.names]
-    keys = sorted({base(n) for n in lacking.active}, key=lambda k: names.index(k) if k in names else -1)
-    model = library.composed(keys)
-    ready = tuple(replace(r, model=model) for r in lacking.records.replays)
-    return replace(lacking.records, replays=ready, space=lacking.records.space.only(tuple(model.parameters)))
+def posed_in(library: Library, lacking: Fit, added: tuple[str, ...]) -> tuple[WhiteRecords, Array]:
+    """Return the problem of a fit, with effects added at rest, in another library, and its free parameters, SI."""
+    records = library.problem((*lacking.active, *added), lacking.values)
+    declared = records.replays[0].model.parameters
+    free = records.space.free_names
+    return records, np.array([lacking.values[n] if n in lacking.values else idle(declared[n]) for n in free])
 
 
 def spread(whole: Sequence[Stretch]) -> list[Stretch]:

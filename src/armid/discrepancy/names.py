@@ -22,7 +22,11 @@ def is_empirical(name: str) -> bool:
 
 
 def shown_name(name: str) -> str:
-    """Return the name of an effect as reports show it: `unnamed:torque` for an empirical term at that port."""
+    """Return the name of an effect as reports show it: `unnamed:torque` for an empirical term at that port.
+
+    >>> shown_name("unnamed_torque_by_theta"), shown_name("coulomb")
+    ('unnamed:torque', 'coulomb')
+    """
     return f"{SHOWN_AS}{name.removeprefix(UNNAMED).split('_by_')[0]}" if is_empirical(name) else name
 
 

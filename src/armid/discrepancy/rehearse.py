@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from armid.discrepancy.descend import descend
 from armid.discrepancy.foresee import Rival, Whitening, outside
 from armid.identifiability import WeightedRecords
 from armid.identifiability.manoeuvres import Feasible
 from armid.identifiability.motions import fine_schedule
-from armid.identifiability.refine import fit
-from armid.model import ArmidError
 from armid.simulation import simulate
 
 Array = NDArray[np.float64]
@@ -97,8 +96,8 @@ def fitted_again(rival: Rival, feasible: Feasible, white: Whitening, seen: Array
     """
     space = rival.records.space
     joint = Joint((), space, (), rival=rival, feasible=feasible, white=white, seen=seen)
-    try:
-        z = fit(joint, rival.z, TOLERANCE)
-    except ArmidError:
+    start = np.clip(rival.z, 0.0, 1.0)
+    if not np.isfinite(joint.chi2(start)[0]):
         return rival.criterion + float(seen @ seen), np.zeros_like(seen)
+    z = descend(joint, [start], TOLERANCE)
     return rival.criterion + float(joint.chi2(z)[0]), joint.predicted(z[np.newaxis])[0]

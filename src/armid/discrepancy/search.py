@@ -1,36 +1,33 @@
 """Look for the effects that the records ask for: one more at a time, a few models of each size kept."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.discrepancy.diagnose import diagnose
+from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from, fit_globally
 from armid.discrepancy.library import Library, idle
 from armid.discrepancy.names import LOOSE, base
-from armid.discrepancy.select import Verdict, compare, criterion
+from armid.discrepancy.ranking import SURE, WITHIN, leading, promising, ranked
+from armid.discrepancy.select import Verdict, compare
 from armid.discrepancy.trace import Score, accurate, refitted, traced
 from armid.discrepancy.view import train_view
 from armid.model import ArmidError
 
+Array = NDArray[np.float64]
 MOST_EFFECTS = 6
 # Of one size so many models are extended: a strong second effect can mislead the choice of the first.
 BEAM = 3
-# Scores are a linear guess: refit at least and at most so many, and those within a factor of the best.
-FEWEST, MOST, WITHIN = 6, 12, 4.0
-# A drop of chi2 that one candidate in thousands reaches on noise: below it nothing is refitted.
-WORTH = 8.0
-# An addition whose statistic stays below this is not looked at further; one in ten thousand asks for 15.
-PROMISING = 12.0
 N_EXCHANGES = 3
-# Models within this factor of the least chi2 are told apart by the criterion; what they leave has about one character.
-COMPARABLE = 1.5
 # Where no test of what remains is more striking than this, all together, no second effect is looked for: it would need
 # more of the residual than the tests would overlook, and looking costs more than everything before.
 QUIET = 0.1
 # Of so many of the best the fixed shapes are set free: a rival must not lose by the width of a sign alone.
 N_LOOSENED = 4
+LOOSENED_WITHIN = 4.0
 LOOSE_STARTS = (0.03, 0.5)
 
 
@@ -91,7 +88,8 @@ class Search:
             best = self.of_size(size)[0]
             self.exchange(best)
             for fit in self.of_size(size)[:N_LOOSENED]:
-                self.loosen(fit)
+                if fit.chi2 <= LOOSENED_WITHIN * best.chi2:
+                    self.loosen(fit)
             if self.of_size(size)[0] is best:
                 break
         smaller, fits = self.of_size(size - 1)[0], self.of_size(size)
@@ -119,10 +117,19 @@ class Search:
         key = frozenset(rest)
         if key not in self.fits:
             records = self.library.problem(rest, fit.values)
-            declared, values = records.replays[0].model.parameters, fit.values
-            x = np.array([values.get(n, idle(declared[n])) for n in records.space.free_names])
-            self.fits[key] = accurate(fit_from(records, rest, [records.shares(x)]), self.library)
+            start = self.start_of(records, fit.values)
+            if not np.isfinite(records.chi2(start)[0]):
+                # What was held in check by the effect that is gone may run away: begin with all that is left at rest.
+                start = self.start_of(records, self.fits[frozenset()].values)
+            self.fits[key] = accurate(fit_from(records, rest, [start]), self.library)
         return self.fits[key]
+
+    @staticmethod
+    def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
+        """Return shares of the range of some values, parameters that have none where they rest."""
+        declared = records.replays[0].model.parameters
+        x = np.array([values.get(n, idle(declared[n])) for n in records.space.free_names])
+        return np.clip(records.shares(x), 0.0, 1.0)
 
     def loosen(self, fit: Fit) -> None:
         """Set the fixed shapes of each effect free, such as the speed over which the sign of friction is smoothed.
@@ -143,14 +150,19 @@ class Search:
 
     def extend(self, parent: Fit) -> None:
         """Fit a model with each of the leading candidates added."""
-        for found in leading(parent, self.trace(parent)):
+        for place, found in enumerate(leading(parent, self.trace(parent))):
             key = frozenset((*parent.active, found.name))
-            if key not in self.fits:
+            if key not in self.fits and (place < SURE or self.within_reach(parent, found)):
                 self.library.told(f"fitting {self.shown((*parent.active, found.name))}")
                 try:
                     self.fits[key] = refitted(parent, found, self.library)
                 except ArmidError:
                     continue
+
+    def within_reach(self, parent: Fit, found: Score) -> bool:
+        """Tell whether a candidate may do as well as the best model of its size, its score a guess within a factor."""
+        known = [f.chi2 for key, f in self.fits.items() if len(key) == len(parent.active) + 1]
+        return parent.chi2 - WITHIN * found.drop <= min(known, default=np.inf)
 
     def trace(self, fit: Fit) -> list[Score]:
         """Return the scores of the candidates at a fit, best first."""
@@ -178,28 +190,3 @@ class Search:
         """Return the models with a number of effects, by their criterion, best first."""
         fits = [f for key, f in self.fits.items() if len(key) == size]
         return ranked(fits)
-
-
-def ranked(fits: Iterable[Fit]) -> list[Fit]:
-    """Return models by their criterion, best first, with the effective samples of the one with the least chi2."""
-    known = list(fits)
-    if not known:
-        return []
-    least = min(f.chi2 for f in known)
-    n_eff = max(f.independent for f in known if f.chi2 <= COMPARABLE * least)
-    return sorted(known, key=lambda f: criterion(f, n_eff))
-
-
-def leading(parent: Fit, scores: list[Score]) -> list[Score]:
-    """Return the scores that deserve a full fit."""
-    if not scores:
-        return []
-    worth = [s for s in scores if s.drop > WORTH * max(1.0, parent.chi2 / len(parent.residual))]
-    near = [s for s in worth if s.drop * WITHIN >= worth[0].drop]
-    return worth[: max(FEWEST, min(MOST, len(near)))]
-
-
-def promising(smaller: Fit, larger: Fit) -> bool:
-    """Tell whether an addition may come to be significant."""
-    n_eff = max(smaller.independent, larger.independent)
-    return bool(n_eff * np.log(smaller.chi2 / larger.chi2) > PROMISING)

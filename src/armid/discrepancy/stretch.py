@@ -1,6 +1,6 @@
 """Train records, piece by piece, with what a signal at each port would do to them: small, so linear."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,14 +61,17 @@ def stretches(
     """Return every piece of the train records with its residual, sensitivities and gains.
 
     x: free parameters, SI, (n_free,); levels: what residuals of each record are divided by [its unit].
-    A port at which no signal moves the output has no gain. All ports together cost one compiled model.
+    A port at which no signal moves the output has no gain. All ports together cost one compiled model, none where the
+    model holds the test signals already.
     """
-    candidate = space.complete(x[np.newaxis])[0]
     pairs = enumerate(zip(replays, levels, strict=True))
     whole = [piece_stretch(r, level, i, k, space, x) for i, (r, level) in pairs for k in range(len(r.pieces))]
-    extended = Model(model.plant, (*model.effects, *(bump_at(port) for port in ports)))
+    known = dict(zip(space.names, space.complete(x[np.newaxis])[0], strict=True))
+    held = {e.name for e in model.effects}
+    probes = [p for p in map(bump_at, ports) if p.name not in held]
+    extended = Model(model.plant, (*model.effects, *probes)) if probes else model
     for port in ports:
-        probe = Probe(extended, candidate, f"{PROBE}{port}")
+        probe = Probe(extended, known, f"{PROBE}{port}")
         size = fitting_size(probe, whole[0])
         if size is not None:
             for stretch in whole:
@@ -109,17 +112,17 @@ def piece_stretch(replay: Replay, level: float, group: int, index: int, space: S
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """Hold a model with a test signal at each port, and which of them is meant; candidate: of the model without."""
+    """Hold a model with a test signal at each port, and which of them is meant; known: name -> value of the others."""
 
     model: Model
-    candidate: Array
+    known: Mapping[str, float]
     name: str
 
     def rows(self, size: float | Array, centre: float | Array, width: float) -> Array:
         """Return a candidate of the model with the test signal for each size or centre, (n, n_parameters)."""
         sizes, centres = np.broadcast_arrays(np.atleast_1d(size), np.atleast_1d(centre))
         names = list(self.model.parameters)
-        rows = np.tile(np.append(self.candidate, np.zeros(len(names) - len(self.candidate))), (len(sizes), 1))
+        rows = np.tile([self.known.get(n, 0.0) for n in names], (len(sizes), 1))
         rows[:, [i for i, n in enumerate(names) if n.startswith(PROBE) and n.endswith(".width")]] = width
         rows[:, names.index(f"{self.name}.size")], rows[:, names.index(f"{self.name}.centre")] = sizes, centres
         return rows

@@ -7,15 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
+from armid.discrepancy.bundles import applies
 from armid.discrepancy.dependence import Dependence
 from armid.discrepancy.diagnose import diagnose
-from armid.discrepancy.empirical import empirical_effect
+from armid.discrepancy.empirical import empirical_effect, terms_of
 from armid.discrepancy.fit import Fit, fit_from
 from armid.discrepancy.group import WITHIN
-from armid.discrepancy.library import Library, idle
-from armid.discrepancy.missing import Missing, missing_from
+from armid.discrepancy.library import Library
+from armid.discrepancy.missing import Missing, missing_from, posed_in
 from armid.discrepancy.search import Search
 from armid.discrepancy.select import FAMILYWISE, criterion, left_out
+from armid.discrepancy.stretch import bump_at
 from armid.discrepancy.view import train_view
 from armid.model import ArmidError, Effect
 
@@ -50,10 +52,11 @@ def empirical_term(declared: Fit, named: Fit, search: Search) -> tuple[Missing |
         return None, None
     found: list[Term] = []
     missing = None
+    library = with_terms(search.library)
     for lacking in (named, declared) if named.active else (declared,):
-        search.library.told("recovering the missing signal without a form")
-        missing = missing_from(lacking, search.library)
-        found += terms(missing, search)
+        library.told("recovering the missing signal without a form")
+        missing = missing_from(lacking, library)
+        found += terms(missing, replace(search, library=library))
     for term in preferred(found, named.independent):
         if earned(declared if len(term.fit.active) == 1 else term.missing.lacking, term.fit):
             return term.missing, term
@@ -85,26 +88,48 @@ def terms(missing: Missing, search: Search) -> list[Term]:
 def term_of(dependence: Dependence, missing: Missing, search: Search) -> Term:
     """Fit one curve together with all other parameters, and take out the named effects that it makes superfluous."""
     lacking = missing.lacking
-    effect, heights = empirical_effect(lacking.records.replays[0].model, dependence)
+    effect, heights = empirical_effect(search.library.declared, dependence)
     library = with_candidate(search.library, effect)
-    records = library.problem((*lacking.active, effect.name), lacking.values | heights)
-    known, declared = lacking.values | heights, records.replays[0].model.parameters
-    x = np.array([known.get(n, idle(declared[n])) for n in records.space.free_names])
-    flat = np.array([known[n] if n in lacking.values else 0.0 for n in records.space.free_names])
+    records, flat = posed_in(library, lacking, (effect.name,))
+    guess = np.array([heights.get(n, v) for n, v in zip(records.space.free_names, flat, strict=True)])
     # The heights are a straight line's guess: where they are worse than none, the fit begins without.
-    starts = np.array([np.clip(records.shares(v), 1e-3, 1.0 - 1e-3) for v in (x, flat)])
+    starts = np.array([np.clip(records.shares(v), 1e-3, 1.0 - 1e-3) for v in (guess, flat)])
     better = starts[int(np.argmin(records.chi2(starts)))]
     fit = fit_from(records, (*lacking.active, effect.name), [better])
     extended = replace(search, library=library, fits=dict(search.fits), scores=dict(search.scores))
     return Term(pruned(fit, extended), dependence, missing, extended, ())
 
 
-def with_candidate(library: Library, effect: Effect) -> Library:
-    """Return a library with one effect more; its models hold the effects that are active and no others."""
+def with_terms(library: Library) -> Library:
+    """Return a library whose first bundle holds a term and a test signal at each port too.
+
+    They are compiled together with all other candidates, once and for whatever curve: which it is, parameters say.
+    """
+    wanted = [*terms_of(library.declared).values(), *(bump_at(port) for port in library.declared.plant.ports)]
+    model = library.wide(())
+    joined: list[Effect] = []
+    for effect in wanted:
+        if applies(model, effect):
+            model, joined = model + effect, [*joined, effect]
+    first = (*(library.bundles[0] if library.bundles else ()), *(e.name for e in joined))
+    added = {e.name: e for e in joined}
     return replace(
-        library, candidates={**library.candidates, effect.name: effect},
-        originals={**library.originals, effect.name: effect},
-        bundles=tuple((key,) for key in (*library.candidates, effect.name)), _wide={}, _problems={},
+        library, candidates={**library.candidates, **added}, originals={**library.originals, **added},
+        bundles=(first, *library.bundles[1:]), _wide={}, _problems={},
+    )  # fmt: skip
+
+
+def with_candidate(library: Library, effect: Effect) -> Library:
+    """Return a library whose term at a port is a certain curve.
+
+    Raises ArmidError where the term cannot be compiled with the others.
+    """
+    if effect.name not in library.candidates:
+        raise ArmidError(f"a term at port {effect.name} cannot be composed with the candidates")
+    changed = {effect.name: effect}
+    return replace(
+        library, candidates={**library.candidates, **changed}, originals={**library.originals, **changed},
+        _wide={}, _problems={},
     )  # fmt: skip
 
 

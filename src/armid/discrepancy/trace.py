@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +10,9 @@ from scipy.stats import chi2 as chi2_distribution
 from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from
 from armid.discrepancy.library import Library, idle
+from armid.discrepancy.rays import Ray, rays
 
 Array = NDArray[np.float64]
-# Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
-LEVELS, LEVELS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
-SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
-WIDE = 5.0
 N_TRIED, N_STARTS = 8, 2
 # A fall of chi2 that is not noticed among so many candidates.
 UNSEEN = 12.0
@@ -41,49 +37,6 @@ class Score:
     bends: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Ray:
-    """Hold one way to switch an effect on: values at full strength, those of the null, and the share that is tried."""
-
-    full: dict[str, float]
-    null: dict[str, float]
-    level: float
-
-    def at(self, share: float) -> dict[str, float]:
-        """Return the parameters of the effect at a share of its full strength."""
-        return {n: self.null[n] + share * (v - self.null[n]) if n in self.null else v for n, v in self.full.items()}
-
-
-def rays(records: WhiteRecords, model_name: str) -> tuple[list[Ray], int]:
-    """Return the grid over strengths and shapes of one effect, and the number of its shapes.
-
-    Strengths are the free parameters with a null value: each alone, and all together where there are several.
-    """
-    space, declared = records.space, records.replays[0].model.parameters
-    mine = [n for n in space.free_names if n.startswith(f"{model_name}.")]
-    null = {n: float(v) for n in mine if (v := declared[n].null) is not None}
-    bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine}
-    shapes = [n for n in mine if n not in null]
-    counts = SHAPES.get(len(shapes), (2,) * len(shapes))
-    grids = [grid(*bound[n], count) for n, count in zip(shapes, counts, strict=True)]
-    points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*grids)]
-    chosen = [(n,) for n in null] + ([tuple(null)] if len(null) > 1 else [])
-    found = []
-    for names, side, shape in product(chosen, (1, 0), points):
-        full = {n: float(bound[n][side]) if n in names else null[n] for n in null}
-        if all(full[n] != null[n] for n in names):
-            found += [Ray(shape | full, null, level) for level in (LEVELS_OF_SHAPES if shapes else LEVELS)]
-    return found, len(points)
-
-
-def grid(low: float, high: float, count: int) -> Array:
-    """Return points inside a range, even in the logarithm where the range is wide."""
-    shares = (np.arange(count) + 0.5) / count
-    if low > 0.0 and high > WIDE * low:
-        return np.asarray(low * (high / low) ** shares)
-    return np.asarray(low + (high - low) * shares)
-
-
 def score(current: Fit, name: str, library: Library) -> Score | None:
     """Score one candidate at a fit; None where nothing can be said, as every strength diverges or changes nothing.
 
@@ -93,39 +46,52 @@ def score(current: Fit, name: str, library: Library) -> Score | None:
     """
     records = library.problem((*current.active, name), current.values)
     found, n_shapes = rays(records, name)
-    base = whole_candidate(records, current)
-    population = np.tile(base, (len(found) + 1, 1))
-    for row, ray in zip(population[1:], found, strict=True):
-        for n, value in ray.at(ray.level).items():
-            row[records.space.index(n)] = value
-    signals = records.whole_signals(population)
-    moved = (signals[1:] - signals[0]) / np.array([r.level for r in found])[:, np.newaxis]
+    moved = responses(current, records, found)
     drops, amplitudes = predicted(current, moved)
-    if not np.isfinite(moved).all(axis=1).any():
+    if not np.isfinite(drops).any():
         return None
-    bends = unseen_bends(current, moved[np.isfinite(moved).all(axis=1)])
+    answers = (current.answer @ moved.T).T
+    bends = unseen_bends(current, moved, answers)
     order = np.argsort(-drops, kind="stable")[: N_TRIED // 2]
-    starts = [s for i in order for s in starts_at(records, current, found[i], moved[i], amplitudes[i])]
+    starts = [s for i in order for s in starts_at(records, current, found[i], answers[i], amplitudes[i])]
     best = int(order[0])
     ratio = log_ratio(current, float(drops[best]))
     p = min(1.0, n_shapes * float(chi2_distribution.sf(ratio, 1)))
     return Score(name, float(drops[best]), float(amplitudes[best]), p, tuple(starts), n_shapes, bends)
 
 
-def unseen_bends(current: Fit, moved: Array) -> Array:
+def responses(current: Fit, records: WhiteRecords, found: Sequence[Ray]) -> Array:
+    """Return the change of the whitened signal per full strength along each ray, (n_rays, n_samples)."""
+    base = whole_candidate(records, current)
+    population = np.tile(base, (len(found) + 1, 1))
+    for row, ray in zip(population[1:], found, strict=True):
+        for n, value in ray.at(ray.level).items():
+            row[records.space.index(n)] = value
+    signals = records.whole_signals(population)
+    return np.asarray((signals[1:] - signals[0]) / np.array([r.level for r in found])[:, np.newaxis])
+
+
+def unseen_bends(current: Fit, moved: Array, answers: Array) -> Array:
     """Return the largest relative change of each free parameter that strengths within the range could cause unseen.
 
     A strength a adds a^2 q to chi2, q the squared length of the change of the signal beyond the reach of the
     parameters; below UNSEEN it is not noticed, while the parameters make up for the rest.
-    moved: change of the whitened signal per full strength, (n_rays, n_samples).
+    moved: change of the whitened signal per full strength, (n_rays, n_samples). answers: of the parameters to it,
+    (n_rays, n_free).
     """
-    if not current.n_free:
-        return np.empty(0)
-    answer = np.linalg.lstsq(current.jacobian, moved.T, rcond=1e-10)[0]
-    beyond = np.sum((moved - (current.jacobian @ answer).T) ** 2, axis=1)
+    good = np.isfinite(moved).all(axis=1)
+    if not current.n_free or not good.any():
+        return np.zeros(current.n_free)
+    beyond = square_beyond(current, moved[good])
     share = np.minimum(1.0, np.sqrt(UNSEEN / np.maximum(beyond, 1e-12)))
-    largest = np.max(np.abs(answer) * share, axis=1) * current.records.span
+    largest = np.max(np.abs(answers[good]) * share[:, np.newaxis], axis=0) * current.records.span
     return np.asarray(largest / np.maximum(np.abs(current.x), 1e-300))
+
+
+def square_beyond(current: Fit, moved: Array) -> Array:
+    """Return the squared length of changes of the signal beyond the reach of the free parameters, (n_rays,)."""
+    within = moved @ current.basis
+    return np.asarray(np.einsum("ij,ij->i", moved, moved) - np.einsum("ij,ij->i", within, within))
 
 
 def predicted(current: Fit, moved: Array) -> tuple[Array, Array]:
@@ -135,12 +101,12 @@ def predicted(current: Fit, moved: Array) -> tuple[Array, Array]:
     """
     basis = current.basis
     rest = current.residual - basis @ (basis.T @ current.residual)
-    free = moved - (moved @ basis) @ basis.T
-    square, slope = np.sum(free**2, axis=1), free @ rest
+    square, slope = square_beyond(current, moved), moved @ rest
     # A ray that the parameters absorb whole leaves rounding, which must not be divided by.
-    seen = np.isfinite(square) & (square > 1e-8 * np.sum(moved**2, axis=1))
+    seen = np.isfinite(square) & (square > 1e-8 * np.einsum("ij,ij->i", moved, moved))
     amplitude = np.clip(np.divide(slope, square, out=np.zeros_like(slope), where=seen), 0.0, 1.0)
-    return np.where(seen, amplitude * (2.0 * slope - amplitude * square), -np.inf), amplitude
+    drop = amplitude * (2.0 * slope - amplitude * square)
+    return np.where(seen, drop, -np.inf), amplitude
 
 
 def log_ratio(current: Fit, drop: float) -> float:
@@ -156,16 +122,14 @@ def whole_candidate(records: WhiteRecords, current: Fit) -> Array:
     return np.asarray(records.space.complete(np.array([free]))[0])
 
 
-def starts_at(records: WhiteRecords, current: Fit, ray: Ray, moved: Array, amplitude: float) -> list[Array]:
+def starts_at(records: WhiteRecords, current: Fit, ray: Ray, answer: Array, amplitude: float) -> list[Array]:
     """Return starts of a refit at a ray: predicted amplitude and tried level, the free parameters moved to match."""
-    return [moved_start(records, current, ray, moved, share) for share in (max(amplitude, 0.01), ray.level)]
+    return [moved_start(records, current, ray, answer, share) for share in (max(amplitude, 0.01), ray.level)]
 
 
-def moved_start(records: WhiteRecords, current: Fit, ray: Ray, moved: Array, share: float) -> Array:
-    """Return the extended candidate at a strength, with the linear answer of the free parameters to it."""
-    left = current.residual - share * moved
-    step = np.linalg.lstsq(current.jacobian, left, rcond=1e-8)[0] if current.n_free else np.empty(0)
-    shares = dict(zip(current.values, np.clip(current.z + step, 0.01, 0.99), strict=True))
+def moved_start(records: WhiteRecords, current: Fit, ray: Ray, answer: Array, share: float) -> Array:
+    """Return the extended candidate at a strength, with the linear answer of the free parameters to it, (n_free,)."""
+    shares = dict(zip(current.values, np.clip(current.z - share * answer, 0.01, 0.99), strict=True))
     added = ray.at(share)
     space = records.space
     z = [shares[n] if n in shares else (added[n] - space.low[i]) / (space.high[i] - space.low[i])

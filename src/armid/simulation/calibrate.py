@@ -22,6 +22,8 @@ NOISE_HIDES = 10.0
 # How many candidates must still be before their switch for a long step to count as tried.
 N_WITNESSES = 8
 N_PROBES = 48
+# Values of a simulation of all candidates that are in memory at a time (64 MB); more are tried in parts of so many.
+MOST_VALUES, PART = 2**23, 8
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,8 @@ def calibrate(
     """
     if accuracy not in ALLOWED:
         raise ArmidError(f"accuracy '{accuracy}' is unknown: {' or '.join(ALLOWED)} is expected")
+    if len(candidates) > PART and len(candidates) * manoeuvre.n_samples > MOST_VALUES:
+        return in_parts(model, manoeuvre, candidates, accuracy)
     allowed = ALLOWED[accuracy] * model.plant.scales.speed
     runs: dict[int, Simulation] = {}
 
@@ -95,10 +99,24 @@ def calibrate(
             error = np.inf
         if error <= MARGIN * allowed:
             break
+        if n != SUBSTEPS[-1]:
+            del runs[n]
     schedule = Schedule(n, weights=switch_weights(candidates, run(n)))
     if spans:
         schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
     return Calibration(schedule, error, bool(error <= allowed))
+
+
+def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str) -> Calibration:
+    """Return the finest of the calibrations of parts of the candidates: a long record would fill the memory with all.
+
+    Its error is no smaller than that of any part. Steps over several samples are not looked for.
+    """
+    parts = [candidates[first : first + PART] for first in range(0, len(candidates), PART)]
+    found = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
+    finest = max(found, key=lambda c: c.schedule.substeps)
+    schedule = replace(finest.schedule, weights=None)
+    return Calibration(schedule, max(c.error for c in found), all(c.reached for c in found))
 
 
 def spared(coarse: Simulation, fine: Simulation) -> bool:

@@ -10,6 +10,7 @@ import ast
 from collections.abc import Iterable
 
 from armid.model import Model
+from armid.simulation.passing import IDLE, strengths_of, use_lines, used, using, variable
 from armid.simulation.source import SourceText, local_name
 from armid.simulation.template import Parts, module_text
 
@@ -19,11 +20,6 @@ INDENT = "    "
 def parenthesised(items: list[str]) -> str:
     """Return a tuple expression."""
     return f"({', '.join(items)}{',' if len(items) == 1 else ''})"
-
-
-def variable(key: str) -> str:
-    """Return the local name of a key; the prefix keeps a plant's `g` or `h` apart from the loop's own names."""
-    return f"v_{key.replace('.', '__')}"
 
 
 class Emitter:
@@ -40,6 +36,7 @@ class Emitter:
         self._guards = [*self._latch_guards, *self._kinks]
         self._output = model.plant.output
         self._fixed = self._fixed_keys([*self._rates, *self._guards, self._output])
+        self._strengths = strengths_of(model)
         self.parts = self._parts()
 
     def _parts(self) -> Parts:
@@ -51,8 +48,9 @@ class Emitter:
             "latch_guards": self._latch_guards, "guards": self._kinks,
         }  # fmt: skip
         names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
+        names["fixed"] += [name for e in self._strengths for name in (using(e), used(e))]
         # Only an input may jump at a sample: a guard that depends on it is then evaluated anew.
-        return Parts(**names, guards_use_inputs=self._uses(self._guards, inputs))
+        return Parts(**names, guards_use_inputs=self._uses(self._guards, inputs), wide=bool(self._strengths))
 
     def _uses(self, keys: list[str], wanted: list[str]) -> bool:
         return any(k in wanted or self._uses(list(self.graph.nodes[k].needs), wanted) for k in keys)
@@ -68,8 +66,16 @@ class Emitter:
 
     def assignments(self, wanted: list[str], static: bool) -> list[str]:
         """Return one line for each node that leads to the wanted ones."""
-        return [f"{variable(n.key)} = {self.expression(n.key)}" for n in self.graph.order(wanted)
+        return [self.line(n.key, static) for n in self.graph.order(wanted)
                 if self.graph.is_static(n.key) == static or n.kind == "initial" or not self._valued(n.key)]  # fmt: skip
+
+    def line(self, key: str, static: bool) -> str:
+        """Return the line that gives a node its value; what moves in an effect that no lane uses is passed over."""
+        node, value = self.graph.nodes[key], self.expression(key)
+        if static or node.owner not in self._strengths or node.kind not in IDLE:
+            return f"{variable(key)} = {value}"
+        taken = f"select({using(node.owner)}, 0.5, {value}, {IDLE[node.kind]})"
+        return f"{variable(key)} = {taken} if {used(node.owner)} else splat({IDLE[node.kind]})"
 
     def expression(self, key: str) -> str:
         """Return the right-hand side of a node."""
@@ -94,9 +100,11 @@ class Emitter:
         moving = [variable("time"), *parts.latches, *parts.states, *parts.inputs, *parts.fixed]
         given = [*parts.parameters, *parts.constants]
         starts, rates, guards = ([variable(k) for k in keys] for keys in (self._initials, self._rates, self._guards))
-        fixed = [f"1.0 * {k}" for k in parts.fixed]
+        fixed = [f"1.0 * {variable(k)}" for k in self._fixed]
+        fixed += [name for e in self._strengths for name in (using(e), used(e))]
+        switches = [line for e, strengths in self._strengths.items() for line in use_lines(e, strengths)]
         texts = [
-            self.function("fixed_values", given, self.assignments(self._fixed, True), fixed),
+            self.function("fixed_values", given, self.assignments(self._fixed, True) + switches, fixed),
             self.function("start_values", given, self.assignments(self._initials, True), starts),
             self.function("rates", moving, self.assignments(self._rates, False), rates),
             self.function("guards", moving, self.assignments(self._guards, False), guards),

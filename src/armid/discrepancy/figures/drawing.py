@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from armid.display import OKABE_ITO
+from armid.display import save as save_figure
 
 BEFORE, AFTER = OKABE_ITO["vermilion"], OKABE_ITO["blue"]
 
@@ -15,5 +16,4 @@ def tidy(axis: Any) -> None:
 
 def save(plt: Any, figure: Any, path: Path) -> None:
     """Write a figure and forget it."""
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    save_figure(figure, path)

@@ -5,15 +5,15 @@ from armid.simulation.template.parts import Parts, block, each, listed, nested, 
 
 CALM = '''if span > 1 and any_above(0.5 - ({open_sum}), 0.0):
                 h = span * interval
-                {k1} = rates(time, {latches}{x}{fixed})
-                {b} = step(time, h, {latches}{x}{k1s}{fixed})
-                {gb} = guards(time + h, {latches}{b}{fixed})
+                {k1} = rates{apart}({time}, {latches}{x}{fixed})
+                {b} = step{apart}({time}, {h}, {latches}{x}{k1s}{fixed})
+                {gb} = guards{apart}({end}, {latches}{b}{fixed})
                 {c} = crossings({latches}{ga}{gb})
                 calm = select({open_sum}, 0.5, 0.0, select({any_crossing}, 0.0, 0.0, 1.0))
                 small = any_above(1.0 - calm, 0.5)
                 mixed = any_above(calm, 0.5)
                 if mixed:
-                    {fb} = rates(time + h, {latches}{b}{fixed})
+                    {fb} = rates{apart}({end}, {latches}{b}{fixed})
                     for i in range(span):
                         {m} = between((i + 1.0) / span, h, {x}{b}{k1s}{fbs})
                         {y_out} = recorded(time + (i + 1.0) * interval, {latches}{m}{fixed})
@@ -88,9 +88,13 @@ def long_step(parts: Parts) -> dict[str, str]:
 def calm_text(parts: Parts) -> str:
     """Return the lines that try one step over several samples in the lanes that have not switched."""
     lines = [f"{n} = {v}" for n, v in long_step(parts).items()]
+    numbers = {"time": "time", "h": "h", "end": "time + h"}
+    # Written into the loop once more, the equations of many effects would take half as long again to compile.
+    called = {n: f"splat({text})" for n, text in numbers.items()} if parts.wide else numbers
     return CALM.format(
-        **parts.lists, open_sum=" + ".join(parts.latches), any_crossing=any_crossing(parts), take_calm=block(lines, 20)
-    )
+        **parts.lists, **called, apart="_apart" if parts.wide else "", open_sum=" + ".join(parts.latches),
+        any_crossing=any_crossing(parts), take_calm=block(lines, 20),
+    )  # fmt: skip
 
 
 def keep_text(parts: Parts) -> str:

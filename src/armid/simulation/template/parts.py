@@ -11,6 +11,7 @@ class Parts:
     parameters, constants: what a simulation is given, in order; fixed: quantities that do not move, computed once.
     states, inputs, latches: what moves, each in its order.
     latch_guards: the guard of each latch; guards: the kinks; guards_use_inputs: whether a guard may jump at a sample.
+    wide: whether there are so many effects that what is rarely needed is compiled but once.
     """
 
     parameters: list[str]
@@ -22,6 +23,7 @@ class Parts:
     latch_guards: list[str]
     guards: list[str]
     guards_use_inputs: bool
+    wide: bool = False
 
     @property
     def all_guards(self) -> list[str]:

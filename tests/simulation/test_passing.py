@@ -1,0 +1,73 @@
+"""In a model of many effects those at their null are passed over, which no candidate can notice."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_cases import Array, drawn
+
+from armid.model import EFFECTS, Manoeuvre, Model
+from armid.simulation import Schedule, simulate
+from armid.simulation.passing import FEWEST, strengths_of
+
+pytestmark = pytest.mark.slow
+NAMES = ("coulomb", "viscous", "tilt", "gas_heat_loss", "gyro_lag", "shell_rocking", "controller_delay", "gyro_bias")
+
+
+@pytest.fixture(scope="module")
+def wide(arm: Model) -> Model:
+    return Model(arm.plant, tuple(EFFECTS[n] for n in NAMES))
+
+
+@pytest.fixture(scope="module")
+def schedule(schedule_for: Callable[[str, str], Schedule]) -> Schedule:
+    return replace(schedule_for("lower", "standard"), weights=None)
+
+
+def using(wide: Model, plain: Array, name: str, share: float = 0.3) -> Array:
+    """Return a candidate that uses one effect, every other at its null."""
+    values = dict(zip(list(wide.parameters)[: len(plain)], plain, strict=True))
+    for key, p in list(wide.parameters.items())[len(plain) :]:
+        rest = next(v for v in (p.null, p.fixed, p.nominal, 0.5 * (p.low + p.high)) if v is not None)
+        in_use = key.startswith(f"{name}.") and p.null is not None
+        values[key] = p.null + share * (p.high - p.null) if in_use else rest
+    return np.array(list(values.values()))
+
+
+def test_a_small_model_passes_nothing_over(arm: Model, wide: Model) -> None:
+    assert len(NAMES) == FEWEST
+    assert not strengths_of(Model(arm.plant, wide.effects[1:]))
+    assert set(strengths_of(wide)) == set(NAMES)
+
+
+def test_neighbours_that_use_other_effects_change_nothing(
+    arm: Model, wide: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
+) -> None:
+    plain = drawn(arm, 1, 7)[0]
+    population = np.array([using(wide, plain, n) for n in (*NAMES, "", *NAMES[::-1])])
+    together = simulate(wide, manoeuvres["lower"], population, schedule).output
+    for candidate, output in zip(population, together, strict=True):
+        np.testing.assert_array_equal(simulate(wide, manoeuvres["lower"], candidate, schedule).output[0], output)
+    assert len(np.unique(together.round(9), axis=0)) == len(NAMES) + 1
+
+
+@pytest.mark.parametrize("name", ["", "shell_rocking", "controller_delay"])
+def test_the_motion_is_that_of_the_model_with_the_one(
+    arm: Model, wide: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule, name: str
+) -> None:
+    plain = drawn(arm, 1, 8)[0]
+    candidate = using(wide, plain, name)
+    small = arm + EFFECTS[name] if name else arm
+    values = dict(zip(wide.parameters, candidate, strict=True))
+    expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], schedule).output
+    found = simulate(wide, manoeuvres["lower"], candidate, schedule).output
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
+
+
+def test_a_strength_that_is_no_number_is_not_taken_for_the_null(
+    arm: Model, wide: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
+) -> None:
+    candidate = using(wide, drawn(arm, 1, 9)[0], "")
+    candidate[list(wide.parameters).index("viscous.slope")] = np.nan
+    assert simulate(wide, manoeuvres["lower"], candidate, schedule).failed.all()
