@@ -119,7 +119,7 @@ def test_nothing_to_report(made):
 def test_a_study_of_another_kind(made):
     results = made(seeds=1)
     other = replace(results, study=results.study | {"kind": "loop"})
-    with pytest.raises(ArmidError, match="is of kind 'loop', 'identify' is expected"):
+    with pytest.raises(ArmidError, match="is of kind 'loop', one of identify, close_loop is expected"):
         report_of(other)
 
 

@@ -85,6 +85,11 @@ def test_a_report_of_a_real_store(reported):
     assert "Versions: armid" in text
     assert {"overview.csv", "table1.png", "ecdf.svg", "runs.tex"} <= {p.name for p in store.iterdir()}
     assert printed[-1].startswith("wrote report.md and ")
+    page = (store / "report.html").read_text()
+    assert page.count("<svg") == len(list(store.glob("*.svg")))
+    for wanted in ("Does a report come out of a real store?", "Nearest to the truth: ", "Complete: 4 of 4 runs.",
+                   "armid study tiny.toml", "d omega/dt", "name = &#34;tiny&#34;"):  # fmt: skip
+        assert wanted in page
 
 
 def test_its_numbers_are_those_of_the_store(reported):
@@ -100,7 +105,7 @@ def test_its_numbers_are_those_of_the_store(reported):
 
 
 def test_the_main_table_and_the_state_are_printed(store, capsys, monkeypatch):
-    monkeypatch.setattr(write, "save", lambda figure, png, svg: [p.write_text("") for p in (png, svg)])
+    monkeypatch.setattr(write, "save", lambda figure, png, svg: [p.write_text("<svg/>") for p in (png, svg)])
     with pytest.raises(SystemExit):
         main(["report", str(store)])
     printed = capsys.readouterr().out
@@ -122,7 +127,7 @@ def test_a_report_that_fails_leaves_nothing(store, tmp_path, monkeypatch):
 
 
 def test_no_store_is_refused_with_a_sentence(tmp_path, capsys):
-    assert "a folder that `armid study` has written is expected" in refused(["report", str(tmp_path)], capsys)
+    assert "holds no result: study.sqlite of `armid study`" in refused(["report", str(tmp_path)], capsys)
 
 
 def test_export_of_a_real_store_loads(store, tmp_path, capsys):

@@ -1,12 +1,9 @@
 """One run of a study that identifies: search, then judge what was found."""
 
 import json
-import platform
 import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from functools import cache
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -20,10 +17,10 @@ from armid.model import ArmidError
 from armid.problem import IdentificationProblem, Meter, Replay, Space
 from armid.study.outcome import DONE, Outcome, Task
 from armid.study.trace import packed
+from armid.study.versions import versions
 from armid.study.workshop import Workshop
 
 Array = NDArray[np.float64]
-PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 
 
 def identify_run(task: Task, workshop: Workshop) -> Outcome:
@@ -87,9 +84,3 @@ def trace(meter: Meter, space: Space) -> tuple[str, bytes]:
     """Return the improvements with their candidates, a row of the table `traces`."""
     found, log = meter.trace(), meter.log()
     return json.dumps(space.free_names), packed(found.evaluation, found.value, log.X[found.evaluation - 1])
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Return the versions of what decides a result."""
-    return {"python": platform.python_version(), **{p: version(p) for p in PACKAGES}}

@@ -8,6 +8,7 @@ from typing import Any
 from armid.study.outcome import Outcome
 
 Perform = Callable[..., Outcome]
+IDENTIFIES, CLOSES_LOOP = "identify", "close_loop"
 
 
 @dataclass(frozen=True)
@@ -30,17 +31,32 @@ class Table:
 class Kind:
     """Declare a kind of studies.
 
-    performed_by: "module:function" of (task, workshop) -> Outcome, imported where runs are performed only.
-    tables: name -> what the outcome's rows hold.
+    Functions are told as "module:function" and imported where they are called only.
+    performed_by: of (task, workshop) -> Outcome. tables: name -> what the outcome's rows hold.
+    read_by: of (table, text, folder, where, known) -> the study. described_by: of (study, folder of the store) -> what
+    a report needs, as JSON can hold it. planned_by: of the study -> its runs. checked_by: of the study, before anything
+    is written; "" where nothing is to be checked.
+    reported_by: of (stored results, key) -> Report. summed_up_by: of stored results -> a report of one table.
     """
 
     performed_by: str
     tables: dict[str, Table]
+    read_by: str
+    described_by: str
+    planned_by: str
+    reported_by: str
+    summed_up_by: str
+    checked_by: str = ""
 
     def perform(self) -> Any:
-        """Return the function."""
-        module, _, name = self.performed_by.partition(":")
-        return getattr(import_module(module), name)
+        """Return the function that performs a run."""
+        return function(self.performed_by)
+
+
+def function(place: str) -> Any:
+    """Return a function from where it is told to be: "module:function"."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
 
 
 IDENTIFY = Kind(
@@ -56,6 +72,21 @@ IDENTIFY = Kind(
         ), rows_by="parameter"),
         "traces": Table(("names TEXT", "trace BLOB")),
     },
+    read_by="armid.study.study:read_identifying",
+    described_by="armid.study.study:description",
+    planned_by="armid.study.plan:planned_runs",
+    reported_by="armid.study.report.build:identify_report",
+    summed_up_by="armid.study.report.build:identify_summary",
+    checked_by="armid.study.runner:check_motion",
 )  # fmt: skip
+CLOSE_LOOP = Kind(
+    "armid.study.loops.run:close_loop_run",
+    {"loops": Table(("verdict TEXT NOT NULL", "cpu_seconds REAL NOT NULL", "report TEXT NOT NULL"))},
+    read_by="armid.study.loops.study:read_loops",
+    described_by="armid.study.loops.study:describe_loops",
+    planned_by="armid.study.loops.plan:planned_loops",
+    reported_by="armid.study.report.loops:loops_report",
+    summed_up_by="armid.study.report.loops:loops_summary",
+)
 
-KINDS: dict[str, Kind] = {"identify": IDENTIFY}
+KINDS: dict[str, Kind] = {IDENTIFIES: IDENTIFY, CLOSES_LOOP: CLOSE_LOOP}

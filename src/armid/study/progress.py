@@ -23,10 +23,10 @@ class Watch:
 
             self._bar = Progress(
                 TextColumn("{task.completed:.0f}/{task.total:.0f} runs"), BarColumn(),
-                TextColumn("{task.fields[rate]:,.0f} simulations/s"), TextColumn("{task.fields[left]}"),
+                TextColumn("{task.fields[rate]}"), TextColumn("{task.fields[left]}"),
                 console=Console(stderr=True), refresh_per_second=4,
             )  # fmt: skip
-            self._task = self._bar.add_task("", total=1, visible=False, rate=0.0, left="")
+            self._task = self._bar.add_task("", total=1, visible=False, rate="", left="")
             self._bar.start()
         return self
 
@@ -44,8 +44,14 @@ class Watch:
             seconds = max(time.monotonic() - self._began, 1e-9)
             missing = counts.missing - self.finished
             left = f"{span(seconds / self.finished * missing)} left" if self.finished else "starting"
-            told = {"completed": counts.planned - missing, "rate": self.simulations / seconds, "left": left}
+            told = {"completed": counts.planned - missing, "rate": self.rate(seconds), "left": left}
             self._bar.update(self._task, total=counts.planned, visible=True, **told)
+
+    def rate(self, seconds: float) -> str:
+        """Return simulations a second, or finished runs a minute where no run counts its simulations."""
+        if self.simulations or not self.finished:
+            return f"{self.simulations / seconds:,.0f} simulations/s"
+        return f"{60.0 * self.finished / seconds:.3g} runs/min"
 
 
 def span(seconds: float) -> str:

@@ -24,6 +24,10 @@ FROM plan p JOIN runs r USING (run) LEFT JOIN identified i USING (run) ORDER BY 
 PARAMETERS = """
 SELECT p."case", q.* FROM plan p JOIN parameters q USING (run) ORDER BY p.place, q.rowid
 """
+LOOPS = """
+SELECT p.run, p."case", l.verdict, r.seconds, l.cpu_seconds, l.report
+FROM plan p JOIN runs r USING (run) JOIN loops l USING (run) ORDER BY p.place
+"""
 TRACES = "SELECT t.run, t.names, t.trace FROM plan p JOIN traces t USING (run)"
 NUMBERS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s2", "holdout_rmse", "seconds")
 COUNTED = ("used", "n_failed")
@@ -66,6 +70,13 @@ class StudyResults:
     def iter_traces(self) -> Iterator[RunTrace]:
         """Yield the traces one after the other, in the order of `runs`; no more than one is in memory."""
         return self._traces(f"{TRACES} ORDER BY p.place", ())
+
+    @property
+    def loops(self) -> pd.DataFrame:
+        """One row a campaign that was closed: run, case, verdict, seconds, cpu_seconds, report (a dict)."""
+        with reading(self.path) as connection:
+            found = pd.read_sql_query(LOOPS, connection)
+        return found.assign(report=[json.loads(text) for text in found["report"]])
 
     def settings_of(self, run: str) -> dict[str, Any]:
         """Return all that decided a run.

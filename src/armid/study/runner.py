@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 
 from armid.identification.interrupt import ctrl_c_waits
 from armid.model import ArmidError, nearest
+from armid.study.any_study import AnyStudy
 from armid.study.crew import Crew, LocalCrew
+from armid.study.kind import KINDS, function
 from armid.study.lane import Workplace
 from armid.study.outcome import Outcome
-from armid.study.plan import case_settings, planned_runs
+from armid.study.plan import case_settings
 from armid.study.records import clean_records
 from armid.study.store import Counts, Store
-from armid.study.study import Study, description, read_study
+from armid.study.study import Study, read_study
 
 if TYPE_CHECKING:
     from armid.study.results import StudyResults
@@ -33,7 +35,7 @@ class Ending:
     others: processes that are still at runs of the study.
     """
 
-    study: Study
+    study: AnyStudy
     folder: Path
     counts: Counts
     finished: int
@@ -76,7 +78,7 @@ def run_study(
 
 
 def run(
-    study: Study,
+    study: AnyStudy,
     jobs: int | None = None,
     dask: str | None = None,
     out: str | Path | None = None,
@@ -92,17 +94,19 @@ def run(
     began = time.monotonic()
     chosen = pattern_of(only, study)
     check_numbers(jobs, dask, time_limit)
-    check_motion(study)
+    kind = KINDS[study.kind]
+    if kind.checked_by:
+        function(kind.checked_by)(study)
     folder = RESULTS / study.name if out is None else Path(out)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
-        store.plan(description(study), planned_runs(study))
+        store.plan(function(kind.described_by)(study, folder), function(kind.planned_by)(study))
         if retry:
             store.forget_failed()
         counts = store.counts()
         told(counts, None)
         finished = simulations = 0
         if counts.missing:
-            workplace = Workplace(study.sheet.kind, study.known.plugins, study.folder, time_limit)
+            workplace = Workplace(study.kind, study.known.plugins, study.folder, time_limit)
             crew = crew_of(jobs, dask, workplace, counts.missing)
             try:
                 for outcome in performed(store, crew, interrupted):
@@ -171,14 +175,14 @@ def check_motion(study: Study) -> None:
                 raise ArmidError(f"case '{case.name}', {error}") from error
 
 
-def pattern_of(only: str, study: Study) -> tuple[str, str]:
+def pattern_of(only: str, study: AnyStudy) -> tuple[str, str]:
     """Return the patterns of case and identifier; CASE alone means all identifiers.
 
     Raises ArmidError for a pattern that meets nothing.
     """
     case, _, identifier = only.partition("/")
     patterns = (case or "*", identifier or "*")
-    names = ([c.name for c in study.cases], [e.label for e in study.entries])
+    names = (study.case_names, study.labels)
     for what, pattern, known in zip(("case", "identifier"), patterns, names, strict=True):
         if not any(name == pattern or fnmatchcase(name, pattern) for name in known):
             raise ArmidError(f"only '{only}': no {what} is called '{pattern}', {nearest(pattern, known)}")

@@ -9,10 +9,11 @@ from typing import Any
 from armid.model import ArmidError, Model
 from armid.record.campaign_file import load_toml
 from armid.record.schema import unknown_name, validated
+from armid.study.any_study import AnyStudy
 from armid.study.case import Case
 from armid.study.cases import cases_of
 from armid.study.entry import Entry, check_pair, entries_of
-from armid.study.kind import KINDS
+from armid.study.kind import IDENTIFIES, KINDS, function
 from armid.study.known import Known, chosen, load_known
 from armid.study.sheet import REPORTS, StudySheet
 
@@ -38,8 +39,23 @@ class Study:
         """Name of the study and of its folder of results."""
         return self.sheet.name
 
+    @property
+    def kind(self) -> str:
+        """Kind of the study."""
+        return self.sheet.kind
 
-def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> Study:
+    @property
+    def case_names(self) -> list[str]:
+        """Names of the cases."""
+        return [case.name for case in self.cases]
+
+    @property
+    def labels(self) -> list[str]:
+        """Labels of the identifiers, each as often as it is there."""
+        return [entry.label for entry in self.entries]
+
+
+def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> AnyStudy:
     """Read a study's TOML file; nothing is simulated.
 
     plugins: `FILE.py:attribute` of the user's own things that it names; this runs their code.
@@ -52,29 +68,41 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> Study:
         raise ArmidError(f"study {file} does not exist, a file that ends in {SUFFIX} is expected")
     table = load_toml(file)
     where = file.name
+    kind = kind_of(table, where)
+    study: AnyStudy = function(KINDS[kind].read_by)(
+        table, file.read_text(encoding="utf-8-sig"), file.resolve().parent, where, load_known(plugins)
+    )
+    return study
+
+
+def kind_of(table: Mapping[str, Any], where: str) -> str:
+    """Return the kind of a study; what is no text is left to its sheet.
+
+    Raises ArmidError for a kind that nobody made.
+    """
+    kind = table.get("kind", IDENTIFIES)
+    if isinstance(kind, str) and kind and kind not in KINDS:
+        raise unknown_name("kind", kind, KINDS, where)
+    return kind if isinstance(kind, str) and kind else IDENTIFIES
+
+
+def read_identifying(table: Mapping[str, Any], text: str, folder: Path, where: str, known: Known) -> Study:
+    """Return a study that identifies; arguments and errors as `read_study`."""
     sheet = validated(StudySheet, table, where)
-    check_words(sheet, where)
-    known = load_known(plugins)
+    if sheet.report not in REPORTS:
+        raise unknown_name("report", sheet.report, REPORTS[1:], where)
     model = Model(chosen(known.plants, sheet.plant, "plant", where))
     for name in sheet.effects:
         model = model + chosen(known.effects, name, "effect", where)
     entries = entries_of(sheet, known, where)
-    cases = cases_of(sheet, model, known, file.resolve().parent, where)
+    cases = cases_of(sheet, model, known, folder, where)
     for entry in entries:
         check_pair(entry, cases, known, where)
-    return Study(sheet, file.read_text(encoding="utf-8-sig"), file.resolve().parent, cases, entries, known)
+    return Study(sheet, text, folder, cases, entries, known)
 
 
-def check_words(sheet: StudySheet, where: str) -> None:
-    """Refuse a kind and a report that nobody made."""
-    if sheet.kind not in KINDS:
-        raise unknown_name("kind", sheet.kind, KINDS, where)
-    if sheet.report not in REPORTS:
-        raise unknown_name("report", sheet.report, REPORTS[1:], where)
-
-
-def description(study: Study) -> dict[str, Any]:
-    """Return what a report needs to know of a study, as JSON can hold it."""
+def description(study: Study, _: Path = Path()) -> dict[str, Any]:
+    """Return what a report needs to know of a study, as JSON can hold it, wherever its store is."""
     sheet = study.sheet
     return {
         "name": study.name,

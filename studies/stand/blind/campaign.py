@@ -32,13 +32,13 @@ def make_campaign(name: str, suite: Suite, case: Case, seed: int) -> tuple[dict[
     drawn = draw(suite, case, np.random.default_rng([seed, 2, case.index]))
     rng = np.random.default_rng([seed, 3, case.index])
     rest = round(suite.rest_s * SAMPLES_PER_SECOND)
-    measured = [_measure(drawn, place, case.effects(), rest, rng) for place in range(len(drawn.strokes))]
+    measured = [measure_stroke(drawn, place, case.effects(), rest, rng) for place in range(len(drawn.strokes))]
     texts = {each.record.file: record_text(each.record, drawn.gyro.decimals) for each in measured}
-    texts |= {"campaign.toml": _campaign_text(name, drawn, measured), "README.md": f"# {name}\n\n{SAID}\n"}
+    texts |= {"campaign.toml": campaign_text(name, drawn, measured), "README.md": f"# {name}\n\n{SAID}\n"}
     return {file: text.encode() for file, text in texts.items()}, _entry(suite, case, drawn, measured)
 
 
-def _measure(drawn: Drawn, place: int, effects: Effects, rest: int, rng: np.random.Generator) -> Measured:
+def measure_stroke(drawn: Drawn, place: int, effects: Effects, rest: int, rng: np.random.Generator) -> Measured:
     """Measure one stroke; what is written departs from the truth by noise and rounding."""
     (manoeuvre, role), trajectory = drawn.strokes[place], drawn.trajectories[place]
     speed = measure(trajectory, drawn.gyro, effects.gyro_bias_deg_s, rng, rest)
@@ -48,7 +48,7 @@ def _measure(drawn: Drawn, place: int, effects: Effects, rest: int, rng: np.rand
     return Measured(record, float(np.sqrt(np.mean(departure**2))))
 
 
-def _campaign_text(name: str, drawn: Drawn, measured: list[Measured]) -> str:
+def campaign_text(name: str, drawn: Drawn, measured: list[Measured]) -> str:
     """Write campaign.toml without a word about the truth."""
     lines = [f"# {SAID}", "", f'name = "{name}"', 'plant = "shell_transfer_arm"']
     lines.append(f"gyro_range_deg_s = {short(drawn.gyro.range_deg_s)}")

@@ -1,5 +1,6 @@
 """Draw what a blind campaign's arm is and what it is told to do."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +20,8 @@ TRIES = 60
 FASTEST = 3.4
 """Largest speed of a drawn manoeuvre [rad/s]: 195 deg/s, below the gyro's range of 200."""
 PAPERS = Manoeuvre("lower", -48.0, 22.0)
+Strokes = Callable[[np.random.Generator], tuple[tuple[Manoeuvre, str], ...]]
+"""What draws manoeuvres, each with its role."""
 
 
 @dataclass(frozen=True)
@@ -32,17 +35,18 @@ class Drawn:
     trajectories: tuple[Trajectory, ...]
 
 
-def draw(suite: Suite, case: Case, rng: np.random.Generator) -> Drawn:
+def draw(suite: Suite, case: Case, rng: np.random.Generator, strokes_of: Strokes | None = None) -> Drawn:
     """Draw parameters and manoeuvres until the arm, effects included, makes every stroke inside its travel.
 
-    Raises RefusalError when no draw does.
+    `strokes_of` draws the manoeuvres; None: as the class of the case wants them. Raises RefusalError when no draw does.
     """
     noise = round(float(rng.uniform(*suite.noise_deg_s)), 4)
+    usual = _one_stroke if case.label == "one_stroke" else six_strokes
     gyro = Gyro(noise, 0.001, suite.bandwidth_hz if case.coloured else 0.0)
     for _ in range(TRIES):
         arm = _arm(suite, rng)
         duration = round(float(rng.uniform(*suite.duration_s)), 2)
-        strokes = _one_stroke(rng) if case.label == "one_stroke" else _six_strokes(rng)
+        strokes = strokes_of(rng) if strokes_of else usual(rng)
         found = [_run(Motion(arm, manoeuvre, case.effects()), duration) for manoeuvre, _ in strokes]
         trajectories = tuple(each for each in found if each is not None)
         if len(trajectories) == len(strokes):
@@ -59,7 +63,7 @@ def _arm(suite: Suite, rng: np.random.Generator) -> Arm:
     return replace(Arm(), **drawn)
 
 
-def _six_strokes(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
+def six_strokes(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
     """Draw six manoeuvres: four to train on, two to hold out."""
 
     def between(low: float, high: float) -> float:

@@ -71,7 +71,7 @@ def read_suite(path: Path) -> Suite:
     """Read the [suite] table of a TOML file. Raises RefusalError with one sentence when that is none."""
     try:
         table = tomllib.loads(path.read_text())["suite"]
-        return _suite(table)
+        return make_suite(table)
     except OSError as error:
         raise RefusalError(f"{path} cannot be read: {error.strerror or error}") from error
     except KeyError as error:
@@ -80,13 +80,14 @@ def read_suite(path: Path) -> Suite:
         raise RefusalError(f"{path} describes no suite: {error}") from error
 
 
-def _suite(table: Mapping[str, Any]) -> Suite:
+def make_suite(table: Mapping[str, Any]) -> Suite:
+    """Give the settings that a [suite] table holds."""
     return Suite(
         effects=tuple(_kind(each, True) for each in table.get("effects", [])),
         unlisted=tuple(_kind(each, False) for each in table.get("unlisted", [])),
         pairs=tuple((first, second) for first, second in table.get("two", {}).get("pairs", [])),
         one_stroke=tuple(table.get("one_stroke", {}).get("effects", [])),
-        controls=int(table["controls"]),
+        controls=int(table.get("controls", 0)),
         ranges={name: _range(edges) for name, edges in table["ranges"].items()},
         margin=float(table["margin"]),
         bandwidth_hz=float(table["bandwidth_hz"]),

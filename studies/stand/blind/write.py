@@ -4,7 +4,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
@@ -16,7 +16,9 @@ from stand.blind.case import Case
 from stand.blind.suite import Suite
 from stand.refusal import RefusalError
 
-CAMPAIGN = re.compile(r"c\d{3,}")
+CAMPAIGN = re.compile(r"c\d{3,}|[a-z]\d\d(_advised|_random)?")
+Make = Callable[[Any], tuple[dict[str, bytes], Entry]]
+"""Makes the files of a campaign, and its entry in the key."""
 
 
 def key_path(folder: Path) -> Path:
@@ -44,18 +46,32 @@ def check_suite_place(folder: Path, force: bool) -> None:
 def write_suite(
     folder: Path, suite: Suite, cases: Mapping[str, Case], seed: int, processes: int
 ) -> None:
+    """Make every campaign of a suite, as `write_campaigns` does."""
+    named = {name: (name, case) for name, case in cases.items()}
+    write_campaigns(folder, named, partial(_make_blind, suite, seed), {"seed": seed}, processes)
+
+
+def _make_blind(suite: Suite, seed: int, named: tuple[str, Case]) -> tuple[dict[str, bytes], Entry]:
+    name, case = named
+    return make_campaign(name, suite, case, seed)
+
+
+def write_campaigns(
+    folder: Path, named: Mapping[str, Any], make: Make, head: Mapping[str, Any], processes: int
+) -> None:
     """Make every campaign, in `processes` processes, and put folder and key in place when all are there.
 
-    What is written does not depend on the number of processes. Raises RefusalError when the disk does not allow it.
+    `named` is what `make` is given for each campaign, `head` what the key tells of all of them. What is written does
+    not depend on the number of processes. Raises RefusalError when the disk does not allow it.
     """
     place = folder.resolve()
     fresh = place.with_name(f".{place.name}.new-{os.getpid()}")
     try:
         fresh.mkdir(parents=True)
-        entries = _make_all(fresh, suite, cases, seed, processes)
+        entries = _make_all(fresh, named, make, processes)
         shutil.rmtree(place, ignore_errors=True)
         fresh.rename(place)
-        key = {"made_by": "studies/test_stand.py blind", "unit": "rad/s", "seed": seed, "campaigns": entries}
+        key = {"made_by": "studies/test_stand.py blind", "unit": "rad/s", **head, "campaigns": entries}
         key_path(place).write_text(json.dumps(key, indent=1) + "\n")
     except OSError as error:
         raise RefusalError(f"{folder} cannot be written: {error.strerror or error}") from error
@@ -63,18 +79,15 @@ def write_suite(
         shutil.rmtree(fresh, ignore_errors=True)
 
 
-def _make_all(
-    fresh: Path, suite: Suite, cases: Mapping[str, Case], seed: int, processes: int
-) -> dict[str, Entry]:
-    make = partial(_make, fresh, suite, seed)
+def _make_all(fresh: Path, named: Mapping[str, Any], make: Make, processes: int) -> dict[str, Entry]:
     with _mapper(processes) as run:
-        return dict(zip(cases, run(make, cases.items()), strict=True))
+        return dict(zip(named, run(partial(_make, fresh, make), named.items()), strict=True))
 
 
-def _make(fresh: Path, suite: Suite, seed: int, named: tuple[str, Case]) -> Entry:
+def _make(fresh: Path, make: Make, named: tuple[str, Any]) -> Entry:
     """Make one campaign, write its files, and give its entry in the key."""
     name, case = named
-    files, entry = make_campaign(name, suite, case, seed)
+    files, entry = make(case)
     (fresh / name).mkdir()
     for file, content in files.items():
         (fresh / name / file).write_bytes(content)

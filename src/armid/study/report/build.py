@@ -1,9 +1,12 @@
 """Build the report of a study from its stored results."""
 
+from pathlib import Path
 from typing import Any
 
 from armid.model import ArmidError
+from armid.study.kind import IDENTIFIES, KINDS, Kind, function
 from armid.study.metrics import Results
+from armid.study.report.answer import answer
 from armid.study.report.evidence import Evidence
 from armid.study.report.general import (
     best_fitness_section,
@@ -22,7 +25,6 @@ BUILDERS = (
     table1_section, table2_section, cramer_rao_section, fitness_section, success_section, running_time_section,
     best_fitness_section, convergence_section, errors_section, ranks_section,
 )  # fmt: skip
-KIND = "identify"
 ALONE = "A seed decides the search alone; the noise is the records' own."
 PAIRED = "The same seed gives the same noise to all identifiers, so that they are compared in pairs."
 SYNTHETIC = (
@@ -31,13 +33,47 @@ SYNTHETIC = (
 )
 
 
-def report_of(results: Results) -> Report:
+def report_of(results: Results, key: Path | None = None) -> Report:
     """Return tables and figures of a study as far as it was run; nothing is drawn yet.
 
-    Raises ArmidError when no run has ended, and for a study of another kind than "identify".
+    key: file of a truth that was kept from the study, None: the one that it names.
+
+    Raises ArmidError when no run has ended, where a key is needed and not there, and for a kind that nobody knows.
     """
-    if results.study.get("kind", KIND) != KIND:
-        raise ArmidError(f"study '{results.study['name']}' is of kind '{results.study['kind']}', '{KIND}' is expected")
+    report: Report = function(kind_of(results).reported_by)(results, key)
+    return report
+
+
+def summary_of(results: Results) -> Report:
+    """Return the report with the one table that is printed when a study ends; no truth that was kept from it enters."""
+    report: Report = function(kind_of(results).summed_up_by)(results)
+    return report
+
+
+def kind_of(results: Results) -> Kind:
+    """Return the kind of a study.
+
+    Raises ArmidError for one that this version does not know.
+    """
+    kind = results.study.get("kind", IDENTIFIES)
+    if kind not in KINDS:
+        raise ArmidError(f"study '{results.study['name']}' is of kind '{kind}', one of {', '.join(KINDS)} is expected")
+    return KINDS[kind]
+
+
+def identify_summary(results: Results) -> Report:
+    """Return state and main table of a study that identifies."""
+    evidence = Evidence(results)
+    return Report(str(results.study["name"]), "", state(evidence.study, evidence), (), main_table(evidence), ())
+
+
+def identify_report(results: Results, key: Path | None = None) -> Report:
+    """Return the report of a study that identifies.
+
+    Raises ArmidError when no run has ended, and for a key, since nothing was kept from such a study.
+    """
+    if key is not None:
+        raise ArmidError(f"study '{results.study['name']}' knows its truths, a key is not expected")
     if results.runs.empty:
         raise ArmidError(f"study '{results.study['name']}' has no finished run: nothing can be reported")
     evidence = Evidence(results)
@@ -46,7 +82,7 @@ def report_of(results: Results) -> Report:
     sections = (Section("Overview", "", (main,)), *(s for s in made if s is not None), runs_section(evidence))
     study = evidence.study
     return Report(str(study["name"]), str(study.get("question", "")), state(study, evidence), facts(evidence), main,
-                  sections)  # fmt: skip
+                  sections, answer(evidence))  # fmt: skip
 
 
 def main_table(evidence: Evidence) -> Table:

@@ -21,7 +21,8 @@ class Report:
     """Hold a whole report.
 
     question: what the study asks; state: how much of it was run, one sentence; facts: how it was made, one sentence
-    each; main: the table that answers the question; sections: everything, the main table's first.
+    each; main: the table that answers the question; sections: everything, the main table's first; answer: the answer in
+    at most two sentences, empty where only the tables give one.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Report:
     facts: tuple[str, ...]
     main: Table
     sections: tuple[Section, ...]
+    answer: tuple[str, ...] = ()
 
     @property
     def tables(self) -> tuple[Table, ...]:

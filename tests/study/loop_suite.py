@@ -1,0 +1,49 @@
+"""A blind suite of three campaigns, and a study that closes the loop on them with few candidates."""
+
+import json
+from pathlib import Path
+
+SUITE = """
+[suite]
+bandwidth_hz = 40.0
+noise_deg_s = [0.25, 0.30]
+duration_s = [1.0, 1.1]
+rest_s = 0.2
+margin = 0.1
+controls = 1
+[suite.ranges]
+p0 = [2.6e6, 3.5e6]
+k = [0.6, 1.1]
+eta3 = [0.45, 0.70]
+n = [0.9, 1.5]
+[[suite.effects]]
+name = "supply_sag"
+port = "supply"
+form = "resistance of both motors"
+matching = true
+sizes = [{ supply_sag = 0.010 }]
+"""
+STUDY = """\
+name = "tiny_blind"
+kind = "close_loop"
+report = "blind"
+question = "Does it name the effect?"
+campaigns = "suite"
+made_by = "make suite"
+key = "suite.key.json"
+candidates = ["coulomb", "seal_friction", "supply_sag", "tilt", "viscous"]
+"""
+
+
+def fake_campaigns(folder: Path, *names: str) -> None:
+    """Write folders that look like campaigns to who does not read them."""
+    for name in names:
+        (folder / name).mkdir(parents=True)
+        (folder / name / "campaign.toml").write_text(f'name = "{name}"\n', encoding="utf-8")
+        (folder / name / "lower.csv").write_text("time_s,angular_velocity_deg_s\n0,0\n", encoding="utf-8")
+
+
+def kept_reports(results) -> dict[str, str]:
+    """Return campaign -> its report as text, so that it can be compared bit for bit."""
+    loops = results.loops
+    return {case: json.dumps(report) for case, report in zip(loops["case"], loops["report"])}

@@ -1,0 +1,129 @@
+"""The loop closed on a small blind suite by the runner: the key stays shut, a kill loses nothing, the report scores."""
+
+import json
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from loop_suite import STUDY, SUITE, kept_reports
+
+from armid.cli.main import main
+from armid.study.results import load_study
+from armid.study.runner import run_study
+
+pytestmark = pytest.mark.slow
+ROOT = Path(__file__).parents[2]
+
+
+def the_stand(*words):
+    """Run the stand, a program that shares no code with the package."""
+    command = [sys.executable, str(ROOT / "studies" / "test_stand.py"), *map(str, words)]
+    subprocess.run(command, check=True, capture_output=True)
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory):
+    """A folder with the study, three campaigns, and their key."""
+    folder = tmp_path_factory.mktemp("blind")
+    (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
+    (folder / "blind.toml").write_text(STUDY, encoding="utf-8")
+    the_stand("blind", folder / "suite", "--seed", 3, "--suite", folder / "suite.toml", "--processes", 1)
+    return folder
+
+
+@pytest.fixture
+def without_key(suite, tmp_path):
+    """A copy of the folder in which nothing is known of the truth."""
+    shutil.copytree(suite, tmp_path / "copy")
+    (tmp_path / "copy" / "suite.key.json").unlink()
+    return tmp_path / "copy"
+
+
+@pytest.fixture(scope="module")
+def closed(suite):
+    """The study run with its key beside it."""
+    return run_study(suite / "blind.toml", jobs=1, out=suite / "out")
+
+
+def test_every_report_is_kept_whole(closed):
+    assert (closed.study["n_planned"], closed.study["n_failed"]) == (3, 0)
+    assert (closed.loops["cpu_seconds"] > 0.0).all()
+    named = sorted(tuple(report["effects"]) for report in closed.loops["report"])
+    assert named == [(), ("supply_sag",), ("supply_sag",)]
+    for case, report in zip(closed.loops["case"], closed.loops["report"]):
+        assert report["campaign"] == case
+        assert set(report) >= {"verdict", "error", "parameters", "steps", "advice"}
+
+
+def test_the_loop_never_opens_the_key(closed, without_key):
+    """A pipe in the place of the key blocks for ever whoever opens it; where there is none nothing is missed either."""
+    os.mkfifo(without_key / "suite.key.json")
+    piped = run_study(without_key / "blind.toml", jobs=1, out=without_key / "piped", time_limit=300.0)
+    (without_key / "suite.key.json").unlink()
+    absent = run_study(without_key / "blind.toml", jobs=1, out=without_key / "absent")
+    assert kept_reports(piped) == kept_reports(absent) == kept_reports(closed)
+
+
+def n_kept(out):
+    """How many runs a store holds."""
+    try:
+        with closing(sqlite3.connect(f"file:{out / 'study.sqlite'}?mode=ro", uri=True)) as connection:
+            return connection.execute("SELECT count(*) FROM loops").fetchone()[0]
+    except sqlite3.OperationalError:
+        return 0
+
+
+def test_a_kill_loses_nothing(start, closed, without_key):
+    out = without_key / "out"
+    shutil.rmtree(out, ignore_errors=True)
+    process = start(without_key / "blind.toml", "--out", out, "--jobs", 1)
+    end = time.monotonic() + 600.0
+    while not n_kept(out) and process.poll() is None:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    process.kill()
+    assert process.wait() == -signal.SIGKILL
+    before = n_kept(out)
+    ended = start(without_key / "blind.toml", "--out", out, "--jobs", 2)
+    text, err = ended.communicate(timeout=600)
+    assert (ended.returncode, err) == (0, "")
+    assert f"{3 - before} runs made" in text
+    assert "3 of 3 are in" in text
+    assert kept_reports(load_study(out)) == kept_reports(closed)
+
+
+def test_the_report_opens_the_key_and_scores(suite, closed, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(suite / "out")])
+    assert ended.value.code == 0
+    assert "right name, or a group that holds it" in capsys.readouterr().out
+    page = (suite / "out" / "report.md").read_text(encoding="utf-8")
+    assert "| single effects that move the held-out error by more than 20 % | wrong name alone | 0 %" in page
+    for figure in ("confusion", "named_first", "false_alarms", "held_out", "bias", "groups_and_times", "answers"):
+        assert (suite / "out" / f"{figure}.png").stat().st_size > 5000
+        assert (suite / "out" / f"{figure}.svg").is_file()
+        assert f"({figure}.png)" in page
+
+
+def test_a_report_without_its_key_says_so(closed, without_key, capsys):
+    shutil.copytree(closed.path.parent, without_key / "out", dirs_exist_ok=True)
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(without_key / "out")])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.endswith("does not exist: `make suite` makes it with the campaigns\n")
+
+
+def test_both_scorers_agree_on_real_reports(suite, closed, tmp_path):
+    with pytest.raises(SystemExit) as ended:
+        main(["export", "reports", str(suite / "out"), str(tmp_path / "reports")])
+    assert ended.value.code == 0
+    the_stand("score", suite / "suite", tmp_path / "reports")
+    told = json.loads((tmp_path / "reports" / "score" / "score.json").read_text())
+    assert [row["judgement"] for row in told["judgements"]] == ["right"] * 3

@@ -1,0 +1,96 @@
+"""Studies that close the loop: what they read, what they refuse, what decides a run."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from loop_suite import STUDY, fake_campaigns
+
+from armid.cli.main import main
+from armid.model import EFFECTS, ArmidError
+from armid.study.loops.plan import planned_loops
+from armid.study.loops.study import describe_loops
+from armid.study.study import read_study
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Return a function that writes a study with two campaigns beside it and returns its file."""
+    fake_campaigns(tmp_path / "suite", "c000", "c001")
+
+    def study(more="", text=STUDY):
+        (tmp_path / "blind.toml").write_text(text + more, encoding="utf-8")
+        return tmp_path / "blind.toml"
+
+    return study
+
+
+def test_a_run_for_each_campaign_and_no_word_of_the_key_in_it(write):
+    study = read_study(write("[suite]\nanything = [1, 2]\n"))
+    planned = list(planned_loops(study))
+    assert [p.case for p in planned] == ["c000", "c001"]
+    assert len({p.run for p in planned}) == 2
+    assert not any("key" in p.settings for p in planned)
+
+
+def test_other_records_and_other_candidates_are_other_runs(write, tmp_path):
+    before = {p.case: p.run for p in planned_loops(read_study(write()))}
+    assert before == {p.case: p.run for p in planned_loops(read_study(write("# a remark\n")))}
+    with open(tmp_path / "suite" / "c001" / "lower.csv", "a", encoding="utf-8") as file:
+        file.write("0.001,0\n")
+    changed = {p.case: p.run for p in planned_loops(read_study(write()))}
+    assert (changed["c000"] == before["c000"], changed["c001"] == before["c001"]) == (True, False)
+    other = {p.case: p.run for p in planned_loops(read_study(write('without = ["tilt"]\n')))}
+    assert not set(other.values()) & set(changed.values())
+
+
+def test_all_effects_are_looked_for_unless_the_study_says_otherwise(write):
+    text = re.sub(r"candidates = .*\n", "", STUDY)
+    assert set(read_study(write(text=text)).candidates) == set(EFFECTS)
+    assert set(read_study(write('without = ["tilt"]\n', text)).candidates) == set(EFFECTS) - {"tilt"}
+
+
+def test_a_key_is_told_as_seen_from_the_store(write, tmp_path):
+    told = describe_loops(read_study(write()), tmp_path / "results" / "blind")
+    assert told["key"] == "../../suite.key.json"
+    assert json.loads(json.dumps(told)) == told
+
+
+def test_some_campaigns_only(write):
+    assert read_study(write('only = ["*1"]\n')).case_names == ["c001"]
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ('only = ["c002"]\n', "key 'only' holds 'c002', which is no campaign of 'suite', did you mean 'c00"),
+        ('without = ["tillt"]\n', "effect 'tillt' is unknown, did you mean 'tilt'?"),
+        ('report = "blnd"\n', "report 'blnd' is unknown, did you mean 'blind'?"),
+        ('kind = "close_lop"\n', "kind 'close_lop' is unknown, did you mean 'close_loop'?"),
+        ("budget = 3\n", "key 'budget' is unknown"),
+        ('campaigns = "swite"\n', "there are no campaigns in 'swite', `make suite` makes them"),
+        ('campaigns = "."\n', "'.' holds no folder with a campaign.toml, `make suite` makes them"),
+    ],
+)
+def test_refuses_with_one_sentence(more, sentence, write, capsys):
+    name = more.partition(" ")[0]
+    text = re.sub(rf"^{name} = .*\n", "", STUDY, flags=re.MULTILINE) + more
+    with pytest.raises(SystemExit) as stopped:
+        main(["study", str(write(text=text))])
+    assert stopped.value.code == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["blind", "blind_short"])
+def test_the_suites_say_how_they_are_made(name, tmp_path):
+    text = (ROOT / "studies" / f"{name}.toml").read_text(encoding="utf-8")
+    (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ArmidError, match=rf"`python studies/test_stand.py blind studies/campaigns/{name} --seed 1"):
+        read_study(tmp_path / f"{name}.toml")
+    fake_campaigns(tmp_path / "campaigns" / name, "c000")
+    assert read_study(tmp_path / f"{name}.toml").case_names == ["c000"]
