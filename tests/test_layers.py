@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[1] / "src" / "armid"
 # A folder or file may import only what stands before it.
 LAYERS = [
     "display", "model", "simulation", "record", "fitness", "problem", "identifiers", "identifiability",
-    "identification", "registry", "contract", "discrepancy", "study", "bench", "cli", "__main__",
+    "identification", "registry", "contract", "new", "discrepancy", "study", "bench", "page", "cli", "__main__",
 ]  # fmt: skip
 FILES = sorted(ROOT.rglob("*.py"))
 

@@ -36,8 +36,10 @@ def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_fold
 
 def test_writes_result_and_figures(identified, tmp_path):
     text, result = identified()
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["convergence.png", "fit.png", "result.json"]
-    assert "wrote result.json, fit.png, convergence.png to" in text
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        "convergence.png", "convergence.svg", "details.json", "fit.png", "report.html", "result.json"
+    ]  # fmt: skip
+    assert "wrote result.json, fit.png, convergence.png, convergence.svg, details.json, report.html to" in text
     assert (result["budget"], result["used"], result["seed"], result["unit"]) == (160, 160, 1, "rad/s")
     assert result["campaign"] == "paper_arm"
 
@@ -116,7 +118,7 @@ def test_nothing_free_is_judged_without_a_search(identified, tmp_path):
     assert (result["used"], result["stopped"], result["correlation"]) == (0, "no parameter is free", {})
     assert result["error"]["train"]["s"] > 0.98
     assert not (tmp_path / "out" / "convergence.png").exists()
-    assert "wrote result.json, fit.png to" in text
+    assert "wrote result.json, fit.png, details.json, report.html to" in text
 
 
 def test_a_campaign_without_holdout(identified, write_axis, tmp_path):

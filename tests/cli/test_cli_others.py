@@ -1,14 +1,18 @@
 """`armid list`, `check`, `bench`, `import`, help and exit codes."""
 
 import re
+import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from armid.cli.main import app
 from armid.model import EFFECTS
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_list_effects(run):
@@ -166,3 +170,39 @@ def test_a_reader_that_leaves_is_no_error_of_ours(root):
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root) as process:
         process.stdout.close()
         assert b"Traceback" not in process.stderr.read()
+
+
+def commands_of(group, words=()):
+    """Yield every command below a group with the words that call it."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands_of(command, (*words, name))
+        else:
+            yield (*words, name), command
+
+
+EVERY = dict(commands_of(app))
+
+
+@pytest.mark.parametrize("words", EVERY, ids=" ".join)
+def test_every_command_tells_an_example_that_exists(words):
+    lines = [line.split("  ")[0] for line in (line.strip() for line in (EVERY[words].epilog or "").splitlines()[2:])]
+    assert lines or words == ("export", "reports"), words
+    for line in lines:
+        said = shlex.split(line)
+        own = next(w for w in EVERY if tuple(said[1 : 1 + len(w)]) == w)
+        known = {name for parameter in EVERY[own].params for name in parameter.opts}
+        assert {word for word in said if word.startswith("--")} <= known, line
+        for word in said:
+            assert not word.startswith("studies/") or (ROOT / word).exists() or word.endswith(("emps", "dfki")), line
+
+
+@pytest.mark.parametrize("words", [w for w in EVERY if any(p.name == "plugins" for p in EVERY[w].params)], ids=" ".join)
+def test_the_help_says_that_a_plug_in_runs_code(run, words):
+    text = " ".join(run(*words, "--help").out.split())
+    assert "--plugin FILE.py:attribute" in text
+    assert "This runs the Python code of the file" in text
+
+
+def test_no_summary_of_a_command_is_cut_off(run):
+    assert "..." not in run("--help").out.partition("Commands:")[2]

@@ -1,31 +1,46 @@
-"""`armid check`: whether a user's own plant, effect, fitness or identifier keeps the contract."""
+"""`armid check`: whether a user's own plant, effect, fitness, identifier or campaign keeps the contract."""
 
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from armid.cli.options import plugin_option
-from armid.registry import load_plugin, load_registry
+from armid.cli.options import examples, plugin_option
+from armid.registry import Registry, load_plugin, load_registry
+
+if TYPE_CHECKING:
+    from armid.contract import Finding
 
 
-@click.command("check")
-@click.argument("thing", metavar="FILE.py:attribute")
+@click.command("check", epilog=examples("armid check mine.py:my_drag", "armid check studies/campaigns/paper_arm"))
+@click.argument("thing", metavar="FILE.py:attribute|CAMPAIGN")
 @plugin_option
 def check_command(thing: str, plugins: tuple[str, ...]) -> None:
     """Run the contract on your own things.
 
-    A plant, an effect, a fitness or an identifier; an effect is tried on every plant that offers its ports, those of
-    --plugin included. Exit code 1 when a point does not hold.
+    A plant, an effect, a fitness or an identifier in a Python file, which is run; an effect is tried on every plant
+    that offers its ports, those of --plugin included. A campaign is read, and its model simulated through each record.
+    Every point is printed. Exit code 0 when all hold, 1 when one does not, 2 when there is nothing to try.
     """
-    from armid.contract import check_thing  # noqa: PLC0415 - simulations and pymoo, which other commands do not need
-
-    registry = load_registry(plugins)
-    kind, name, found = load_plugin(thing)
+    kind, name, findings = findings_of(thing, load_registry(plugins))
     print(f"{kind}: {name}")
-    findings = check_thing(kind, name, found, registry.plants)
     for finding in findings:
         print(f"  {'ok  ' if finding.passed else 'FAIL'} {finding.name}: {finding.sentence}")
     failed = sum(not f.passed for f in findings)
     print(f"{len(findings) - failed} of {len(findings)} points hold")
     if failed:
         sys.exit(1)
+
+
+def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[Finding]"]:
+    """Return kind and name of a thing, and what its contract finds."""
+    # simulations and pymoo, which other commands do not need
+    from armid.contract import check_campaign, check_thing  # noqa: PLC0415
+    from armid.record import read_campaign  # noqa: PLC0415
+
+    if Path(thing).is_dir() or (":" not in thing and Path(thing).suffix != ".py"):
+        campaign = read_campaign(thing, registry.plants, registry.effects)
+        return "campaign", campaign.name, check_campaign(campaign, registry.effects)
+    kind, name, found = load_plugin(thing)
+    return kind, name, check_thing(kind, name, found, registry.plants)

@@ -7,20 +7,34 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armid.cli.made_by import made_by
 from armid.cli.new_files import NewFiles, refuse_unwritable
-from armid.cli.options import campaign_argument, effects_option, interval, intervals, model_of, numbers, plugin_option
+from armid.cli.options import (
+    campaign_argument,
+    effects_option,
+    examples,
+    intervals,
+    numbers,
+    opened,
+    plugin_option,
+)
+from armid.cli.pages import write_page
 from armid.model import ArmidError, Effect, nearest
 
 if TYPE_CHECKING:
     from armid.discrepancy import ClosedLoop
 
 
-@click.command("close-loop")
+@click.command("close-loop", short_help="Find the effects that the declared model lacks.", epilog=examples(
+    "armid close-loop studies/campaigns/four_strokes --out results/four_strokes",
+    "armid close-loop CAMPAIGN --out DIR --candidates coulomb,viscous,stribeck",
+    "armid close-loop CAMPAIGN --out DIR --plugin mine.py:my_drag",
+))  # fmt: skip
 @campaign_argument
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder for report.md, report.json and the figures.")
+              help="Folder for report.html, report.md, report.json and the figures.")
 @effects_option
-@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for; else all that apply.")
+@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]")
 @click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
 @click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
               help="Free a parameter, of the model or of a candidate, between bounds, SI. Repeatable.")
@@ -43,19 +57,13 @@ def close_loop_command(
     from numpy.random import default_rng  # noqa: PLC0415 - other commands do not need it
 
     from armid.discrepancy import close_loop  # noqa: PLC0415 - scipy and compiled code that other commands do not need
-    from armid.record import read_campaign  # noqa: PLC0415
-    from armid.registry import load_registry  # noqa: PLC0415
 
-    registry = load_registry(plugins)
-    read = read_campaign(campaign, registry.plants, registry.effects)
-    if window:
-        read = read.with_window(*interval(window, "--window"))
-    model = model_of(read, effects, registry)
+    registry, read, model = opened(campaign, effects, plugins, window)
     wanted = looked_for(registry.effects, candidates, without)
-    given = intervals(bounds, "--bounds"), numbers(fix, "--fix")
+    overrides = intervals(bounds, "--bounds"), numbers(fix, "--fix")
     refuse_unwritable(out)
     with Status() as status:
-        found = close_loop(model, read, wanted, default_rng(seed), *given, threads=threads, told=status.tell)
+        found = close_loop(model, read, wanted, default_rng(seed), *overrides, threads=threads, told=status.tell)
     report(found)
     write(found, out)
 
@@ -105,16 +113,25 @@ def report(found: "ClosedLoop") -> None:
 
 
 def write(found: "ClosedLoop", out: Path) -> None:
-    """Write report.md, report.json and the figures, all or none."""
+    """Write report.html, report.md, report.json, details.json and the figures, all or none."""
     from armid.discrepancy import report_of  # noqa: PLC0415
-    from armid.discrepancy.figures import FIGURES  # noqa: PLC0415 - takes time to import
+    from armid.discrepancy.details import details_of  # noqa: PLC0415
+    from armid.discrepancy.figures import figures_of  # noqa: PLC0415 - takes time to import
+    from armid.discrepancy.figures.residuals import residual_figure  # noqa: PLC0415
     from armid.discrepancy.report import markdown  # noqa: PLC0415
+    from armid.page import LOOP  # noqa: PLC0415
 
+    figures = figures_of(found)
     with NewFiles(out) as files:
         files.path("report.json").write_text(json.dumps(report_of(found), indent=2, allow_nan=False) + "\n")
-        files.path("report.md").write_text(markdown(found, list(FIGURES)))
-        for name, draw in FIGURES.items():
+        files.path("report.md").write_text(markdown(found, list(figures)))
+        files.path("details.json").write_text(json.dumps(details_of(found, made_by()), allow_nan=False) + "\n")
+        for name, draw in figures.items():
             draw(found, files.path(name))
+            if draw is not residual_figure:
+                # the page draws residuals itself, with layers; as SVG they would be large
+                draw(found, files.path(str(Path(name).with_suffix(".svg"))))
+        write_page(files, LOOP, out)
     print(f"wrote {', '.join(files.names)} to {out}")
 
 

@@ -16,11 +16,11 @@ from armid.cli.options import (
     assignments,
     campaign_argument,
     effects_option,
-    interval,
+    examples,
     intervals,
-    model_of,
     number,
     numbers,
+    opened,
     plugin_option,
 )
 from armid.model import ArmidError, nearest
@@ -30,9 +30,14 @@ if TYPE_CHECKING:
     from armid.problem import Space
 
 Array = NDArray[np.float64]
+# The rounding of a speed is larger.
+LEAST_NOISE = 1e-15
 
 
-@click.command("identifiability")
+@click.command("identifiability", short_help="Say how well the records pin down the parameters.", epilog=examples(
+    "armid identifiability studies/campaigns/paper_arm --window 0:0.7 --out results/identifiability",
+    "armid identifiability CAMPAIGN --from results/paper_arm/result.json --rank worst",
+))  # fmt: skip
 @campaign_argument
 @effects_option
 @click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
@@ -63,20 +68,15 @@ def identifiability_command(
     from armid.identifiability.examine import examine  # noqa: PLC0415 - compiled code that other commands do not need
     from armid.identifiability.purchase import SHRINKAGE, VOLUME, WORST  # noqa: PLC0415
     from armid.problem import space_of  # noqa: PLC0415
-    from armid.record import read_campaign  # noqa: PLC0415
-    from armid.registry import load_registry  # noqa: PLC0415
 
     if rank not in (VOLUME, WORST, SHRINKAGE):
         raise ArmidError(f"--rank '{rank}': {nearest(rank, (VOLUME, WORST, SHRINKAGE))}")
-    if noise is not None and not (np.isfinite(noise) and noise > 0.0):
-        raise ArmidError(f"--noise is {noise:g}, a finite number above 0 is expected")
+    if noise is not None and not LEAST_NOISE <= noise <= 1.0 / LEAST_NOISE:
+        expected = f"a finite number above 0 is expected, {LEAST_NOISE:g} to {1.0 / LEAST_NOISE:g}"
+        raise ArmidError(f"--noise is {noise:g}, {expected}")
     if at and source is not None:
         raise ArmidError("--at and --from are both given: one point is expected")
-    registry = load_registry(plugins)
-    read = read_campaign(campaign, registry.plants, registry.effects)
-    if window:
-        read = read.with_window(*interval(window, "--window"))
-    model = model_of(read, effects, registry)
+    _, read, model = opened(campaign, effects, plugins, window)
     space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
     point = point_of(space, at, source)
     if out is not None:
@@ -103,7 +103,7 @@ def read_point(path: Path) -> dict[str, float]:
     try:
         parameters = json.loads(path.read_text(encoding="utf-8"))["parameters"]
         return {str(name): float(entry["value"]) for name, entry in parameters.items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise ArmidError(f"--from {path} holds no parameters with values: a result.json of `armid identify` is "
                          "expected") from error  # fmt: skip
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from armid.cli.made_by import made_by
 from armid.cli.new_files import NewFiles, refuse_unwritable
 from armid.cli.options import (
     accuracy_of,
@@ -15,19 +16,24 @@ from armid.cli.options import (
     campaign_argument,
     chosen,
     effects_option,
-    interval,
+    examples,
     intervals,
-    model_of,
     numbers,
+    opened,
     plugin_option,
     value_of,
 )
+from armid.cli.pages import write_page
 
 if TYPE_CHECKING:
     from armid.identification import Identification
 
 
-@click.command("identify")
+@click.command("identify", epilog=examples(
+    "armid identify studies/campaigns/paper_arm --window 0:0.7 --out results/paper_arm",
+    "armid identify CAMPAIGN --identifier pso+least_squares --fitness rmse --budget 3000",
+    "armid identify CAMPAIGN --effects coulomb --bounds coulomb.level=0:80 --fix n=1.4",
+))  # fmt: skip
 @campaign_argument
 @click.option("--identifier", default="pso", show_default=True,
               help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.")
@@ -46,7 +52,8 @@ if TYPE_CHECKING:
               help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(0),
               help="Seed of everything random; the same gives the same result.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for result.json and the figures.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for report.html, result.json and the figures.")
 @accuracy_option
 @plugin_option
 def identify_command(
@@ -57,20 +64,15 @@ def identify_command(
     """Identify parameters from the train records.
 
     The result is judged on train and holdout. Prints parameters with 95 % intervals (from sensitivities and measured
-    noise), warnings in words, and errors.
+    noise), warnings in words, and errors. Without --out nothing is written. Ctrl-C ends the search, judges the best so
+    far, and exits with 130.
     """
     from armid.fitness import SIMILARITIES  # noqa: PLC0415 - compiled code that other commands do not need
     from armid.identification import INTERRUPTED  # noqa: PLC0415 - pymoo takes time to import
     from armid.identification import identify as run  # noqa: PLC0415
     from armid.problem import space_of  # noqa: PLC0415
-    from armid.record import read_campaign  # noqa: PLC0415
-    from armid.registry import load_registry  # noqa: PLC0415
 
-    registry = load_registry(plugins)
-    read = read_campaign(campaign, registry.plants, registry.effects)
-    if window:
-        read = read.with_window(*interval(window, "--window"))
-    model = model_of(read, effects, registry)
+    registry, read, model = opened(campaign, effects, plugins, window)
     space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
     distance: Any = chosen(fitness, registry.fitness, "fitness")
     searcher = registry.identifier_of(identifier)
@@ -104,15 +106,20 @@ def report(found: "Identification") -> None:
 
 
 def write(found: "Identification", out: Path) -> None:
-    """Write result.json and the figures, all or none."""
+    """Write report.html, result.json, details.json and the figures, all or none."""
+    from armid.identification.details import details_of  # noqa: PLC0415
     from armid.identification.figures import convergence_figure, fit_figure  # noqa: PLC0415
     from armid.identification.result import result_of  # noqa: PLC0415
+    from armid.page import IDENTIFICATION  # noqa: PLC0415
 
     with NewFiles(out) as files:
         files.path("result.json").write_text(json.dumps(result_of(found), indent=2, allow_nan=False) + "\n")
         fit_figure(found, files.path("fit.png"))
         if len(found.trace[0]):
             convergence_figure(found, files.path("convergence.png"))
+            convergence_figure(found, files.path("convergence.svg"))
+        files.path("details.json").write_text(json.dumps(details_of(found, made_by()), allow_nan=False) + "\n")
+        write_page(files, IDENTIFICATION, out)
     print(f"wrote {', '.join(files.names)} to {out}")
 
 

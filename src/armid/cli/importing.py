@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from armid.cli.options import plugin_option
+from armid.cli.options import examples, plugin_option
 from armid.registry import load_registry
 
 
@@ -16,7 +16,7 @@ def import_group() -> None:
     """
 
 
-@import_group.command("emps")
+@import_group.command("emps", epilog=examples("armid import emps FOLDER --out studies/campaigns/emps"))
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="New folder to write.")
 @plugin_option
@@ -33,7 +33,8 @@ def emps(folder: Path | None, out: Path, plugins: tuple[str, ...]) -> None:
     print(f"wrote {import_emps(folder, out)}")
 
 
-@import_group.command("dfki")
+@import_group.command("dfki", short_help="Import DFKI's torque-limited simple pendulum: a rotary axis that swings up.",
+                      epilog=examples("armid import dfki FOLDER --out studies/campaigns/dfki"))  # fmt: skip
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="New folder to write.")
 @click.option("--holdout", metavar="NAME", help="Record to hold out, ddp or direct_collocation; else both train.")

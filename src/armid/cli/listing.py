@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import click
 
-from armid.cli.options import chosen, plugin_option
+from armid.cli.options import chosen, examples, plugin_option
 from armid.model import Effect, Parameter, Plant, refusal_of
 from armid.model.equations import returned_text
 from armid.registry import KINDS, Registry, load_registry
@@ -18,11 +18,16 @@ multistart:LOCAL: a local one from ever new starts until the budget is used
 GLOBAL+LOCAL[+LOCAL]: a chain, each phase from the best so far; options share=0.5 (0.5:0.3), NAME.OPTION=VALUE"""
 
 
-@click.command("list")
+@click.command("list", short_help="List what is registered.",
+               epilog=examples("armid list plants", "armid list effects --plugin mine.py:my_drag"))  # fmt: skip
 @click.argument("what", metavar="effects|plants|fitness|identifiers")
 @plugin_option
 def list_command(what: str, plugins: tuple[str, ...]) -> None:
-    """List what is registered: names, equations, parameters, units."""
+    """List what is registered: names, equations, parameters, units.
+
+    plants: parameters with bounds, states, quantities, ports, inputs, constants and keys of a record. effects: port,
+    equation, parameters, source, the plants that take it. fitness: how records join. identifiers: what they need.
+    """
     chosen(what, dict.fromkeys(KINDS), "list")
     registry = load_registry(plugins)
     texts = {"effects": effect_texts, "plants": plant_texts, "fitness": fitness_texts, "identifiers": identifier_texts}

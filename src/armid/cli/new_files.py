@@ -26,6 +26,11 @@ class NewFiles:
         self._beside = TemporaryDirectory(dir=self.folder, prefix=".armid-")
         return self
 
+    @property
+    def place(self) -> Path:
+        """Where the files are until all are there."""
+        return Path(self._beside.name)
+
     def path(self, name: str) -> Path:
         """Return where to write a file for now.
 
@@ -34,7 +39,7 @@ class NewFiles:
         if (self.folder / name).is_dir():
             raise ArmidError(f"--out {self.folder} holds a folder {name}: a place for a file of that name is expected")
         self.names.append(name)
-        path = Path(self._beside.name) / name
+        path = self.place / name
         path.parent.mkdir(parents=True, exist_ok=True)
         return path
 
@@ -42,7 +47,7 @@ class NewFiles:
         if kind is None:
             for name in self.names:
                 (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                os.replace(Path(self._beside.name) / name, self.folder / name)
+                os.replace(self.place / name, self.folder / name)
         self._beside.cleanup()
         if self._is_new:
             with suppress(OSError):

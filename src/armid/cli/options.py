@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
 from armid.model import ArmidError, Model, nearest
-from armid.registry import Registry
+from armid.registry import Registry, load_registry
 
 if TYPE_CHECKING:
     from armid.record import Campaign
@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
 plugin_option = click.option(
     "--plugin", "plugins", multiple=True, metavar="FILE.py:attribute",
-    help="Register your own plant, effect, fitness or identifier; runs the file's code. Repeatable.",
+    help="Register your own plant, effect, fitness or identifier. This runs the Python code of the file, so name only "
+    "files that you trust; campaigns and studies never run code. Repeatable.",
 )  # fmt: skip
 effects_option = click.option(
     "--effects", default="", metavar="NAME,NAME[:FORM]", help="Effects to add to those that the campaign declares."
@@ -25,6 +26,34 @@ accuracy_option = click.option(
     help="Error of the engine: standard 1e-5 rad/s, fine 2e-7 rad/s (shares of the plant's speed scale); auto: fine "
     "where the noise would not hide the standard error.",
 )  # fmt: skip
+
+
+class Opened(NamedTuple):
+    """What a command on a campaign works with: all that is registered, the records, the declared model."""
+
+    registry: Registry
+    campaign: "Campaign"
+    model: Model
+
+
+def opened(campaign: Path, effects: str, plugins: Iterable[str], window: str = "") -> Opened:
+    """Return what CAMPAIGN, --effects, --plugin and --window stand for; plug-ins run their code.
+
+    Raises ArmidError for whatever of them cannot be used.
+    """
+    from armid.record import read_campaign  # noqa: PLC0415 - `armid list` and `armid new` read no record
+
+    registry = load_registry(plugins)
+    read = read_campaign(campaign, registry.plants, registry.effects)
+    if window:
+        read = read.with_window(*interval(window, "--window"))
+    return Opened(registry, read, model_of(read, effects, registry))
+
+
+def examples(*lines: str) -> str:
+    """Return what stands below the options of a command's help."""
+    # \b keeps click from joining the lines
+    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
 
 def number(text: str, option: str) -> float:
@@ -51,8 +80,10 @@ def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> 
     return found
 
 
-def value_of(text: str) -> float | int | str:
-    """Return a whole number, a number, or the word itself."""
+def value_of(text: str) -> float | int | bool | str:
+    """Return true or false, a whole number, a number, or the word itself."""
+    if text in ("true", "false"):
+        return text == "true"
     for kind in (int, float):
         try:
             return kind(text)

@@ -1,5 +1,6 @@
-"""`armid report`: tables and figures of a study from its stored results."""
+"""`armid report`: one page, tables and figures from stored results."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,30 +8,80 @@ from typing import TYPE_CHECKING
 import click
 
 from armid.cli.new_files import NewFiles
+from armid.cli.options import examples
+from armid.model import ArmidError
 
 if TYPE_CHECKING:
     from armid.study.report import Report
+    from armid.study.results import StudyResults
 
 
-@click.command("report")
+@click.command("report", short_help="Write the page of stored results.", epilog=examples(
+    "armid report results/table1_short", "armid report results/four_strokes",
+))  # fmt: skip
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-def report_command(folder: Path) -> None:
-    """Write the report of a study beside its stored results.
+@click.option("--key", type=click.Path(path_type=Path), metavar="FILE",
+              help="Truth of blind campaigns. [default: the file that the study names]")
+def report_command(folder: Path, key: Path | None) -> None:
+    """Write report.html, one self-contained page, beside stored results.
 
-    DIR holds study.sqlite, which `armid study` wrote. Into it go report.md, every table as CSV and LaTeX, every figure
-    as PNG and SVG; the same results give the same bytes. A study that is not complete is reported as far as it is, and
-    the report says so. Prints the main table.
+    DIR is a folder that `armid study`, `armid close-loop` or `armid identify` has written. The same results give the
+    same bytes, and nothing is simulated. For a study, report.md, every table as CSV and LaTeX and every figure as PNG
+    and SVG are written too, and the main table is printed; one that is not complete is reported as far as it is, and
+    the report says so.
     """
+    from armid.page import STUDY, result_in  # noqa: PLC0415 - jinja2 and seaborn take time to import
+
+    result = result_in(folder)
+    if result == STUDY:
+        report_study(folder, key)
+    elif key is not None:
+        raise ArmidError(f"{folder} holds no study, and a key is the truth of a study's campaigns: none is expected")
+    else:
+        report_folder(folder, result)
+
+
+def report_folder(folder: Path, result: str) -> None:
+    """Write the page of a closed loop or an identification."""
+    from armid.page import PAGE, html, page_of_folder  # noqa: PLC0415
+
+    text = html(page_of_folder(folder, result, str(folder)))
+    with NewFiles(folder) as files:
+        files.path(PAGE).write_text(text, encoding="utf-8")
+    print(f"wrote {PAGE} ({len(text.encode()) / 1e6:.1f} MB) to {folder}")
+
+
+def report_study(folder: Path, key: Path | None) -> None:
+    """Write the page, tables and figures of a study, and print its main table."""
+    from armid.page import PAGE, html  # noqa: PLC0415
+    from armid.page.study_page import study_page  # noqa: PLC0415
     from armid.study.report import report_of, write_report  # noqa: PLC0415 - pandas takes time to import
     from armid.study.results import load_study  # noqa: PLC0415
 
     results = load_study(folder)
-    report = report_of(results)
+    report = report_of(results, key)
+    again = f"armid report results/{report.name}"
     place = results.path.parent
     with NewFiles(place) as files:
-        write_report(report, f"armid report results/{report.name}", files.path)
+        write_report(report, again, files.path)
+        svgs = {f.name: (files.place / f"{f.name}.svg").read_text(encoding="utf-8") for f in report.figures}
+        commands = command_of(results), again
+        page = study_page(report, svgs, str(results.study["text"]), models_of(results), commands)
+        files.path(PAGE).write_text(html(page), encoding="utf-8")
     show(report)
-    print(f"wrote report.md and {len(files.names) - 1} tables and figures to {place}")
+    print(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
+
+
+def command_of(results: "StudyResults") -> str:
+    """Return what makes the runs again, as a shell takes it."""
+    plugins = [word for name in results.study.get("plugins", ()) for word in ("--plugin", str(name))]
+    return shlex.join(["armid", "study", f"{results.study['name']}.toml", *plugins])
+
+
+def models_of(results: "StudyResults") -> list[str]:
+    """Return the equations of the models that were run, each once."""
+    hashes = [h for h in dict.fromkeys(results.runs["model"]) if isinstance(h, str)]
+    return list(dict.fromkeys(results.text_of(h) for h in hashes))
 
 
 def show(report: "Report") -> None:

@@ -13,20 +13,23 @@ from armid.cli.options import (
     accuracy_option,
     campaign_argument,
     effects_option,
-    model_of,
+    examples,
     numbers,
+    opened,
     plugin_option,
 )
 from armid.model import ArmidError, Model, nearest
-from armid.record import Campaign, Override, Piece, Record, read_campaign, write_table
-from armid.registry import load_registry
+from armid.record import Campaign, Override, Piece, Record, write_table
 from armid.simulation import accuracy_against, calibrate, simulate
 
 Array = NDArray[np.float64]
 SIGNAL = {"rad/s": "angular_velocity_rad_s", "m/s": "velocity_m_s"}
 
 
-@click.command("simulate")
+@click.command("simulate", epilog=examples(
+    "armid simulate studies/campaigns/paper_arm --set p0=3.1e6 --out results/simulated",
+    "armid simulate CAMPAIGN --effects coulomb --set coulomb.level=40 --out DIR",
+))  # fmt: skip
 @campaign_argument
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write to.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, SI. Repeatable.")
@@ -42,9 +45,7 @@ def simulate_command(
     times are irregular), the states, and the recorded signal, SI. A parameter that is not set takes the value that the
     campaign fixes, else its nominal one.
     """
-    registry = load_registry(plugins)
-    read = read_campaign(campaign, registry.plants, registry.effects)
-    model = model_of(read, effects, registry)
+    _, read, model = opened(campaign, effects, plugins)
     candidate = candidate_of(model, read, numbers(settings, "--set"))
     wanted = accuracy_of(accuracy)
     with NewFiles(out) as files:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armid.cli.options import plugin_option
+from armid.cli.options import examples, plugin_option
 
 if TYPE_CHECKING:
     from armid.study.runner import Ending
@@ -14,7 +14,11 @@ if TYPE_CHECKING:
 MOST_NAMED = 300
 
 
-@click.command("study")
+@click.command("study", short_help="Run what is missing of a study.", epilog=examples(
+    "armid study studies/table1_short.toml",
+    "armid study studies/table1.toml --jobs 2 --only 'row 1/pso*'",
+    "armid study mine.toml --plugin mine.py:my_search --out results/mine",
+))  # fmt: skip
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("--jobs", type=click.IntRange(1), help="Worker processes. [default: as many as processors]")
 @click.option("--dask", metavar="tcp://HOST:PORT", help="Scheduler of a Dask cluster, in place of own processes.")
@@ -30,10 +34,11 @@ def study_command(
     study: Path, jobs: int | None, dask: str | None, out: Path | None, time_limit: float, only: str, retry: bool,
     plugins: tuple[str, ...],
 ) -> None:  # fmt: skip
-    """Run what is missing of STUDY, a TOML file of cases, identifiers, fitnesses and seeds.
+    """Run what is missing of STUDY, a TOML file of cases, identifiers, fitnesses and seeds, or of campaigns to close.
 
     Finished runs are kept in one SQLite file, whatever ends the program; the same command goes on where it was.
-    Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not.
+    Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not. Ends
+    with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
     from armid.study.progress import Watch  # noqa: PLC0415
     from armid.study.runner import absolute, run  # noqa: PLC0415 - compiled code that other commands do not need
@@ -52,14 +57,10 @@ def study_command(
 def show_table(folder: Path) -> None:
     """Print the main table of the report, the rest of which takes longer."""
     from armid.cli.report import show  # noqa: PLC0415
-    from armid.study.report import Report  # noqa: PLC0415 - pandas takes time to import
-    from armid.study.report.build import main_table, state  # noqa: PLC0415
-    from armid.study.report.evidence import Evidence  # noqa: PLC0415
+    from armid.study.report import summary_of  # noqa: PLC0415 - pandas takes time to import
     from armid.study.results import load_study  # noqa: PLC0415
 
-    evidence = Evidence(load_study(folder))
-    name, told = str(evidence.study["name"]), state(evidence.study, evidence)
-    show(Report(name, "", told, (), main_table(evidence), ()))
+    show(summary_of(load_study(folder)))
 
 
 def words(ending: "Ending") -> list[str]:

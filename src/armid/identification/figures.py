@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from armid.display import SHOWN, style
+from armid.display import SHOWN, save, style
 from armid.fitness import SIMILARITIES
 from armid.identification.identify import Identification
 from armid.problem import Replay
@@ -97,8 +97,7 @@ def convergence_figure(found: Identification, path: Path) -> None:
     text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {shown[-1]:.6g} {unit}"
     axis.set_title(text.rstrip(), fontsize="medium")
     axis.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    save(figure, path)
 
 
 def set_log_scale(axis: Any) -> None:

@@ -44,8 +44,13 @@ def result_of(found: Identification) -> dict[str, Any]:
         },
         "engine_error": max(r.engine_error for r in found.train_replays),
         "model": str(found.model),
-        "versions": {"python": platform.python_version(), **{p: version(p) for p in PACKAGES}},
+        "versions": versions(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Return package -> version, of Python too."""
+    return {"python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
 
 
 def entry(found: Identification, i: int) -> dict[str, Any]:

@@ -1,0 +1,101 @@
+"""Folders as the commands write them, with numbers that nobody computed: they test pages, and claim nothing."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pandas import DataFrame
+
+from armid.study.report import Report, Section
+from armid.study.tables import Column, Table
+
+EVIL = '<script>document.title="broken"</script><img src=x onerror=alert(1)>"\'&'
+SVG = """<?xml version="1.0"?>
+<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">
+<svg xmlns:xlink="http://www.w3.org/1999/xlink" width="450pt" height="225pt" viewBox="0 0 450 225"
+ xmlns="http://www.w3.org/2000/svg"><metadata><date>today</date></metadata>
+<defs><clipPath id="c1"><rect x="0" y="0" width="450" height="225"/></clipPath>
+<path id="m1" d="M 0 0 L 3.14159 3"/></defs>
+<g id="unused"><path d="M 0.123456 10 L 450 200" clip-path="url(#c1)" style="fill: none; stroke: #0072b2"/></g>
+<use xlink:href="#m1" x="10.98765" y="20"/></svg>"""
+
+
+def errors(rmse: float) -> dict[str, float]:
+    """Return the errors of some records."""
+    return {"rmse": rmse, "nrmse": 0.01, "chi2_per_sample": 2.0, "s": 0.99, "s1": 0.98, "s2": 1.0}
+
+
+def parameter(value: float, unit: str = "1", sure: bool = True) -> dict[str, Any]:
+    """Return one parameter of a loop."""
+    return {"value": value, "unit": unit, "low": 0.9 * value, "high": 1.1 * value, "trusted": sure}
+
+
+def curve(n: int, size: float) -> dict[str, list[float]]:
+    """Return a curve."""
+    x = np.linspace(0.0, 1.2, n)
+    return {"x": list(x), "y": list(size * np.sin(9.0 * x))}
+
+
+def made_by(command: str) -> dict[str, Any]:
+    """Return what made a result."""
+    return {"command": command, "settings": {"seed": 1, "plugins": [], "window": ""}}
+
+
+def loop_report(name: str = "arm") -> dict[str, Any]:
+    """Return report.json of a loop that has added one effect."""
+    before = {"p0": parameter(3.1e6, "Pa", False), "n": parameter(1.3, sure=False)}
+    after = {"p0": parameter(3.0e6, "Pa"), "n": parameter(1.4), f"{name}_x.level": parameter(40.0, "N m")}
+    step = {"effect": f"{name}_x", "port": "torque", "alternatives": ["other"], "empirical": False,
+            "error": {"train": errors(0.005), "holdout": errors(0.006)}, "parameters": after}  # fmt: skip
+    return {
+        "campaign": name, "plant": "shell_transfer_arm", "unit": "rad/s", "noise_rms": 0.004,
+        "verdict": "cannot_tell_apart", "effects": [f"{name}_x"],
+        "error": {"before": {"train": errors(0.02), "holdout": errors(0.03)}, "after": step["error"]},
+        "parameters": {"before": before, "after": after}, "steps": [step],
+        "advice": [{"manoeuvre": {"supply_V": 24.0}, "separates": [f"{name}_x", "other"], "power": 0.8}],
+    }  # fmt: skip
+
+
+def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> dict[str, Any]:
+    """Return details.json of the same loop."""
+    record = {"role": "train", "n_samples": n_points, "noise_rms": 0.004,
+              "error": {"before": errors(0.02), "after": errors(0.005)},
+              "curves": {"before": curve(n_points, 0.03), "after": curve(n_points, 0.004)}}  # fmt: skip
+    listed = [
+        {"effect": f"{name}_{i}", "drop": 0.9 / (i + 1), "p": 10.0 ** (i - 20), "share": 0.2,
+         "alignment": 0.9 - 0.1 * i, "reached": 0.8 if i < 2 else None,
+         "curve": curve(n_points, 3.0) if i < 2 else None}
+        for i in range(12)
+    ]  # fmt: skip
+    return {
+        "made_by": made_by(f"armid close-loop {name}"), "versions": {"armid": "0"}, "conclusion": f"It lacks {name}.",
+        "shifts": [f"{name} was bent"], "doubts": [],
+        "diagnosis": {"before": {"train": [f"More than noise in {name}."], "holdout": None}, "after": None},
+        "missing": [], "equations": {"before": f"{name}\n  torque = 0", "after": f"{name} + x\n  torque = x\n  end"},
+        "records": [{"file": f"{name}_{i}.csv", **record} for i in range(n_records)], "n_records": n_records + 1,
+        "candidates": {"listed": listed, "residual": curve(n_points, 4.0), "edges": [0, 150, 300], "files": [name]},
+        "advice": [f"lower {name}"],
+    }  # fmt: skip
+
+
+def write_loop(folder: Path, name: str = "arm", details: bool = True, figures: bool = True) -> Path:
+    """Write a folder of `armid close-loop`."""
+    folder.mkdir()
+    (folder / "report.json").write_text(json.dumps(loop_report(name)))
+    if details:
+        (folder / "details.json").write_text(json.dumps(loop_details(name)))
+    if figures:
+        for figure in ("ranking", "diagnosis"):
+            (folder / f"{figure}.svg").write_text(SVG)
+    return folder
+
+
+def study_report(name: str = "made_up") -> Report:
+    """Return a report of a study with a table of numbers and texts, some of them missing or infinite."""
+    frame = DataFrame({"who": [f"{name} {w}" for w in "bcad"], "error": [0.02, np.inf, np.nan, 3e-9],
+                       "cost": ["90 (1 %)", "inf (0 %)", "", "1200 (7 %)"]})  # fmt: skip
+    columns = Column("who", "identifier"), Column("error", "error [%]", ".3g", 100.0), Column("cost", "cost")
+    table = Table("overview", f"Errors of {name}", f"Words of {name}.", frame, columns)
+    return Report(name, f"Is {name} right?", "Complete: 4 of 4 runs.", (f"Made of {name}.",), table,
+                  (Section("Overview", f"Of {name}.", (table,)),), (f"Yes, {name}.",))  # fmt: skip
