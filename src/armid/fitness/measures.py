@@ -21,7 +21,11 @@ def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
 
 
 def rmse(measured: ArrayLike, simulated: ArrayLike) -> Array:
-    """Return the root of the mean of (x - x')^2 [signal's unit], (n_candidates,)."""
+    """Return the root of the mean of (x - x')^2 [signal's unit], (n_candidates,).
+
+    >>> rmse([3.0, 4.0], [[0.0, 0.0], [3.0, 3.0]]).round(6)
+    array([3.535534, 0.707107])
+    """
     return np.sqrt(mean_square(measured, simulated))
 
 

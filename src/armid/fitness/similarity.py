@@ -27,6 +27,11 @@ def similarity(
     Returns S, S1, S2, each (n_candidates,); all three are 0 for a candidate that holds a NaN or an infinity.
     Raises ArmidError for a measured series that is zero throughout or constant, and for thresholds out of range.
     Source: paper Eqs 10-14, section III.B; negative s_i are clipped to 0, points with x = 0 have no weight.
+
+    >>> measured = np.sin(np.linspace(0.0, 6.0, 601))
+    >>> S, S1, S2 = similarity(measured, np.array([measured, 0.9 * measured]), interval=0.01)
+    >>> S1.round(6)
+    array([1. , 0.9])
     """
     scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold)
     return scores[0], scores[1], scores[2]

@@ -9,7 +9,7 @@ from armid.identifiers.identifier import Identifier
 from armid.identifiers.least_squares import LeastSquaresOptions, least_squares_method
 from armid.identifiers.nlopt_local import GradientOptions, LocalOptions, nlopt_method
 from armid.identifiers.of_pymoo import differential, genetic, pymoo_swarm
-from armid.identifiers.options import checked_count, options_of
+from armid.identifiers.options import checked_count, checked_population, options_of
 from armid.identifiers.pso import PaperPSO
 from armid.identifiers.search import Method
 from armid.identifiers.searching import Searching
@@ -23,7 +23,7 @@ def swarm(budget: int, **options: Any) -> PaperPSO:
     Raises ArmidError unless the budget is above 0, and for an unknown option.
     """
     budget = checked_count("the budget", budget)
-    n_particles = checked_count("n_particles", options.pop("n_particles", min(80, budget)))
+    n_particles = checked_population("n_particles", options.pop("n_particles", min(80, budget)))
     return PaperPSO(**({"n_particles": n_particles, "n_iterations": -(-budget // n_particles)} | options))
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from armid.identifiers.options import checked, checked_count, checked_share
+from armid.identifiers.options import checked, checked_population, checked_share
 from armid.identifiers.search import Array, Ask, Method, Search, Task
 from armid.problem import PENALTY
 
@@ -24,7 +24,7 @@ class CmaesOptions:
 
     def __post_init__(self) -> None:
         checked_share("initial_step", self.initial_step)
-        checked_count("n_candidates", self.n_candidates)
+        checked_population("n_candidates", self.n_candidates)
         checked("growth", self.growth, 1.0, "a number of at least 1")
 
 

@@ -9,7 +9,11 @@ from typing import Any
 from pymoo.core.algorithm import Algorithm
 
 from armid.fitness import Fitness
+from armid.identifiers.options import OF_SETUP
 from armid.model.errors import ArmidError
+
+# What a run decides and no option may: the budget, the seed, and all that pymoo is told when an algorithm is set up.
+NOT_OPTIONS = (*OF_SETUP, "budget", "self")
 
 
 @dataclass(frozen=True)
@@ -33,10 +37,14 @@ class Identifier:
     def with_options(self, options: Mapping[str, Any]) -> "Identifier":
         """Return the identifier with options of its own, such as `velocity_limit` of the swarm.
 
-        Raises ArmidError when it takes none; an unknown name or a bad value is refused when it is built.
+        Raises ArmidError when it takes none, for a name that it cannot take, and for what is armid's or pymoo's to say
+        (budget, seed, termination ...); any other unknown name or a bad value is refused when it is built.
         """
         if options and not takes_options(self.build):
             raise ArmidError(f"identifier '{self.name}' takes no options, '{next(iter(options))}' was given")
+        for option in options:
+            if option.rpartition(".")[2] in NOT_OPTIONS or not accepts(partial(self.build, 1), **{option: 0}):
+                raise ArmidError(f"identifier '{self.name}' has no option '{option}' that could be set here")
         return replace(self, build=partial(self.build, **options)) if options else self
 
     def refuse(self, fitness: Fitness) -> None:
@@ -71,10 +79,10 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
 
 
-def accepts(function: Callable[..., Any], *arguments: object) -> bool:
+def accepts(function: Callable[..., Any], *arguments: object, **named: object) -> bool:
     """Say whether a function can be called with such arguments."""
     try:
-        inspect.signature(function).bind(*arguments)
+        inspect.signature(function).bind(*arguments, **named)
     except (TypeError, ValueError):
         return False
     return True

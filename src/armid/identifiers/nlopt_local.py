@@ -17,6 +17,8 @@ ALGORITHMS = {
     "lbfgs": "LD_LBFGS", "slsqp": "LD_SLSQP",
 }  # fmt: skip
 SEEDS = 2**31 - 1
+# A model of BOBYQA that reached beyond both bounds would be refused.
+LONGEST_STEP = 0.5
 Objective = Callable[[Array, Array], float]
 # Its words for "no further progress": steps below the rounding of the fitness, a line search without descent. Before
 # NLopt 2.8 the latter was Python's own RuntimeError.
@@ -27,15 +29,15 @@ NO_PROGRESS = (nlopt.RoundoffLimited, getattr(nlopt, "runtime_error", RuntimeErr
 class LocalOptions:
     """Hold the options of a search without derivatives.
 
-    initial_step: first step, as a share of each parameter's range; tolerance: it ends when a step changes no
-    parameter by more than this share of its range.
+    initial_step: first step, as a share of each parameter's range, at most 0.5; tolerance: it ends when a step changes
+    no parameter by more than this share of its range.
     """
 
     initial_step: float = 0.05
     tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        checked_share("initial_step", self.initial_step)
+        checked_share("initial_step", self.initial_step, LONGEST_STEP)
         checked("tolerance", self.tolerance)
 
 

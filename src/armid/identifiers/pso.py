@@ -8,7 +8,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
-from armid.identifiers.options import OF_PYMOO, OF_SETUP, checked, checked_count, refuse_unknown
+from armid.identifiers.options import OF_PYMOO, OF_SETUP, checked, checked_count, checked_population, refuse_unknown
 from armid.identifiers.population import SwarmEvaluator, as_population, box
 from armid.model.errors import ArmidError
 
@@ -49,9 +49,9 @@ class PaperPSO(Algorithm):  # type: ignore[misc]
         first_velocity: float = 0.2,
         **of_pymoo: Any,
     ) -> None:
-        refuse_unknown(of_pymoo, (*OWN, *OF_PYMOO), "the swarm")
+        refuse_unknown(of_pymoo, OWN, "the swarm", OF_PYMOO)
         super().__init__(**({"evaluator": SwarmEvaluator()} | of_pymoo))
-        self.n_particles = checked_count("n_particles", n_particles)
+        self.n_particles = checked_population("n_particles", n_particles)
         self.n_iterations = checked_count("n_iterations", n_iterations)
         self.c1, self.c2 = checked("c1", c1), checked("c2", c2)
         self.first_inertia = checked("first_inertia", first_inertia)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from armid.identifiers.options import checked_count
+from armid.identifiers.options import checked_population
 from armid.identifiers.search import Ask, Method, Search, Task
 
 
@@ -13,7 +13,7 @@ class UniformOptions:
     n_candidates: int = 80
 
     def __post_init__(self) -> None:
-        checked_count("n_candidates", self.n_candidates)
+        checked_population("n_candidates", self.n_candidates)
 
 
 def uniform_method(options: UniformOptions) -> Method:

@@ -10,6 +10,8 @@ from armid.model.errors import ArmidError
 Array = NDArray[np.float64]
 
 FIRST_CHUNK = 1024
+# What is asked for has to end within a lifetime.
+LARGEST_BUDGET = 10**15
 
 
 class Log(NamedTuple):
@@ -44,6 +46,8 @@ class Meter:
     def __init__(self, budget: int, target: float | None = None, resume_from: Log | None = None) -> None:
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 1:
             raise ArmidError(f"the budget is {budget!r}, expected a whole number of simulations above 0")
+        if budget > LARGEST_BUDGET:
+            raise ArmidError(f"the budget is {budget:.6g}, expected at most {LARGEST_BUDGET:,} simulations")
         if target is not None and np.isnan(target):
             raise ArmidError("the target is NaN, expected a fitness")
         self.budget = int(budget)

@@ -15,6 +15,9 @@ from armid.problem.residual import weighted
 from armid.problem.space import Space
 
 Array = NDArray[np.float64]
+# Values of signals in memory at a time (64 MB), and what the numbers of candidates at a time are multiples of, so that
+# the engine's lanes are full.
+MOST_VALUES, LANES = 2**23, 16
 
 
 class IdentificationProblem(Metered):
@@ -47,13 +50,23 @@ class IdentificationProblem(Metered):
 
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
         """Return fitness, +inf where one diverged, and where asked the weighted residuals, (n_candidates, n_total)."""
-        candidates = self.space.complete(X)
-        signals = [replay.signal(candidates) for replay in self.replays]
-        values = fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights)
         if not residuals:
-            return values, None
+            parts = [self._fitness(X[part])[0] for part in self._parts(len(X))]
+            return parts[0] if len(parts) == 1 else np.concatenate(parts), None
+        values, signals = self._fitness(X)
         weights = [self.fitness.weight_of(r.record.noise.rms) for r in self.replays]
         return values, weighted(signals, self.measured, weights)
+
+    def _fitness(self, X: Array) -> tuple[Array, list[Array]]:
+        """Return the fitness of candidates, (n_candidates,), and their signals in each record."""
+        candidates = self.space.complete(X)
+        signals = [replay.signal(candidates) for replay in self.replays]
+        return fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights), signals
+
+    def _parts(self, n_candidates: int) -> list[slice]:
+        """Return the parts of a population whose signals are in memory at a time; no result depends on them."""
+        size = LANES * max(MOST_VALUES // (LANES * sum(x.size for x in self.measured)), 1)
+        return [slice(first, first + size) for first in range(0, max(n_candidates, 1), size)]
 
     @cached_property
     def record_weights(self) -> Array:

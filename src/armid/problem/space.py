@@ -36,7 +36,13 @@ class Space:
         return tuple(n for n, f in zip(self.names, self.free, strict=True) if f)
 
     def complete(self, X: Array) -> Array:
-        """Return whole candidates: X, shape (n_candidates, n_free), with the fixed values put in."""
+        """Return whole candidates: X, shape (n_candidates, n_free), with the fixed values put in.
+
+        >>> low, high, fixed = np.zeros(2), np.ones(2), np.array([np.nan, 0.5])
+        >>> Space(("a", "b"), ("1", "1"), low, high, fixed).complete(np.array([[0.1], [0.2]]))
+        array([[0.1, 0.5],
+               [0.2, 0.5]])
+        """
         whole = np.empty((len(X), len(self.fixed)))
         whole[:] = self.fixed
         whole[:, self.free] = X
