@@ -91,7 +91,7 @@ def test_the_empirical_term_starts_from_the_curve_and_claims_no_name(axis, whole
     assert is_empirical(effect.name)
     assert shown_name(effect.name) == "unnamed:torque"
     extended = model + effect
-    own = {name: start[name] if name in start else p.fixed for name, p in extended.parameters.items() if name != "mass"}
+    own = {name: start.get(name, p.fixed) for name, p in extended.parameters.items() if name != "mass"}
     assert None not in own.values()
     candidate = np.array([[MASS, *(float(v) for v in own.values())]])
     after = replays([r.record for r in ready], extended, space_of(extended))

@@ -131,7 +131,7 @@ def test_what_minimize_would_swallow_is_refused() -> None:
 
 @pytest.mark.parametrize(("name", "options", "sentence"), [
     ("bobyqa", {"initial_stp": 0.1}, "'bobyqa' has no option 'initial_stp', did you mean 'initial_step'?"),
-    ("bobyqa", {"initial_step": 0.0}, "initial_step is 0.0, expected a number above 0 and at most 1"),
+    ("bobyqa", {"initial_step": 0.0}, "initial_step is 0.0, expected a number above 0 and at most 0.5"),
     ("nelder_mead", {"tolerance": -1}, "tolerance is -1, expected a number of at least 0"),
     ("lbfgs", {"differences": "centrl"}, "differences is 'centrl', did you mean 'central'?"),
     ("slsqp", {"step": 2}, "step is 2, expected a number above 0 and at most 1"),

@@ -15,7 +15,7 @@ from pymoo.optimize import minimize
 from armid.fitness import FITNESS, Fitness, similarity
 from armid.identifiers import PaperPSO
 from armid.model import ArmidError
-from armid.problem import PENALTY, IdentificationProblem, Meter, MeterTermination, replays, space_of
+from armid.problem import PENALTY, IdentificationProblem, Meter, MeterTermination, Replay, replays, space_of
 from armid.record import read_campaign
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
@@ -173,6 +173,22 @@ def test_a_candidate_does_not_see_its_neighbours(problem):
     together = problem.value(X)
     np.testing.assert_array_equal(together, [problem.value(x)[0] for x in X])
     np.testing.assert_array_equal(together[::-1], problem.value(X[::-1]))
+
+
+def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
+    X = np.random.default_rng(3).uniform(problem.xl, problem.xu, (37, 4))
+    whole = problem.value(X)
+    seen = []
+    signal = Replay.signal
+
+    def watched(replay, candidates):
+        seen.append(len(candidates))
+        return signal(replay, candidates)
+
+    monkeypatch.setattr("armid.problem.problem.MOST_VALUES", 1000)
+    monkeypatch.setattr(Replay, "signal", watched)
+    np.testing.assert_array_equal(problem.value(X), whole)
+    assert seen == [16, 16, 5]
 
 
 def test_without_a_free_parameter_or_a_record_it_is_refused(arm_space, lowering_replays):

@@ -1,0 +1,142 @@
+"""Campaigns, studies and stored results come from anywhere: none runs code, none reads or writes elsewhere."""
+
+import ast
+import pickle
+import sqlite3
+import zlib
+from contextlib import closing, suppress
+from pathlib import Path
+
+import pytest
+
+from armid.cli.main import main
+
+ROOT = Path(__file__).parents[1] / "src" / "armid"
+FILES = sorted(ROOT.rglob("*.py"))
+# Where code is made out of text, and whose text that is: the composed model's own, the user's --plugin.
+MAKES_CODE = {"simulation/compile.py", "registry.py", "simulation/loading.py"}
+TEXT_RUNS, FILE_RUNS = {"eval", "exec", "compile", "__import__"}, {"exec_module", "spec_from_file_location"}
+UNPICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve", "yaml"}
+EVIL = "from pathlib import Path\nPath('touched').touch()\nthing = 1\n"
+CAMPAIGN = """\
+name = "c"
+plant = "{plant}"
+effects = {effects}
+[[records]]
+file = "lower.csv"
+role = "train"
+start_angle_deg = -48.0
+target_angle_deg = 22.0
+shell = true
+supply_V = 28.0
+"""
+STUDY = """\
+name = "{name}"
+plant = "{plant}"
+budget = 40
+seeds = 1
+fitness = "{fitness}"
+effects = {effects}
+[[identifiers]]
+name = "{identifier}"
+options = {{ {option} }}
+[[cases]]
+name = "row"
+truth = {{ p0 = 3.20e6, k = 1.00, eta3 = 0.62, n = 1.00 }}
+manoeuvres = [{{ start_angle_deg = -48.0, target_angle_deg = 22.0, shell = true, supply_V = 28.0, duration_s = 0.3 }}]
+"""
+GOOD = {"name": "s", "plant": "shell_transfer_arm", "fitness": "rmse", "effects": "[]", "identifier": "random",
+        "option": ""}  # fmt: skip
+CODE = "evil.py:thing"
+
+
+@pytest.fixture(autouse=True)
+def evil(tmp_path, monkeypatch):
+    """A working folder with a file that must not be run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "evil.py").write_text(EVIL)
+    yield
+    assert not (tmp_path / "touched").exists()
+
+
+def refused(*words):
+    with pytest.raises(SystemExit) as left:
+        main([str(word) for word in words])
+    assert left.value.code == 2
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_nothing_unpickles_and_nothing_runs_text(path):
+    tree = ast.parse(path.read_text())
+    modules = {a.name.split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
+    modules |= {str(n.module).split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+    assert not modules & UNPICKLES
+    calls = [ast.unparse(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)]
+    made = {c for c in calls if c in TEXT_RUNS or c.rpartition(".")[2] in FILE_RUNS}
+    assert not made or path.relative_to(ROOT).as_posix() in MAKES_CODE, made
+    assert not {"np.load", "joblib.load", "pd.read_pickle"} & set(calls)
+
+
+@pytest.mark.parametrize(("key", "value"), [("plant", CODE), ("effects", f'["{CODE}"]'), ("effects", '["evil"]')])
+def test_a_campaign_names_registered_things_only(tmp_path, key, value):
+    folder = tmp_path / "c"
+    folder.mkdir()
+    told = {"plant": "shell_transfer_arm", "effects": "[]"} | {key: value}
+    (folder / "campaign.toml").write_text(CAMPAIGN.format(**told))
+    (folder / "lower.csv").write_text("time_s,angular_velocity_deg_s\n0,1\n")
+    refused("identify", folder)
+
+
+@pytest.mark.parametrize(("key", "value"), [
+    ("plant", CODE), ("effects", f'["{CODE}"]'), ("fitness", CODE), ("identifier", CODE),
+    ("identifier", f"multistart:{CODE}"), ("identifier", f"random+{CODE}"), ("name", "../s"), ("name", "/tmp/s"),
+    ("option", 'plugin = "evil.py:thing"'), ("option", "termination = 3"), ("option", "evaluator = 1"),
+])  # fmt: skip
+def test_a_study_names_registered_things_only(tmp_path, key, value):
+    (tmp_path / "s.toml").write_text(STUDY.format(**(GOOD | {key: value})))
+    refused("study", "s.toml")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["evil.py", "s.toml"]
+
+
+@pytest.mark.parametrize("name", [
+    "/etc/passwd", "../lower.csv", "sub/../../lower.csv", "..\\lower.csv", "C:\\lower.csv", "lower.csv\\u0000",
+    "linked.csv", "linked/lower.csv",
+])  # fmt: skip
+def test_a_record_stays_in_its_folder(tmp_path, name):
+    folder, outside = tmp_path / "c", tmp_path / "outside"
+    folder.mkdir()
+    outside.mkdir()
+    (outside / "lower.csv").write_text("time_s,angular_velocity_deg_s\n0,1\n")
+    (tmp_path / "lower.csv").write_text("time_s,angular_velocity_deg_s\n0,1\n")
+    (folder / "linked.csv").symlink_to(outside / "lower.csv")
+    (folder / "linked").symlink_to(outside)
+    escaped = name.replace("\\", "\\\\").replace("\\\\u0000", "\\u0000")
+    told = CAMPAIGN.format(plant="shell_transfer_arm", effects="[]").replace("lower.csv", escaped)
+    (folder / "campaign.toml").write_text(told)
+    with pytest.raises(SystemExit) as left:
+        main(["simulate", str(folder), "--out", "out"])
+    assert left.value.code == 2
+    assert not (tmp_path / "out").exists()
+
+
+class Touch:
+    """Touch a file where it is unpickled."""
+
+    def __reduce__(self):
+        return (Path.touch, (Path("touched"),))
+
+
+@pytest.mark.parametrize("place", ["traces.trace", "runs.error", "study.value"])
+def test_a_store_with_a_pickle_in_it_runs_nothing(tmp_path, place, capsys):
+    (tmp_path / "s.toml").write_text(STUDY.format(**GOOD))
+    with pytest.raises(SystemExit) as left:
+        main(["study", "s.toml", "--jobs", "1", "--out", "out"])
+    assert left.value.code == 0, capsys.readouterr()
+    table, column = place.split(".")
+    with closing(sqlite3.connect(tmp_path / "out" / "study.sqlite")) as connection:
+        connection.execute(f"UPDATE {table} SET {column} = ?", (pickle.dumps(Touch()),))
+        connection.commit()
+    capsys.readouterr()
+    # such a store was never written by armid: it may be refused anyhow, as long as nothing of it is run
+    with suppress(zlib.error, ValueError, SystemExit):
+        main(["report", "out"])
