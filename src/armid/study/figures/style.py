@@ -10,6 +10,7 @@ DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)))
 MARKERS = "osD^vPX"
 INK, PALE = "#222222", "0.75"
 DPI = 130
+MANY_MARKS = 1_000
 # Ids of an SVG come out of a hash; letters are drawn, so that no font is needed to read it.
 SETTINGS: Any = {"svg.hashsalt": "armid", "svg.fonttype": "path"}
 
@@ -46,7 +47,17 @@ def save(figure: Any, png: Path, svg: Path) -> None:
     # The layout takes longer than the drawing, and need not be found twice for each file.
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
+    for axis in figure.axes:
+        flatten_marks(axis)
     with mpl.rc_context(SETTINGS):
         figure.savefig(png, dpi=DPI, metadata={"Software": None})
-        figure.savefig(svg, metadata={"Date": None, "Creator": None})
+        figure.savefig(svg, dpi=DPI, metadata={"Date": None, "Creator": None})
     pyplot().close(figure)
+
+
+def flatten_marks(axis: Any) -> None:
+    """Turn the marks of an axis into one picture inside the SVG where there are many: each would be an element."""
+    marks = [line for line in axis.lines if line.get_linestyle() == "None"]
+    if sum(len(line.get_xdata()) for line in marks) > MANY_MARKS:
+        for line in marks:
+            line.set_rasterized(True)
