@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.discrepancy.fit import Fit, span
-from armid.discrepancy.library import Library, idle
+from armid.discrepancy.library import Library
 from armid.discrepancy.names import base
 from armid.discrepancy.select import criterion
+from armid.discrepancy.trace import at_null
 
 Array = NDArray[np.float64]
 # Rivals whose refits differ by less than this in the criterion and whose traces correlate above that are one group.
@@ -67,15 +68,20 @@ def group_of(fit: Fit, key: str, others: Sequence[Fit], library: Library) -> Gro
 
 def trace_of(fit: Fit, key: str) -> Array:
     """Return the change of the whitened signal by an effect, projected off the other free parameters, of length 1."""
-    model, space = fit.records.replays[0].model, fit.records.space
-    without = fit.candidate
-    for i, name in enumerate(space.names):
-        if name.partition(".")[0] == base(key) and model.parameters[name].null is not None:
-            without[i] = idle(model.parameters[name])
-    signals = fit.records.whole_signals(np.array([fit.candidate, without]))
-    own = [name.partition(".")[0] == base(key) for name in fit.values]
-    basis = span(fit.jacobian[:, ~np.array(own, dtype=np.bool_)]) if own else np.empty((signals.shape[1], 0))
-    change = signals[0] - signals[1]
+    change = change_by(fit, key)
+    basis = span(fit.jacobian[:, ~owned_by(fit, key)])
     free = change - basis @ (basis.T @ change)
     length = float(np.linalg.norm(free))
     return np.asarray(free / length) if length > 0.0 else np.asarray(free)
+
+
+def change_by(fit: Fit, key: str) -> Array:
+    """Return the change of the whitened signal by an effect of a fit, (n_samples,)."""
+    without = at_null(fit.records, fit.candidate, key)
+    signals = fit.records.whole_signals(np.array([fit.candidate, without]))
+    return np.asarray(signals[0] - signals[1])
+
+
+def owned_by(fit: Fit, key: str) -> NDArray[np.bool_]:
+    """Return which free parameters of a fit belong to an effect, (n_free,)."""
+    return np.array([name.partition(".")[0] == base(key) for name in fit.values], dtype=np.bool_)

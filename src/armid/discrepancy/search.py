@@ -1,23 +1,21 @@
 """Look for the effects that the records ask for: one more at a time, a few models of each size kept."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armid.discrepancy.alike import alike
 from armid.discrepancy.diagnose import diagnose
-from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from, fit_globally
-from armid.discrepancy.library import Library, idle
+from armid.discrepancy.library import Library
 from armid.discrepancy.names import LOOSE, base
-from armid.discrepancy.ranking import SURE, WITHIN, leading, promising, ranked
+from armid.discrepancy.ranking import SURE, different, leading, promising, ranked, within_reach
 from armid.discrepancy.select import Verdict, compare
-from armid.discrepancy.trace import Score, accurate, refitted, traced
+from armid.discrepancy.trace import Score, accurate, refitted, start_of, traced
 from armid.discrepancy.view import train_view
 from armid.model import ArmidError
 
-Array = NDArray[np.float64]
 MOST_EFFECTS = 6
 # Of one size so many models are extended: a strong second effect can mislead the choice of the first.
 BEAM = 3
@@ -78,7 +76,7 @@ class Search:
         self.extend(last.best)
         if last.best.is_noise and not (self.of_size(size) and promising(last.best, self.of_size(size)[0])):
             return None
-        for parent in last.fits[1:BEAM]:
+        for parent in different(last.fits)[1:BEAM]:
             self.extend(parent)
         if not self.of_size(size):
             return None
@@ -87,6 +85,8 @@ class Search:
         for _ in range(N_EXCHANGES):
             best = self.of_size(size)[0]
             self.exchange(best)
+            if self.of_size(size)[0] is best:
+                self.exchange_alike(best)
             for fit in self.of_size(size)[:N_LOOSENED]:
                 if fit.chi2 <= LOOSENED_WITHIN * best.chi2:
                     self.loosen(fit)
@@ -112,24 +112,30 @@ class Search:
             rest = tuple(n for n in best.active if n != name)
             self.extend(self.reduced(best, rest))
 
+    def exchange_alike(self, best: Fit) -> None:
+        """Fit the models in which a candidate that moves the records alike stands in the place of an effect."""
+        for rival in alike(best, self.library):
+            active, values = (*(n for n in best.active if n != rival.place), rival.name), rival.values
+            if frozenset(active) not in self.fits:
+                self.library.told(f"fitting {self.shown(active)}")
+                records = self.library.problem(active, values)
+                try:
+                    fit = fit_from(records, active, [start_of(records, values)])
+                except ArmidError:
+                    continue
+                self.fits[frozenset(active)] = accurate(fit, self.library)
+
     def reduced(self, fit: Fit, rest: tuple[str, ...]) -> Fit:
         """Return the fit with some effects only, from the values that they had."""
         key = frozenset(rest)
         if key not in self.fits:
             records = self.library.problem(rest, fit.values)
-            start = self.start_of(records, fit.values)
+            start = start_of(records, fit.values)
             if not np.isfinite(records.chi2(start)[0]):
                 # What was held in check by the effect that is gone may run away: begin with all that is left at rest.
-                start = self.start_of(records, self.fits[frozenset()].values)
+                start = start_of(records, self.fits[frozenset()].values)
             self.fits[key] = accurate(fit_from(records, rest, [start]), self.library)
         return self.fits[key]
-
-    @staticmethod
-    def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
-        """Return shares of the range of some values, parameters that have none where they rest."""
-        declared = records.replays[0].model.parameters
-        x = np.array([values.get(n, idle(declared[n])) for n in records.space.free_names])
-        return np.clip(records.shares(x), 0.0, 1.0)
 
     def loosen(self, fit: Fit) -> None:
         """Set the fixed shapes of each effect free, such as the speed over which the sign of friction is smoothed.
@@ -152,17 +158,12 @@ class Search:
         """Fit a model with each of the leading candidates added."""
         for place, found in enumerate(leading(parent, self.trace(parent))):
             key = frozenset((*parent.active, found.name))
-            if key not in self.fits and (place < SURE or self.within_reach(parent, found)):
+            if key not in self.fits and (place < SURE or within_reach(parent, found, self.fits)):
                 self.library.told(f"fitting {self.shown((*parent.active, found.name))}")
                 try:
                     self.fits[key] = refitted(parent, found, self.library)
                 except ArmidError:
                     continue
-
-    def within_reach(self, parent: Fit, found: Score) -> bool:
-        """Tell whether a candidate may do as well as the best model of its size, its score a guess within a factor."""
-        known = [f.chi2 for key, f in self.fits.items() if len(key) == len(parent.active) + 1]
-        return parent.chi2 - WITHIN * found.drop <= min(known, default=np.inf)
 
     def trace(self, fit: Fit) -> list[Score]:
         """Return the scores of the candidates at a fit, best first."""

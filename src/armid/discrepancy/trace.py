@@ -1,6 +1,6 @@
 """Score candidate effects at a fit: how far each would bring the residual down, were the records linear in it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.stats import chi2 as chi2_distribution
 from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from
 from armid.discrepancy.library import Library, idle
+from armid.discrepancy.names import base
 from armid.discrepancy.rays import Ray, rays
 
 Array = NDArray[np.float64]
@@ -60,10 +61,13 @@ def score(current: Fit, name: str, library: Library) -> Score | None:
     return Score(name, float(drops[best]), float(amplitudes[best]), p, tuple(starts), n_shapes, bends)
 
 
-def responses(current: Fit, records: WhiteRecords, found: Sequence[Ray]) -> Array:
-    """Return the change of the whitened signal per full strength along each ray, (n_rays, n_samples)."""
-    base = whole_candidate(records, current)
-    population = np.tile(base, (len(found) + 1, 1))
+def responses(current: Fit, records: WhiteRecords, found: Sequence[Ray], without: str = "") -> Array:
+    """Return the change of the whitened signal per full strength along each ray, (n_rays, n_samples).
+
+    without: an effect of the fit that is put to its null before.
+    """
+    rest = at_null(records, whole_candidate(records, current), without)
+    population = np.tile(rest, (len(found) + 1, 1))
     for row, ray in zip(population[1:], found, strict=True):
         for n, value in ray.at(ray.level).items():
             row[records.space.index(n)] = value
@@ -120,6 +124,22 @@ def whole_candidate(records: WhiteRecords, current: Fit) -> Array:
     declared, values = records.replays[0].model.parameters, current.values
     free = [values.get(n, idle(declared[n])) for n in records.space.free_names]
     return np.asarray(records.space.complete(np.array([free]))[0])
+
+
+def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
+    """Return shares of the range of some values, parameters that have none where they rest, (n_free,)."""
+    declared = records.replays[0].model.parameters
+    x = np.array([values.get(n, idle(declared[n])) for n in records.space.free_names])
+    return np.clip(records.shares(x), 0.0, 1.0)
+
+
+def at_null(records: WhiteRecords, candidate: Array, key: str) -> Array:
+    """Return a whole candidate with one effect at its null, shapes as they are."""
+    model, changed = records.replays[0].model, candidate.copy()
+    for i, name in enumerate(records.space.names):
+        if name.partition(".")[0] == base(key) and model.parameters[name].null is not None:
+            changed[i] = idle(model.parameters[name])
+    return changed
 
 
 def starts_at(records: WhiteRecords, current: Fit, ray: Ray, answer: Array, amplitude: float) -> list[Array]:
