@@ -29,7 +29,10 @@ def doubtful(found: ClosedLoop) -> str:
     said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
     said += [f"{s.effect} fits hardly better than {' or '.join(r.name for r in s.group.unlike)}"
              for s in found.steps if s.group.unlike]  # fmt: skip
-    return f"With {' + '.join(found.effects)} what remains is noise, but on these records {'; '.join(said)}."
+    names = " + ".join(found.effects)
+    said += [f"{names} fits hardly better than {' + '.join(r.names)}" for r in found.rivals]
+    remains = "a significant discrepancy remains, and" if found.after.significant else "what remains is noise, but"
+    return f"With {names} {remains} on these records {'; '.join(said)}."
 
 
 def partly_empirical(found: ClosedLoop) -> str:

@@ -66,6 +66,27 @@ def group_of(fit: Fit, key: str, others: Sequence[Fit], library: Library) -> Gro
     return Group(library.public(key), alike, tuple(r for r in rivals if r not in alike))
 
 
+@dataclass(frozen=True, eq=False)
+class RivalModel:
+    """Hold another model of as many effects, two or more of them others, that fits nearly as well."""
+
+    names: tuple[str, ...]
+    gap: float
+    fit: Fit
+
+
+def rival_models(fit: Fit, others: Sequence[Fit], library: Library) -> tuple[RivalModel, ...]:
+    """Return the models within the criterion that differ in more effects than one, the nearest first."""
+    mine = {library.public(n) for n in fit.active}
+    found: dict[frozenset[str], RivalModel] = {}
+    for other in others:
+        names = tuple(library.public(n) for n in other.active)
+        gap = criterion(other, fit.independent) - criterion(fit, fit.independent)
+        if len(names) == len(mine) and len(set(names) - mine) > 1 and gap < WITHIN:
+            found.setdefault(frozenset(names), RivalModel(names, float(gap), other))
+    return tuple(sorted(found.values(), key=lambda r: r.gap)[:MOST])
+
+
 def trace_of(fit: Fit, key: str) -> Array:
     """Return the change of the whitened signal by an effect, projected off the other free parameters, of length 1."""
     change = change_by(fit, key)

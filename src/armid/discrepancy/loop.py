@@ -11,7 +11,7 @@ from armid.discrepancy.estimates import estimates, public_model, unseen
 from armid.discrepancy.evidence import evidence_of
 from armid.discrepancy.fit import Fit
 from armid.discrepancy.foresee import Rival
-from armid.discrepancy.group import Group, Likeness, group_of
+from armid.discrepancy.group import Group, Likeness, RivalModel, group_of, rival_models
 from armid.discrepancy.library import Library, library_of
 from armid.discrepancy.names import SHOWN_AS, base, is_empirical, shown_name
 from armid.discrepancy.result import (
@@ -32,7 +32,7 @@ from armid.identification import campaign_errors
 from armid.model import EFFECTS, Effect, Model
 from armid.record import Campaign, Record
 
-MOST_ADVICE = 5
+MOST_ADVICE, MOST_RIVALS = 5, 4
 
 
 def close_loop(
@@ -65,6 +65,7 @@ def close_loop(
     # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
     answered = refused is not None and not diagnose(train_view(levels[-1].best)).significant
     missing, term = (None, None) if answered else empirical_term(declared, named, search)
+    rivals = rival_models(named, search.of_size(len(named.active)), library) if term is None else ()
     if term is not None:
         chosen, search, library, refused = term.fit, term.search, term.search.library, None
         kept = [g for g, key in zip(groups, named.active, strict=True) if key in chosen.active]
@@ -75,12 +76,12 @@ def close_loop(
     bends = unseen(declared, search.trace(declared), library)
     judged = [judge(fit, library, campaign.holdout, bends) for fit in path]
     steps = tuple(step_of(key, judged[i + 1], groups[i], library) for i, key in enumerate(chosen.active))
-    verdict = verdict_of(judged[0], judged[-1], steps, refused)
-    rivals = rivals_of(groups, refused)
-    return ClosedLoop(
-        campaign, float(np.mean([level.rms for level in evidence.levels])), verdict, judged[0], judged[-1], steps,
-        refused, advice_for(rivals, search, levels[-1].best, campaign.gyro_range, told), library, search, missing, term,
-    )  # fmt: skip
+    verdict = verdict_of(judged[0], judged[-1], steps, refused, rivals)
+    noise = float(np.mean([level.rms for level in evidence.levels]))
+    contest = contest_of(rivals_of(groups, refused), search, levels[-1].best) or whole_contest(named, rivals)
+    advice = advice_for(contest, levels[-1].best, campaign.gyro_range, told)
+    return ClosedLoop(campaign, noise, verdict, judged[0], judged[-1], steps, refused, rivals, advice, library, search,
+                      missing, term)  # fmt: skip
 
 
 def settled(levels: Sequence[Level], search: Search) -> tuple[Fit, list[Group], Group | None]:
@@ -130,9 +131,11 @@ def group_of_term(term: Term) -> Group:
     return Group(shown_name(key_of(term.dependence.port)), tuple(Likeness(n, 0.0, 1.0) for n in names), ())
 
 
-def verdict_of(before: Judgement, after: Judgement, steps: Sequence[Step], refused: Group | None) -> str:
-    """Return the verdict in one word; a term without a name never explains."""
-    if refused is not None:
+def verdict_of(
+    before: Judgement, after: Judgement, steps: Sequence[Step], refused: Group | None, rivals: Sequence[RivalModel]
+) -> str:
+    """Return the verdict in one word; a term without a name never explains, and a name in doubt is told first."""
+    if refused is not None or rivals:
         return TOO_ALIKE
     if not steps:
         return UNEXPLAINED if before.diagnosis.significant else NO_DISCREPANCY
@@ -148,20 +151,32 @@ def rivals_of(groups: Sequence[Group], refused: Group | None) -> list[tuple[str,
     return [names for names in found if not names[0].startswith(SHOWN_AS)]
 
 
+def contest_of(groups: Sequence[tuple[str, ...]], search: Search, best: Fit) -> list[Rival]:
+    """Return the models that differ in the effect of the first group, none where nothing is in doubt."""
+    fits = [(name, search.model_with(name, best)) for name in (groups[0] if groups else ())[:MOST_RIVALS]]
+    return [rival(name, fit, best) for name, fit in fits if fit is not None]
+
+
+def whole_contest(named: Fit, rivals: Sequence[RivalModel]) -> list[Rival]:
+    """Return a model and its rivals that differ in more effects than one, none where there is no such rival."""
+    if not rivals:
+        return []
+    mine = rival(" + ".join(map(base, named.active)), named, named)
+    return [mine, *(rival(" + ".join(r.names), r.fit, named) for r in rivals[: MOST_RIVALS - 1])]
+
+
+def rival(name: str, fit: Fit, best: Fit) -> Rival:
+    """Return a model as the advice takes it."""
+    return Rival(name, fit.records, fit.z, criterion(fit, best.independent))
+
+
 def advice_for(
-    groups: Sequence[tuple[str, ...]], search: Search, best: Fit, speed_limit: float | None, told: Callable[[str], None]
+    rivals: Sequence[Rival], best: Fit, speed_limit: float | None, told: Callable[[str], None]
 ) -> tuple[Advice, ...]:
-    """Return the manoeuvres that would tell the first group apart, best first; none where nothing is in doubt."""
-    if not groups:
-        return ()
-    told(f"looking for a manoeuvre that tells {' and '.join(groups[0][:4])} apart")
-    rivals = []
-    for name in groups[0][:4]:
-        fit = search.model_with(name, best)
-        if fit is not None:
-            rivals.append(Rival(name, fit.records, fit.z, criterion(fit, best.independent)))
+    """Return the manoeuvres that would tell rivals apart, best first; none where nothing is in doubt."""
     if len(rivals) < 2:
         return ()
+    told(f"looking for a manoeuvre that tells {' and '.join(r.name for r in rivals)} apart")
     level = best.records.evidence.levels[0]
     found = advise(rivals, lambda signals: level.white(signals, [signals.shape[-1]]), speed_limit=speed_limit)
     return found[:MOST_ADVICE]

@@ -10,7 +10,7 @@ from armid.discrepancy.advise import Advice
 from armid.discrepancy.diagnose import Diagnosis
 from armid.discrepancy.estimates import Estimate
 from armid.discrepancy.fit import Fit
-from armid.discrepancy.group import Group
+from armid.discrepancy.group import Group, RivalModel
 from armid.discrepancy.library import Library
 from armid.discrepancy.missing import Missing
 from armid.discrepancy.search import Search
@@ -70,8 +70,9 @@ class ClosedLoop:
 
     verdict: "no_discrepancy", "explained", "partly_explained", "unexplained" or "cannot_tell_apart". before, after: the
     declared model, and the model with the effects that earned their place. refused: a group too big to be a finding,
-    None where there is none. library, search: everything that was tried. missing: the signal that the named effects
-    leave unexplained, None where they leave nothing; term: the empirical term for it, None where none earned its place.
+    None where there is none. rivals: other models that fit nearly as well and differ in more effects than one. library,
+    search: everything that was tried. missing: the signal that the named effects leave unexplained, None where they
+    leave nothing; term: the empirical term for it, None where none earned its place.
     """
 
     campaign: Campaign
@@ -81,6 +82,7 @@ class ClosedLoop:
     after: Judgement
     steps: tuple[Step, ...]
     refused: Group | None
+    rivals: tuple[RivalModel, ...]
     advice: tuple[Advice, ...]
     library: Library
     search: Search

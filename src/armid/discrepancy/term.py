@@ -57,7 +57,10 @@ def empirical_term(declared: Fit, named: Fit, search: Search) -> tuple[Missing |
         library.told("recovering the missing signal without a form")
         missing = missing_from(lacking, library)
         found += terms(missing, replace(search, library=library))
-    for term in preferred(found, named.independent):
+    # A curve must do better than the names that it would replace.
+    limit = criterion(named, named.independent)
+    better = [t for t in found if criterion(t.fit, named.independent) < limit]
+    for term in preferred(better, named.independent):
         if earned(declared if len(term.fit.active) == 1 else term.missing.lacking, term.fit):
             return term.missing, term
     return missing, None
@@ -66,6 +69,8 @@ def empirical_term(declared: Fit, named: Fit, search: Search) -> tuple[Missing |
 def preferred(found: Sequence[Term], n_eff: float) -> list[Term]:
     """Return terms by the criterion, best first; of those that do about as well as the best the fewest names first."""
     ranked = sorted(found, key=lambda t: criterion(t.fit, n_eff))
+    if not ranked:
+        return []
     near = [t for t in ranked if criterion(t.fit, n_eff) < criterion(ranked[0].fit, n_eff) + WITHIN]
     return sorted(near, key=lambda t: (len(t.fit.active), t.fit.chi2)) + ranked[len(near) :]
 
