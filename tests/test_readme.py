@@ -93,16 +93,6 @@ def test_the_commands_run(commands, blocks, elsewhere, capsys):
         assert captured.out
 
 
-def test_the_user_s_own_things_keep_the_contract(blocks, elsewhere, capsys):
-    text = blocks_of(blocks, "python")[0]
-    assert text.startswith("# mine.py\n")
-    (elsewhere / "mine.py").write_text(text)
-    for name in ("cubic_drag", "largest_miss", "evolution"):
-        with pytest.raises(SystemExit) as left:
-            main(["check", f"mine.py:{name}"])
-        assert left.value.code == 0, capsys.readouterr().out
-
-
 def test_the_python_examples_run(blocks, elsewhere):
     for text in blocks_of(blocks, "python"):
         ran = subprocess.run([sys.executable, "-W", "error", "-c", text], check=False, capture_output=True, text=True)
