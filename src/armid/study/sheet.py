@@ -14,6 +14,8 @@ REPORTS = ("", "table1", "table2", "benchmark", "fitness")
 WHOLE = "whole"
 # Neither key nor number of a study may be larger: what it asks for has to fit into memory and a lifetime.
 LARGEST_COUNT = 10**9
+# Seeds and cases are held in memory, one by one.
+MOST_HELD = 10**6
 
 
 def plain_name(value: object) -> str:
@@ -53,7 +55,14 @@ def seeds(value: object) -> tuple[int, ...]:
     """Return seeds: n stands for 1 to n."""
     if isinstance(value, list):
         return tuple(list_of(whole_number, 1)(value))
-    return tuple(range(1, count(value) + 1))
+    return tuple(range(1, some(value) + 1))
+
+
+def some(value: object) -> int:
+    """Return a number of things that are all held in memory."""
+    if count(value) <= MOST_HELD:
+        return count(value)
+    raise KindError(value)
 
 
 def one_or_more(value: object) -> tuple[str, ...]:
@@ -137,7 +146,7 @@ class CaseSheet:
 class RandomSheet:
     """Declare [random_cases]: truths spread over the box."""
 
-    n: int = field(metadata=key(count, "a whole number above 0"))
+    n: int = field(metadata=key(some, "a whole number above 0, up to 1,000,000"))
     seed: int = field(metadata=key(whole_number, "a whole number of at least 0"))
     manoeuvres: tuple[dict[str, Any], ...] = field(metadata=TABLES)
     margin: float = field(default=0.0, metadata=key(at_least_zero, "a share of the range from 0 to below 0.5"))
@@ -152,7 +161,7 @@ class EntrySheet:
     budget: int | None = field(default=None, metadata=key(count, "a whole number above 0"))
     fitness: tuple[str, ...] | None = field(default=None, metadata=NAMES)
     noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=LEVELS)
-    seeds: tuple[int, ...] | None = field(default=None, metadata=key(seeds, "a number of seeds or a list of them"))
+    seeds: tuple[int, ...] | None = field(default=None, metadata=key(seeds, "at most 1,000,000 seeds or a list"))
     options: Mapping[str, Any] = field(default_factory=dict, metadata=key(options, "a number, a text, true or false"))
 
 
@@ -166,7 +175,7 @@ class StudySheet:
         metadata=key(list_of(any_table, 1), "at least one table headed [[identifiers]]")
     )
     budget: int = field(metadata=key(count, "a whole number of simulations above 0"))
-    seeds: tuple[int, ...] = field(metadata=key(seeds, "a number of seeds or a list of them"))
+    seeds: tuple[int, ...] = field(metadata=key(seeds, "at most 1,000,000 seeds or a list"))
     question: str = field(default="", metadata=key(any_text, "a text"))
     kind: str = field(default="identify", metadata=key(text, "the kind of a study"))
     report: str = field(default="", metadata=key(any_text, f"one of {', '.join(map(repr, REPORTS))}"))
