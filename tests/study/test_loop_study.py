@@ -90,7 +90,8 @@ def test_refuses_with_one_sentence(more, sentence, write, capsys):
 def test_the_suites_say_how_they_are_made(name, tmp_path):
     text = (ROOT / "studies" / f"{name}.toml").read_text(encoding="utf-8")
     (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(ArmidError, match=rf"`python studies/test_stand.py blind studies/campaigns/{name} --seed [0-9]+"):
+    told = rf"`python studies/test_stand.py blind studies/campaigns/{name} --seed [0-9]+"
+    with pytest.raises(ArmidError, match=told):
         read_study(tmp_path / f"{name}.toml")
     fake_campaigns(tmp_path / "campaigns" / name, "c000")
     assert read_study(tmp_path / f"{name}.toml").case_names == ["c000"]
