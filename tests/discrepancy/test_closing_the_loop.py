@@ -116,3 +116,13 @@ def test_unknown_parameter_is_refused(closed):
     campaign = closed().campaign
     with pytest.raises(ArmidError, match=r"did you mean 'coulomb\.level'"):
         close_loop(Model(campaign.plant), campaign, CANDIDATES, bounds={"coulomb.levl": (0.0, 1.0)})
+
+
+def test_what_says_the_same_in_other_words_is_one_group(stand):
+    """A stronger drive, a higher supply and less inertia: one motion, other parameters that make up for the rest."""
+    campaign = read_campaign(stand(*COMMON, "--effect", "drive_gain=0.08"))
+    names = ("drive_gain", "supply_error", "added_inertia")
+    found = close_loop(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in names})
+    assert found.verdict == "cannot_tell_apart"
+    assert "drive_gain" in (found.steps[0].effect, *found.steps[0].alternatives)
+    assert len(found.steps[0].alternatives) > 0

@@ -51,7 +51,7 @@ class Group:
 def group_of(fit: Fit, key: str, others: Sequence[Fit], library: Library) -> Group:
     """Return the rivals of one effect of a model: models that differ in that effect alone, within the criterion."""
     kept = {base(n) for n in fit.active if n != key}
-    mine = trace_of(fit, key)
+    mine, own = trace_of(fit, key), sensitivity_of(fit, key)
     best: dict[str, Likeness] = {}
     for other in others:
         new = [n for n in other.active if base(n) not in kept]
@@ -60,7 +60,8 @@ def group_of(fit: Fit, key: str, others: Sequence[Fit], library: Library) -> Gro
         gap = criterion(other, fit.independent) - criterion(fit, fit.independent)
         name = library.public(new[0])
         if gap < WITHIN and (name not in best or gap < best[name].gap):
-            best[name] = Likeness(name, float(gap), float(abs(mine @ trace_of(other, new[0]))))
+            likeness = max(abs(mine @ trace_of(other, new[0])), abs(own @ sensitivity_of(other, new[0])))
+            best[name] = Likeness(name, float(gap), float(likeness))
     rivals = sorted(best.values(), key=lambda r: r.gap)
     alike = tuple(r for r in rivals if r.correlation > ALIKE)
     return Group(library.public(key), alike, tuple(r for r in rivals if r not in alike))
@@ -92,6 +93,26 @@ def trace_of(fit: Fit, key: str) -> Array:
     change = change_by(fit, key)
     basis = span(fit.jacobian[:, ~owned_by(fit, key)])
     free = change - basis @ (basis.T @ change)
+    length = float(np.linalg.norm(free))
+    return np.asarray(free / length) if length > 0.0 else np.asarray(free)
+
+
+def sensitivity_of(fit: Fit, key: str) -> Array:
+    """Return the derivative by an effect's strength at the fit, projected off the other free parameters, of length 1.
+
+    Of several strengths the direction in which they are away from their nulls. Two models that say the same in other
+    words (a torque and an inertia in one proportion) have one sensitivity, while the changes from null to value differ
+    by what other parameters have to make up for.
+    """
+    space, declared = fit.records.space, fit.records.replays[0].model.parameters
+    away = np.zeros(fit.n_free)
+    for i, name in enumerate(fit.values):
+        null, place = declared[name].null, space.index(name)
+        if name.partition(".")[0] == base(key) and null is not None:
+            away[i] = fit.z[i] - (null - space.low[place]) / (space.high[place] - space.low[place])
+    basis = span(fit.jacobian[:, ~owned_by(fit, key)])
+    moved = fit.jacobian @ away
+    free = moved - basis @ (basis.T @ moved)
     length = float(np.linalg.norm(free))
     return np.asarray(free / length) if length > 0.0 else np.asarray(free)
 
