@@ -22,9 +22,9 @@ def answers_figure(counts: Mapping[str, DataFrame]) -> Any:
     rows = max(len(c) for c in counts.values())
     columns = max(c.shape[1] for c in counts.values())
     size = (2.6 + WIDE * columns * len(counts), 2.4 + CELL * rows)
-    figure, axes = plt.subplots(1, len(counts), figsize=size, squeeze=False, layout="constrained", sharey=True)
+    figure, axes = plt.subplots(1, len(counts), figsize=size, squeeze=False, layout="constrained")
     for axis, (title, numbers) in zip(axes.ravel(), counts.items(), strict=True):
-        draw(axis, numbers, title)
+        draw(axis, numbers, title, names=axis is axes[0, 0])
     axes[0, 0].set_ylabel("true effect")
     return figure
 
@@ -43,14 +43,17 @@ def names_figure(numbers: DataFrame) -> Any:
     return figure
 
 
-def draw(axis: Any, numbers: DataFrame, title: str) -> None:
-    """Draw counts as a heat map whose colour is the share of the row; empty cells carry no number."""
+def draw(axis: Any, numbers: DataFrame, title: str, names: bool = True) -> None:
+    """Draw counts as a heat map whose colour is the share of the row; empty cells carry no number.
+
+    names: whether the rows are named.
+    """
     import seaborn as sns  # noqa: PLC0415 - takes time to import, and only figures need it
 
     sums = numbers.sum(axis=1).replace(0, np.nan)
     shares = numbers.div(sums, axis=0).fillna(0.0)
     sns.heatmap(shares, ax=axis, vmin=0.0, vmax=1.0, cmap="Blues", cbar=False, linewidths=0.5, linecolor="0.9",
-                xticklabels=True, yticklabels=True)  # fmt: skip
+                xticklabels=True, yticklabels=names)  # fmt: skip
     counts, dark = numbers.to_numpy(int), shares.to_numpy(float) > DARK
     for i, j in np.argwhere(counts > 0):
         ink = "white" if dark[i, j] else "0.1"
