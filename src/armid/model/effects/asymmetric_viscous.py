@@ -1,6 +1,6 @@
 """Viscous friction that differs between the directions of motion; `torque_offset` is its Coulomb half.
 
-Source: Janot, Gautier, Brunot 2019, reference models of EMPS (asymmetric friction).
+Source: Janot, Gautier, Brunot 2019, Workshop on Nonlinear System Identification Benchmarks (asymmetric friction).
 """
 
 import numpy as np
@@ -22,5 +22,5 @@ asymmetric_viscous = Effect(
     ),
     adds={"torque": torque},
     note="viscous friction that differs between the directions",
-    source="Janot, Gautier, Brunot 2019, EMPS reference models",
+    source="Janot, Gautier, Brunot 2019, Nonlinear System Identification Benchmarks",
 )

@@ -1,6 +1,6 @@
 """Constant effort: an unbalanced weight, an offset of the drive, unequal Coulomb friction in the two directions.
 
-Source: Janot, Gautier, Brunot 2019, reference models of EMPS (the term `offset`).
+Source: Janot, Gautier, Brunot 2019, Workshop on Nonlinear System Identification Benchmarks (the term `offset`).
 """
 
 from armid.model.effect import Effect
@@ -17,5 +17,5 @@ torque_offset = Effect(
     parameters=(Parameter("level", "effort", -0.2, 0.2, null=0.0, note="constant effort"),),
     adds={"torque": torque},
     note="constant effort on the shaft",
-    source="Janot, Gautier, Brunot 2019, EMPS reference models",
+    source="Janot, Gautier, Brunot 2019, Nonlinear System Identification Benchmarks",
 )
