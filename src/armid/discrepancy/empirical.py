@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from armid.discrepancy.bundles import applies
 from armid.discrepancy.curve import any_curve
 from armid.discrepancy.dependence import N_KNOTS, Dependence, knows, variable_names
 from armid.discrepancy.names import UNNAMED
@@ -39,7 +40,8 @@ def empirical_effect(model: Model, found: Dependence) -> tuple[Effect, dict[str,
     Raises ArmidError where the port needs what the term would be made of: a circle.
     """
     variables = usable(model, found.port)
-    if found.variable not in variables or (found.factor == "drive_effort" and not composes(model, found.port, found)):
+    driven = found.factor == "drive_effort"
+    if found.variable not in variables or (driven and not composes(model, found.port, "drive_effort")):
         raise ArmidError(f"a curve over {found.variable} cannot stand at port {found.port}, which it is made of")
     effect = term_at(model, found.port, variables, found)
     return effect, {f"{effect.name}.h{i}": float(h) for i, h in enumerate(found.heights)}
@@ -50,16 +52,11 @@ def usable(model: Model, port: str) -> list[str]:
     return [v for v in variable_names(model) if composes(model, port, v)][:SLOTS]
 
 
-def composes(model: Model, port: str, asked: str | Dependence) -> bool:
-    """Tell whether a term at a port may use a variable, or the effort of the drive that a dependence asks for."""
-    variable = asked if isinstance(asked, str) else "drive_effort"
-    if not knows(model, variable) and variable != "time":
-        return False
-    try:
-        return bool(model + Effect("trial", (Parameter("one", "1", 0.0, 1.0, null=0.0),), {port: product},
-                                   binds={"variable": variable}))  # fmt: skip
-    except ArmidError:
-        return False
+def composes(model: Model, port: str, variable: str) -> bool:
+    """Tell whether a term at a port may use a variable."""
+    one = Parameter("one", "1", 0.0, 1.0, null=0.0)
+    trial = Effect("trial", (one,), {port: product}, binds={"variable": variable})
+    return knows(model, variable) and applies(model, trial)
 
 
 def product(variable, one):  # type: ignore[no-untyped-def]

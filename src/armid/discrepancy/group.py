@@ -90,11 +90,7 @@ def rival_models(fit: Fit, others: Sequence[Fit], library: Library) -> tuple[Riv
 
 def trace_of(fit: Fit, key: str) -> Array:
     """Return the change of the whitened signal by an effect, projected off the other free parameters, of length 1."""
-    change = change_by(fit, key)
-    basis = span(fit.jacobian[:, ~owned_by(fit, key)])
-    free = change - basis @ (basis.T @ change)
-    length = float(np.linalg.norm(free))
-    return np.asarray(free / length) if length > 0.0 else np.asarray(free)
+    return beyond_others(fit, key, change_by(fit, key))
 
 
 def sensitivity_of(fit: Fit, key: str) -> Array:
@@ -110,8 +106,12 @@ def sensitivity_of(fit: Fit, key: str) -> Array:
         null, place = declared[name].null, space.index(name)
         if name.partition(".")[0] == base(key) and null is not None:
             away[i] = fit.z[i] - (null - space.low[place]) / (space.high[place] - space.low[place])
+    return beyond_others(fit, key, fit.jacobian @ away)
+
+
+def beyond_others(fit: Fit, key: str, moved: Array) -> Array:
+    """Return what parameters other than an effect's own cannot do of a change of the signal, of length 1."""
     basis = span(fit.jacobian[:, ~owned_by(fit, key)])
-    moved = fit.jacobian @ away
     free = moved - basis @ (basis.T @ moved)
     length = float(np.linalg.norm(free))
     return np.asarray(free / length) if length > 0.0 else np.asarray(free)

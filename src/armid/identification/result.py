@@ -1,14 +1,13 @@
 """What an identification found, as numbers for other programs."""
 
-import platform
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from armid.identification.errors import Errors, record_errors
 from armid.identification.identify import Identification
+from armid.identification.versions import versions_of
 from armid.problem import Replay
 
 PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
@@ -50,7 +49,7 @@ def result_of(found: Identification) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Return package -> version, of Python too."""
-    return {"python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
+    return versions_of(PACKAGES)
 
 
 def entry(found: Identification, i: int) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """The versions of what decides a result."""
 
-import platform
 from functools import cache
-from importlib.metadata import version
+
+from armid.identification.versions import versions_of
 
 PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 
@@ -10,4 +10,4 @@ PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 @cache
 def versions() -> dict[str, str]:
     """Return package -> version, of Python too."""
-    return {"python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
+    return versions_of(PACKAGES)
