@@ -12,13 +12,16 @@ FEET_PER_MINUTE = 0.3048 / 60.0
 
 
 def flux(arm: Arm, effects: Effects, now: State) -> float:
-    """Give Phi = K abs(I) [Wb] (Eq 7); K abs(I)/(1 + abs(I)/I_s) or K I_s atan(abs(I)/I_s) when the iron saturates.
+    """Give Phi = K abs(I) [Wb] (Eq 7), less when the iron saturates.
 
-    A fading motor has Phi / (1 + c * integral of abs(I)).
+    Then K abs(I)/(1 + abs(I)/I_s), K I_s atan(abs(I)/I_s) or K abs(I)/sqrt(1 + (I/I_s)^2). A fading motor
+    has Phi / (1 + c * integral of abs(I)).
     """
     ampere = abs(now["current"])
     if effects.flux_atan:
         ampere = effects.flux_atan * math.atan(ampere / effects.flux_atan)
+    if effects.flux_root:
+        ampere /= math.hypot(1.0, ampere / effects.flux_root)
     if effects.flux_saturation:
         ampere /= 1.0 + ampere / effects.flux_saturation
     return arm.excitation * ampere / (1.0 + effects.motor_fade * now.get("charge", 0.0))

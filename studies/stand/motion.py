@@ -103,13 +103,16 @@ class Motion:
     def _tray(self, now: State) -> float:
         """J_s (w^2 s (1 + (s/s_0)^2) + 2 z w s') [N m], w = 2 pi f: what the tray's spring and damper pass on.
 
-        s = theta - phi is the stretch, and s_0 the one at which the spring is twice as stiff (none by default). The
-        weight of the shell stays on the arm, so the spring is at rest when the arm is.
+        s = theta - phi is the stretch, where the tray has play what is beyond it, and s_0 the one at which the spring
+        is twice as stiff (none by default). The weight of the shell stays on the arm, so the spring is at rest when the
+        arm is.
         """
         if not self.rocks:
             return 0.0
         effects, natural = self.effects, 2.0 * math.pi * self.effects.rocking_hz
         stretch, slip = now["angle"] - now["shell_angle"], now["speed"] - now["shell_speed"]
+        if effects.rocking_play:
+            stretch -= min(max(stretch, -effects.rocking_play), effects.rocking_play)
         if effects.rocking_stop:
             stretch *= 1.0 + (stretch / effects.rocking_stop) ** 2
         return SHELL_INERTIA * natural * (natural * stretch + 2.0 * effects.rocking_damping * slip)

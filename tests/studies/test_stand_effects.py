@@ -89,6 +89,17 @@ def test_the_exponent_of_stribeck_shapes_how_it_fades() -> None:
         assert found == pytest.approx(40.0 * math.exp(-(2.0**exponent)))
 
 
+def test_stribeck_can_fade_rationally() -> None:
+    effects = Effects(stribeck=40.0, stribeck_speed=0.1, stribeck_rational=1.0, stribeck_tanh=1.0)
+    assert friction(ARM, effects, {"speed": 0.3}) == pytest.approx(4.0)
+
+
+def test_the_root_saturates_at_its_current() -> None:
+    root = Effects(flux_root=100.0)
+    assert flux(ARM, root, {"current": -100.0}) == pytest.approx(ARM.excitation * 100.0 / math.sqrt(2.0))
+    assert flux(ARM, root, {"current": 1e7}) == pytest.approx(ARM.excitation * 100.0, rel=1e-4)
+
+
 def test_atan_saturates_as_its_series_says() -> None:
     """K I_s atan(x) = K I (1 - x^2/3 + ...), x = I/I_s, and K I_s pi/2 in the end; the rational form bends at once."""
     bent = Effects(flux_atan=100.0)
@@ -148,6 +159,12 @@ def test_a_stop_in_the_tray_stiffens_it() -> None:
     soft, hard = (moved(Effects(rocking_hz=5.0, rocking_stop=stop)).states for stop in (0.0, 0.003))
     stretch = [np.abs(states["shell_angle"] - states["angle"]).max() for states in (soft, hard)]
     assert stretch[1] < 0.8 * stretch[0]
+
+
+def test_play_in_the_tray_lets_the_shell_lag() -> None:
+    tight, loose = (moved(Effects(rocking_hz=12.0, rocking_play=play)).states for play in (0.0, 0.004))
+    stretch = [np.abs(states["shell_angle"] - states["angle"]).max() for states in (tight, loose)]
+    assert stretch[1] > stretch[0] + 0.003
 
 
 def test_a_taut_cable_pulls_only_beyond_its_angle() -> None:

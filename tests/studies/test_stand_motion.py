@@ -45,6 +45,7 @@ SIZES = {
     "worm_speed": 0.1,
     "drive_gain": 0.05,
     "flux_atan": 150.0,
+    "flux_root": 150.0,
     "line_loss": 2e4,
     "tachometer_ripple": 0.05,
     "controller_delay": 0.005,
@@ -63,6 +64,7 @@ LATE = {"controller_delay": 5e-4, "controller_period": 1e-3}
 NEARLY_NULL = {name: 1e-6 * size for name, size in SIZES.items() if name not in STIFF | LATE} | {
     "flux_saturation": 1e9,
     "flux_atan": 1e7,
+    "flux_root": 1e7,
     "gas_heat_loss": 1e7,
 }
 
@@ -133,8 +135,8 @@ def test_refuses_an_effect_too_stiff_to_integrate() -> None:
 @pytest.mark.parametrize(
     "name",
     ["coulomb", "stribeck", "viscous", "drag", "flux_saturation", "brush_drop", "winding_heating", "supply_sag",
-     "seal_friction", "asymmetric_friction", "worm_speed", "flux_atan", "line_loss", "cam_bump", "motor_fade",
-     "piston_stiction", "pressure_friction"],
+     "seal_friction", "asymmetric_friction", "worm_speed", "flux_atan", "flux_root", "line_loss", "cam_bump",
+     "motor_fade", "piston_stiction", "pressure_friction"],
 )  # fmt: skip
 def test_a_loss_delays_the_switch_both_ways(name: str) -> None:
     for manoeuvre in ("lower", "raise"):

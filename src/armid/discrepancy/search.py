@@ -4,17 +4,21 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.discrepancy.alike import alike
 from armid.discrepancy.diagnose import diagnose
+from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from, fit_globally
 from armid.discrepancy.library import Library
 from armid.discrepancy.names import LOOSE, base
 from armid.discrepancy.ranking import SURE, different, leading, promising, ranked, within_reach
 from armid.discrepancy.select import Verdict, compare
-from armid.discrepancy.trace import Score, accurate, refitted, start_of, traced
+from armid.discrepancy.trace import Score, accurate, at_null, refitted, start_of, traced
 from armid.discrepancy.view import train_view
 from armid.model import ArmidError
+
+Array = NDArray[np.float64]
 
 MOST_EFFECTS = 6
 # Of one size so many models are extended: a strong second effect can mislead the choice of the first.
@@ -27,6 +31,8 @@ QUIET = 0.1
 N_LOOSENED = 4
 LOOSENED_WITHIN = 4.0
 LOOSE_STARTS = (0.03, 0.5)
+# Each of these shapes is tried at so many places first: the best period of a sampled control is a narrow one.
+N_PLACES = 384
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +156,10 @@ class Search:
             records = self.library.problem(active, fit.values)
             known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
             z = records.shares(np.array([known[n] for n in records.space.free_names]))
-            free = [n in self.library.loosened(name) for n in records.space.free_names]
+            free = np.array([n in self.library.loosened(name) for n in records.space.free_names])
             starts = [np.where(free, share, z) for share in LOOSE_STARTS]
+            rest = records.shares(at_null(records, fit.candidate, name)[records.space.free])
+            starts += [best_along(records, at, i) for i in map(int, np.flatnonzero(free)) for at in (z, rest)]
             self.fits[key] = fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts])
 
     def extend(self, parent: Fit) -> None:
@@ -191,3 +199,10 @@ class Search:
         """Return the models with a number of effects, by their criterion, best first."""
         fits = [f for key, f in self.fits.items() if len(key) == size]
         return ranked(fits)
+
+
+def best_along(records: WhiteRecords, z: Array, place: int) -> Array:
+    """Return a candidate with one of its free parameters where it does best, the others as they are, (n_free,)."""
+    tried = np.tile(z, (N_PLACES, 1))
+    tried[:, place] = (np.arange(N_PLACES) + 0.5) / N_PLACES
+    return np.asarray(tried[np.nanargmin(np.nan_to_num(records.chi2(tried), nan=np.inf))])

@@ -96,11 +96,12 @@ def test_load_is_what_is_held():
 
 def test_shell_and_arm_exchange_momentum():
     """What the spring does to the arm it does not do to the body, and held it swings at its frequency."""
-    values = {"frequency": 8.0, "damping_ratio": 0.05, "twist": 0.01, "body_speed": 0.3, "omega": 0.1}
+    values = {"frequency": 8.0, "damping_ratio": 0.05, "hardening": 1e-3, "twist": 0.01, "omega": 0.1}
+    values["body_speed"] = 0.3
     on_arm = shell_rocking.torque(30.0, 1.0, **values)
     assert on_arm == pytest.approx(-30.0 * shell_rocking.body_speed_rate(**values))
-    matrix = np.array([[0.0, 1.0], [shell_rocking.body_speed_rate(8.0, 0.05, 1.0, 0.0, 0.0),
-                                    shell_rocking.body_speed_rate(8.0, 0.05, 0.0, 1.0, 0.0)]])  # fmt: skip
+    matrix = np.array([[0.0, 1.0], [shell_rocking.body_speed_rate(8.0, 0.05, 0.0, 1.0, 0.0, 0.0),
+                                    shell_rocking.body_speed_rate(8.0, 0.05, 0.0, 0.0, 1.0, 0.0)]])  # fmt: skip
     root = np.linalg.eigvals(matrix)[0]
     assert abs(root) / (2 * np.pi) == pytest.approx(8.0)
     assert -root.real / abs(root) == pytest.approx(0.05)
@@ -127,18 +128,41 @@ def test_delay_is_a_dead_time_at_the_frequencies_of_the_arm(frequency, delay):
     s = 2j * np.pi * frequency
     longest = max(delay, 2e-3)
     smooth = 1.0 / (1.0 + 0.5 * longest * s + longest**2 * s**2 / 12)
-    assert controller_delay.slope_rate(delay, 1.0, smooth, s * smooth) == pytest.approx(s**2 * smooth)
+    assert controller_delay.slope_rate(delay, 0.0, 1.0, smooth, s * smooth) == pytest.approx(s**2 * smooth)
     late = np.exp(-s * delay)
     allowed = abs(s * longest) ** 5 / 700 + abs(s) ** 2 * max(2e-3 - delay, 0.0) * delay / 1.9
-    assert abs(1.0 + controller_delay.feedback(delay, s * smooth) - late) <= allowed
-    angle = 1.0 / s - controller_delay.command(1, 1, 1.0, 0, 0, 0, 1.0, 0, 1, 1, 0, delay, smooth)
+    assert abs(1.0 + controller_delay.feedback(delay, 0.0, 1.0, smooth, s * smooth) - late) <= allowed
+    angle = 1.0 / s - controller_delay.command(1, 1, 1.0, 0, 0, 0, 1.0, 0, 1, 1, 0, delay, 0.0, smooth, s * smooth)
     assert abs(s * angle - late) <= allowed
+
+
+@pytest.mark.parametrize("frequency", [1.0, 10.0, 20.0])
+@pytest.mark.parametrize(("delay", "period"), [(0.0, 0.008), (0.0, 0.02), (0.003, 0.004), (0.006, 0.004)])
+def test_a_sampled_control_is_a_hold_after_a_dead_time(frequency, delay, period):
+    s = 2j * np.pi * frequency
+    held = (1.0 - np.exp(-s * period)) / (s * period) * np.exp(-s * delay)
+    x = s * controller_delay.filter_time(delay, period)
+    smooth = 1.0 / (1.0 + 0.5 * x + x**2 / 12)
+    found = 1.0 + controller_delay.feedback(delay, period, 1.0, smooth, s * smooth)
+    angle = 1.0 / s - controller_delay.command(1, 1, 1.0, 0, 0, 0, 1.0, 0, 1, 1, 0, delay, period, smooth, s * smooth)
+    assert abs(found - held) <= (abs(x) ** 4 / 500 if delay == 0.0 else abs(x) ** 3 / 200)
+    assert s * angle == pytest.approx(found)
+
+
+@pytest.mark.parametrize(("delay", "period", "switch"), [
+    (0.004, 0.0, 0.1083), (0.0, 0.008, 0.112), (0.0, 0.03, 0.12), (0.007, 0.008, 0.112), (0.008, 0.008, 0.12),
+])  # fmt: skip
+def test_a_sampled_control_switches_at_a_sample(delay, period, switch):
+    """The loop closes at 0.1043 s: the first sample after the dead time is waited for."""
+    assert controller_delay.still_to_wait(1.0, delay, period, 0.0, 0.1043) == pytest.approx(switch - 0.1043)
+    assert controller_delay.still_to_wait(0.0, delay, period, 0.0, 0.1043) > 0.0
 
 
 def test_late_switch_keeps_the_full_voltage():
     """While the switch waits the demand, after what the plant puts on top of the command, is that before the switch."""
     K_p, theta_D, theta, damping, omega, feedback, U, u_th = 280.0, 0.4, 0.1, 70.0, 2.0, 0.1, 28.0, 0.5
-    added = controller_delay.command(1.0, 0.0, K_p, theta_D, theta, damping, omega, feedback, 1.0, U, u_th, 0.01, 0.0)
+    seen = K_p, theta_D, theta, damping, omega, feedback
+    added = controller_delay.command(1.0, 0.0, *seen, 1.0, U, u_th, 0.01, 0.0, 0.0, 0.0)
     assert K_p * (theta_D - theta) + added - damping * (omega + feedback) == pytest.approx(2 * (U + u_th))
 
 

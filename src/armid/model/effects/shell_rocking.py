@@ -2,7 +2,8 @@
 
 Zhao and Hou see it in their records and cut them at 0.7 s. The inertia that rocks is taken out of the arm's; with all
 of the shell it is 45.5 kg x (0.85 m)^2 = 32.9 kg m2 (REF), less where a part of the shell is held. Gravity stays on the
-arm, where it is declared: at rest the spring carries the shell in either reading.
+arm, where it is declared: at rest the spring carries the shell in either reading. A spring that hardens (Duffing) has
+the stiffness of the linear one times 1 + hardening a^2, a = w0^2 twist the acceleration that the linear spring gives.
 """
 
 import numpy as np
@@ -16,10 +17,11 @@ def inertia(inertia_share, shell):
     return -inertia_share * shell
 
 
-def torque(inertia_share, shell, frequency, damping_ratio, twist, body_speed, omega):
-    """Torque of spring and damper on the arm [N m], J_c (w0^2 twist + 2 zeta w0 (body_speed - omega)), w0 = 2 pi f."""
+def torque(inertia_share, shell, frequency, damping_ratio, hardening, twist, body_speed, omega):
+    """Torque on the arm [N m], J_c (a (1 + hardening a^2) + 2 zeta w0 (body_speed - omega)), a = w0^2 twist."""
     w0 = 2 * np.pi * frequency
-    return inertia_share * shell * (w0**2 * twist + 2 * damping_ratio * w0 * (body_speed - omega))
+    a = w0**2 * twist
+    return inertia_share * shell * (a * (1 + hardening * a**2) + 2 * damping_ratio * w0 * (body_speed - omega))
 
 
 def twist_rate(body_speed, omega):
@@ -27,10 +29,11 @@ def twist_rate(body_speed, omega):
     return body_speed - omega
 
 
-def body_speed_rate(frequency, damping_ratio, twist, body_speed, omega):
-    """Acceleration of the body [rad/s2], -(w0^2 twist + 2 zeta w0 (body_speed - omega)), w0 = 2 pi f."""
+def body_speed_rate(frequency, damping_ratio, hardening, twist, body_speed, omega):
+    """Acceleration of the body [rad/s2], -(a (1 + hardening a^2) + 2 zeta w0 (body_speed - omega)), a = w0^2 twist."""
     w0 = 2 * np.pi * frequency
-    return -(w0**2) * twist - 2 * damping_ratio * w0 * (body_speed - omega)
+    a = w0**2 * twist
+    return -a * (1 + hardening * a**2) - 2 * damping_ratio * w0 * (body_speed - omega)
 
 
 def untwisted():
@@ -49,6 +52,7 @@ shell_rocking = Effect(
         Parameter("inertia_share", "kg m2", 0.0, 45.0, null=0.0, note="inertia that rocks; 32.9 for the whole shell"),
         Parameter("frequency", "Hz", 2.0, 40.0, nominal=10.0, note="of the body against an arm that is held"),
         Parameter("damping_ratio", "1", 0.0, 0.3, nominal=0.05, note="damping over critical damping"),
+        Parameter("hardening", "s4/rad2", 0.0, 0.1, fixed=0.0, note="stiffening per squared acceleration of the body"),
     ),
     adds={"inertia": inertia, "torque": torque},
     states=(
