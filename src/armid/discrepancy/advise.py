@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 from armid.discrepancy.foresee import Forecast, Rival, Whitening, chance, forecasts_of
 from armid.discrepancy.rehearse import rehearse
+from armid.discrepancy.side_by_side import side_by_side
 from armid.identifiability import WeightedRecords
 from armid.identifiability.manoeuvres import Feasible, Key, manoeuvre_grid
 from armid.model import ArmidError
@@ -50,6 +51,7 @@ def advise(
     grid: Sequence[Feasible] | None = None,
     speed_limit: float | None = None,
     threshold: float = THRESHOLD,
+    threads: int = 1,
 ) -> tuple[Advice, ...]:
     """Rank feasible manoeuvres by how well one record of each would tell the rivals apart, the best first.
 
@@ -59,6 +61,7 @@ def advise(
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_signals, n_samples), into
     units of white noise, None: the mean weight of the records. grid: None: `manoeuvre_grid`. speed_limit: of the gyro,
     [unit of the signal]. threshold: difference of the criterion at which one model counts as better.
+    threads: among which rivals and manoeuvres are shared.
 
     Raises ArmidError for fewer than two rivals.
     Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
@@ -68,11 +71,11 @@ def advise(
     first = rivals[0].records
     filtered = white or mean_weight(first)
     told = grid or manoeuvre_grid(first.replays[0].model, [r.record for r in first.replays])
-    promising = foreseen_best(rivals, told, filtered, speed_limit, threshold)
+    promising = foreseen_best(rivals, told, filtered, speed_limit, threshold, threads)
     draws = normal_draws(max(len(r.z) for r in rivals), N_REHEARSED_DRAWS)
-    tried = [(f, rehearsed_powers(rivals, f, filtered, draws, threshold)) for f in promising]
-    ranked = sorted(tried, key=lambda pair: rank(pair[1]), reverse=True)
-    return tuple(advice_of(rivals, feasible, powers) for feasible, powers in ranked)
+    powers = side_by_side(lambda f: rehearsed_powers(rivals, f, filtered, draws, threshold), promising, threads)
+    ranked = sorted(zip(promising, powers, strict=True), key=lambda pair: rank(pair[1]), reverse=True)
+    return tuple(advice_of(rivals, feasible, found) for feasible, found in ranked)
 
 
 def mean_weight(records: WeightedRecords) -> Whitening:
@@ -87,10 +90,11 @@ def normal_draws(n_dimensions: int, n_draws: int) -> Array:
 
 
 def foreseen_best(
-    rivals: Sequence[Rival], grid: Sequence[Feasible], white: Whitening, speed_limit: float | None, threshold: float
+    rivals: Sequence[Rival], grid: Sequence[Feasible], white: Whitening, speed_limit: float | None, threshold: float,
+    threads: int,
 ) -> list[Feasible]:
     """Return the manoeuvres that are worth a rehearsal, by the linear forecast, the best first."""
-    forecasts = [forecasts_of(rival, grid, white, speed_limit) for rival in rivals]
+    forecasts = side_by_side(lambda rival: forecasts_of(rival, grid, white, speed_limit), rivals, threads)
     draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
     possible = [f for f in grid if all(f in known for known in forecasts)]
     ranks = {f: rank(foreseen_powers(rivals, [k[f] for k in forecasts], draws, threshold)) for f in possible}

@@ -5,8 +5,9 @@ rank fourteenth there and still fit as well as the first (seen on one stroke). A
 is good: put in its place, a rival does nearly what it does, the parameters making up for what they can.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,22 +35,28 @@ class Rival:
 
 def alike(fit: Fit, library: Library) -> list[Rival]:
     """Return the candidates that move the records like an effect of a fit, the likest first."""
-    found = sorted(rivals(fit, library), key=lambda r: -r.correlation)
+    changes = {name: change_by(fit, name) for name in fit.active}
+    spans = {name: span(fit.jacobian[:, ~owned_by(fit, name)]) for name in fit.active}
+    candidates = [c for c in library.candidates if library.can_join(c, fit.active)]
+    each = library.each(lambda c: list(rivals(fit, library, c, changes, spans)), candidates)
+    found = sorted(chain.from_iterable(each), key=lambda r: -r.correlation)
     return [r for place in fit.active for r in [r for r in found if r.place == place][:MOST]]
 
 
-def rivals(fit: Fit, library: Library) -> Iterator[Rival]:
-    """Yield the candidates that move the records like an effect of a fit."""
-    changes = {name: change_by(fit, name) for name in fit.active}
-    spans = {name: span(fit.jacobian[:, ~owned_by(fit, name)]) for name in fit.active}
-    for candidate in (c for c in library.candidates if library.can_join(c, fit.active)):
-        records = library.problem((*fit.active, candidate), fit.values)
-        found, _ = rays(records, candidate)
-        for name in fit.active:
-            best = likest(changes[name], responses(fit, records, found, without=name), spans[name])
-            if best is not None:
-                ray, correlation, amplitude = found[best[0]], best[1], float(np.clip(best[2], 0.01, 1.0))
-                yield Rival(name, candidate, correlation, fit.values | ray.at(amplitude))
+def rivals(
+    fit: Fit, library: Library, candidate: str, changes: Mapping[str, Array], spans: Mapping[str, Array]
+) -> Iterator[Rival]:
+    """Yield the effects of a fit that a candidate moves the records like.
+
+    changes: by each effect, (n_samples,); spans: bases of what the other parameters can absorb, (n_samples, rank).
+    """
+    records = library.problem((*fit.active, candidate), fit.values)
+    found, _ = rays(records, candidate)
+    for name in fit.active:
+        best = likest(changes[name], responses(fit, records, found, without=name), spans[name])
+        if best is not None:
+            ray, correlation, amplitude = found[best[0]], best[1], float(np.clip(best[2], 0.01, 1.0))
+            yield Rival(name, candidate, correlation, fit.values | ray.at(amplitude))
 
 
 def likest(change: Array, moved: Array, basis: Array) -> tuple[int, float, float] | None:

@@ -79,7 +79,7 @@ def close_loop(
     verdict = verdict_of(judged[0], judged[-1], steps, refused, rivals)
     noise = float(np.mean([level.rms for level in evidence.levels]))
     contest = contest_of(rivals_of(groups, refused), search, levels[-1].best) or whole_contest(named, rivals)
-    advice = advice_for(contest, levels[-1].best, campaign.gyro_range, told)
+    advice = advice_for(contest, levels[-1].best, campaign.gyro_range, threads, told)
     return ClosedLoop(campaign, noise, verdict, judged[0], judged[-1], steps, refused, rivals, advice, library, search,
                       missing, term)  # fmt: skip
 
@@ -171,12 +171,13 @@ def rival(name: str, fit: Fit, best: Fit) -> Rival:
 
 
 def advice_for(
-    rivals: Sequence[Rival], best: Fit, speed_limit: float | None, told: Callable[[str], None]
+    rivals: Sequence[Rival], best: Fit, speed_limit: float | None, threads: int, told: Callable[[str], None]
 ) -> tuple[Advice, ...]:
     """Return the manoeuvres that would tell rivals apart, best first; none where nothing is in doubt."""
     if len(rivals) < 2:
         return ()
     told(f"looking for a manoeuvre that tells {' and '.join(r.name for r in rivals)} apart")
     level = best.records.evidence.levels[0]
-    found = advise(rivals, lambda signals: level.white(signals, [signals.shape[-1]]), speed_limit=speed_limit)
+    found = advise(rivals, lambda signals: level.white(signals, [signals.shape[-1]]), None, speed_limit,
+                   threads=threads)  # fmt: skip
     return found[:MOST_ADVICE]

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 LEAST_NOISE = 5e-5
 MOST_TERMS = 8
-FEWEST_FOR_COLOUR = 200
+FEWEST_FOR_COLOUR = 50
 LAGS = 500
 
 

@@ -1,24 +1,23 @@
 """Look for the effects that the records ask for: one more at a time, a few models of each size kept."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.discrepancy.alike import alike
 from armid.discrepancy.diagnose import diagnose
-from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from, fit_globally
 from armid.discrepancy.library import Library
+from armid.discrepancy.loosen import loosened
 from armid.discrepancy.names import LOOSE, base
 from armid.discrepancy.ranking import SURE, different, leading, promising, ranked, within_reach
 from armid.discrepancy.select import Verdict, compare
-from armid.discrepancy.trace import Score, accurate, at_null, refitted, start_of, traced
+from armid.discrepancy.trace import Score, accurate, refitted, start_of, substituted, traced
 from armid.discrepancy.view import train_view
 from armid.model import ArmidError
-
-Array = NDArray[np.float64]
 
 MOST_EFFECTS = 6
 # Of one size so many models are extended: a strong second effect can mislead the choice of the first.
@@ -30,9 +29,8 @@ QUIET = 0.1
 # Of so many of the best the fixed shapes are set free: a rival must not lose by the width of a sign alone.
 N_LOOSENED = 4
 LOOSENED_WITHIN = 4.0
-LOOSE_STARTS = (0.03, 0.5)
-# Each of these shapes is tried at so many places first: the best period of a sampled control is a narrow one.
-N_PLACES = 384
+Trial = Callable[[], Fit]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +91,8 @@ class Search:
             self.exchange(best)
             if self.of_size(size)[0] is best:
                 self.exchange_alike(best)
-            for fit in self.of_size(size)[:N_LOOSENED]:
-                if fit.chi2 <= LOOSENED_WITHIN * best.chi2:
-                    self.loosen(fit)
+            leaders = self.of_size(size)[:N_LOOSENED]
+            self.loosen(f for f in leaders if f.chi2 <= LOOSENED_WITHIN * best.chi2)
             if self.of_size(size)[0] is best:
                 break
         smaller, fits = self.of_size(size - 1)[0], self.of_size(size)
@@ -120,16 +117,11 @@ class Search:
 
     def exchange_alike(self, best: Fit) -> None:
         """Fit the models in which a candidate that moves the records alike stands in the place of an effect."""
+        tried: dict[frozenset[str], Trial] = {}
         for rival in alike(best, self.library):
-            active, values = (*(n for n in best.active if n != rival.place), rival.name), rival.values
-            if frozenset(active) not in self.fits:
-                self.library.told(f"fitting {self.shown(active)}")
-                records = self.library.problem(active, values)
-                try:
-                    fit = fit_from(records, active, [start_of(records, values)])
-                except ArmidError:
-                    continue
-                self.fits[frozenset(active)] = accurate(fit, self.library)
+            active = (*(n for n in best.active if n != rival.place), rival.name)
+            tried.setdefault(frozenset(active), partial(substituted, active, rival.values, self.library))
+        self.fit_each(tried)
 
     def reduced(self, fit: Fit, rest: tuple[str, ...]) -> Fit:
         """Return the fit with some effects only, from the values that they had."""
@@ -143,35 +135,30 @@ class Search:
             self.fits[key] = accurate(fit_from(records, rest, [start]), self.library)
         return self.fits[key]
 
-    def loosen(self, fit: Fit) -> None:
-        """Set the fixed shapes of each effect free, such as the speed over which the sign of friction is smoothed.
-
-        A declared width that is not the machine's leaves a residual that another effect would be taken for.
-        """
-        for name in fit.active:
-            key = frozenset(n + LOOSE if n == name else n for n in fit.active)
-            if name.endswith(LOOSE) or not self.library.loosened(name) or key in self.fits:
-                continue
-            active = tuple(n + LOOSE if n == name else n for n in fit.active)
-            records = self.library.problem(active, fit.values)
-            known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
-            z = records.shares(np.array([known[n] for n in records.space.free_names]))
-            free = np.array([n in self.library.loosened(name) for n in records.space.free_names])
-            starts = [np.where(free, share, z) for share in LOOSE_STARTS]
-            rest = records.shares(at_null(records, fit.candidate, name)[records.space.free])
-            starts += [best_along(records, at, i) for i in map(int, np.flatnonzero(free)) for at in (z, rest)]
-            self.fits[key] = fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts])
+    def loosen(self, fits: Iterable[Fit]) -> None:
+        """Set the fixed shapes of each effect of some models free, one effect at a time (see `loosened`)."""
+        tried: dict[frozenset[str], Trial] = {}
+        for fit in fits:
+            for name in fit.active:
+                if not name.endswith(LOOSE) and self.library.loosened(name):
+                    key = frozenset(n + LOOSE if n == name else n for n in fit.active)
+                    tried.setdefault(key, partial(loosened, fit, name, self.library))
+        self.fit_each(tried)
 
     def extend(self, parent: Fit) -> None:
-        """Fit a model with each of the leading candidates added."""
-        for place, found in enumerate(leading(parent, self.trace(parent))):
-            key = frozenset((*parent.active, found.name))
-            if key not in self.fits and (place < SURE or within_reach(parent, found, self.fits)):
-                self.library.told(f"fitting {self.shown((*parent.active, found.name))}")
-                try:
-                    self.fits[key] = refitted(parent, found, self.library)
-                except ArmidError:
-                    continue
+        """Fit a model with each of the leading candidates added, beyond the first few where it is in reach."""
+        scores = leading(parent, self.trace(parent))
+        self.fit_each({key_with(parent, s): partial(refitted, parent, s, self.library) for s in scores[:SURE]})
+        near = [s for s in scores[SURE:] if within_reach(parent, s, self.fits)]
+        self.fit_each({key_with(parent, s): partial(refitted, parent, s, self.library) for s in near})
+
+    def fit_each(self, tried: Mapping[frozenset[str], Trial]) -> None:
+        """Make the fits that are not known yet, side by side; one that diverges whatever its start is left out."""
+        new = {key: trial for key, trial in tried.items() if key not in self.fits}
+        for key in new:
+            self.library.told(f"fitting {self.shown(sorted(key))}")
+        found = self.library.each(unless_diverged, new.values())
+        self.fits.update({key: fit for key, fit in zip(new, found, strict=True) if fit and np.isfinite(fit.chi2)})
 
     def trace(self, fit: Fit) -> list[Score]:
         """Return the scores of the candidates at a fit, best first."""
@@ -201,8 +188,14 @@ class Search:
         return ranked(fits)
 
 
-def best_along(records: WhiteRecords, z: Array, place: int) -> Array:
-    """Return a candidate with one of its free parameters where it does best, the others as they are, (n_free,)."""
-    tried = np.tile(z, (N_PLACES, 1))
-    tried[:, place] = (np.arange(N_PLACES) + 0.5) / N_PLACES
-    return np.asarray(tried[np.nanargmin(np.nan_to_num(records.chi2(tried), nan=np.inf))])
+def unless_diverged(trial: Callable[[], T]) -> T | None:
+    """Return what a fit gives, None where each of its starts diverges or it cannot be composed."""
+    try:
+        return trial()
+    except ArmidError:
+        return None
+
+
+def key_with(parent: Fit, found: Score) -> frozenset[str]:
+    """Return the key of a model with a candidate added."""
+    return frozenset((*parent.active, found.name))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from armid.discrepancy.fit import Fit, fit_from
 from armid.discrepancy.group import WITHIN
 from armid.discrepancy.library import Library
 from armid.discrepancy.missing import Missing, missing_from, posed_in
-from armid.discrepancy.search import Search
+from armid.discrepancy.search import Search, unless_diverged
 from armid.discrepancy.select import FAMILYWISE, criterion, left_out
 from armid.discrepancy.stretch import bump_at
 from armid.discrepancy.view import train_view
@@ -78,14 +79,12 @@ def preferred(found: Sequence[Term], n_eff: float) -> list[Term]:
 def terms(missing: Missing, search: Search) -> list[Term]:
     """Fit the leading curves to what a model lacks, the best first."""
     removing, predicting = missing.dependences, sorted(missing.dependences, key=lambda d: -d.share)
-    found = []
-    for dependence in dict.fromkeys([*removing[:MOST_REMOVING], *predicting[:MOST_PREDICTING]]):
+    leading = tuple(dict.fromkeys([*removing[:MOST_REMOVING], *predicting[:MOST_PREDICTING]]))
+    for dependence in leading:
         search.library.told(f"fitting a curve over {dependence.variable} at port {dependence.port}")
-        try:
-            found.append(term_of(dependence, missing, search))
-        except ArmidError:
-            # Another curve may compose with the model, and not diverge, where this one does not.
-            continue
+    # Another curve may compose with the model, and not diverge, where one does not.
+    tried = search.library.each(unless_diverged, [partial(term_of, d, missing, search) for d in leading])
+    found = [t for t in tried if t is not None]
     found.sort(key=lambda t: criterion(t.fit, missing.lacking.independent))
     return [with_others(t, found) for t in found]
 

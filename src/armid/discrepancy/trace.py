@@ -160,7 +160,7 @@ def moved_start(records: WhiteRecords, current: Fit, ray: Ray, answer: Array, sh
 def traced(current: Fit, library: Library) -> list[Score]:
     """Return the scores of all candidates that are not in a fit, best first."""
     names = [n for n in library.candidates if library.can_join(n, current.active)]
-    found = [score(current, n, library) for n in names]
+    found = library.each(lambda n: score(current, n, library), names)
     return sorted((s for s in found if s is not None), key=lambda s: -s.drop)
 
 
@@ -171,6 +171,12 @@ def refitted(current: Fit, found: Score, library: Library) -> Fit:
     order = np.argsort(values, kind="stable")[:N_STARTS]
     starts = distinct([found.starts[i] for i in order])
     return accurate(fit_from(records, (*current.active, found.name), starts), library)
+
+
+def substituted(active: tuple[str, ...], values: Mapping[str, float], library: Library) -> Fit:
+    """Fit a model fully from some values."""
+    records = library.problem(active, values)
+    return accurate(fit_from(records, active, [start_of(records, values)]), library)
 
 
 def accurate(fit: Fit, library: Library) -> Fit:

@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from threading import RLock
 from types import ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -76,6 +77,7 @@ def load_module(text: str) -> ModuleType:
     return module
 
 
+LOADING = RLock()
 KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
 
 
@@ -84,7 +86,9 @@ def compile_model(model: Model) -> tuple[Kernel, int]:
 
     Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
     """
-    if model not in KERNELS:
-        kernel = load_module(generate_module(model, LANE_WIDTH)).simulate
-        KERNELS[model] = (load_lightly(kernel), LANE_WIDTH)
-    return KERNELS[model]
+    # Threads that ask for the same model at once share one kernel, which numba then compiles once.
+    with LOADING:
+        if model not in KERNELS:
+            kernel = load_module(generate_module(model, LANE_WIDTH)).simulate
+            KERNELS[model] = (load_lightly(kernel), LANE_WIDTH)
+        return KERNELS[model]
