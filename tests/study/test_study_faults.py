@@ -4,7 +4,7 @@ import os
 import resource
 import shutil
 import subprocess
-import time
+import sys
 
 import pytest
 from small_study import RUNS_A_SEED, same_results
@@ -15,6 +15,14 @@ from armid.study.runner import run_study
 from armid.study.store_file import FILE_NAME
 
 SEEDS = 6
+READER = """
+import sqlite3, sys, time
+store = sqlite3.connect(sys.argv[1])
+store.execute("pragma journal_mode = wal").fetchone()
+store.execute("select count(*) from sqlite_master").fetchone()
+print("open", flush=True)
+time.sleep(600)
+"""
 CHAIN = 'name = "pso+least_squares"'
 
 
@@ -85,13 +93,14 @@ def test_a_read_only_folder_can_be_read_and_is_told_when_written(start, write_st
 def test_a_log_left_in_a_read_only_folder_is_read(start, write_study, small_disk):
     subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
     out = small_disk / "out"
-    process = start(write_study(100), "--out", out, "--jobs", 1)
-    while not (out / f"{FILE_NAME}-wal").exists():
-        assert process.poll() is None
-        time.sleep(0.01)
-    assert start(write_study(100), "--out", out, "--jobs", 1, "--only", "row 1/random").wait() == 0
-    process.kill()
-    process.wait()
+    file = write_study(2)
+    assert start(file, "--out", out, "--jobs", 1, "--only", "row 1/random").wait() == 0
+    # Who has the store open when the runner ends, and is killed then, leaves the log behind.
+    reader = subprocess.Popen([sys.executable, "-c", READER, str(out / FILE_NAME)], stdout=subprocess.PIPE, text=True)
+    assert reader.stdout.readline() == "open\n"
+    assert start(file, "--out", out, "--jobs", 1, "--only", "row 1").wait() == 0
+    reader.kill()
+    reader.communicate()
     n = len(load_study(out).runs)
     assert any(p.name.endswith("-wal") for p in out.iterdir())
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
