@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from armid.model import ArmidError
+from armid.study.damage import description_of, whole
 from armid.study.outcome import DONE
 from armid.study.reading import existing_store, reading
 from armid.study.trace import RunTrace, unpacked
@@ -76,7 +77,8 @@ class StudyResults:
         """One row a campaign that was closed: run, case, verdict, seconds, cpu_seconds, report (a dict)."""
         with reading(self.path) as connection:
             found = pd.read_sql_query(LOOPS, connection)
-        return found.assign(report=[json.loads(text) for text in found["report"]])
+        with whole(self.path, "the report of a campaign"):
+            return found.assign(report=[json.loads(text) for text in found["report"]])
 
     def settings_of(self, run: str) -> dict[str, Any]:
         """Return all that decided a run.
@@ -87,7 +89,8 @@ class StudyResults:
             row = connection.execute("SELECT settings FROM settings WHERE run = ?", (run,)).fetchone()
         if row is None:
             raise ArmidError(f"{self.path} holds no run '{run}'")
-        settings: dict[str, Any] = json.loads(row[0])
+        with whole(self.path, f"the settings of run '{run}'"):
+            settings: dict[str, Any] = json.loads(row[0])
         return settings
 
     def text_of(self, digest: str) -> str:
@@ -104,7 +107,9 @@ class StudyResults:
     def _traces(self, query: str, values: tuple[str, ...]) -> Iterator[RunTrace]:
         with reading(self.path) as connection:
             for run, names, content in connection.execute(query, values):
-                yield unpacked(run, content, tuple(json.loads(names)))
+                with whole(self.path, f"the trace of run '{run}'"):
+                    trace = unpacked(run, content, tuple(json.loads(names)))
+                yield trace
 
     def _frame(self, trace: RunTrace | None) -> pd.DataFrame:
         """Return a trace as a table with a column for every parameter of the study, None: one without rows."""
@@ -129,7 +134,7 @@ def load_study(path: str | Path) -> StudyResults:
         row = connection.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
         if row is None:
             raise ArmidError(f"{file} holds no study yet: let `armid study` begin it")
-        study: dict[str, Any] = json.loads(row[0])
+        study = description_of(file, str(row[0]))
         study |= counted(connection) | {"versions": versions(connection), "folder": str(file.parent)}
         study["parameters"] = list(dict.fromkeys(name for case in study["cases"] for name in case["bounds"]))
         return StudyResults(file, study, runs_in(connection), parameters_in(connection, study))

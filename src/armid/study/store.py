@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from armid.model import ArmidError
+from armid.study.damage import description_of
 from armid.study.kind import KINDS
 from armid.study.outcome import FAILED, Outcome, Task
 from armid.study.plan import Planned
@@ -113,7 +114,7 @@ class Store:
 
     def _refuse_other(self, name: str) -> None:
         kept = self._kept("description")
-        other = json.loads(kept)["name"] if kept else name
+        other = description_of(self.path, kept)["name"] if kept else name
         if other != name:
             raise ArmidError(f"{self.path} holds the study '{other}', another folder is expected for '{name}'")
 
