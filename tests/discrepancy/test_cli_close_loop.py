@@ -57,3 +57,15 @@ def test_bad_option_is_one_sentence_and_writes_nothing(paper_arm_folder, tmp_pat
     assert sentence in said
     assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_the_result_is_the_same_on_any_number_of_threads(stand, tmp_path):
+    campaign = stand(*MANOEUVRES, "--repeats", "1", "--duration", "1.0", "--effect", "coulomb=30", "tilt_deg=2")
+    reports = []
+    for threads in (1, 2, 3):
+        out = tmp_path / str(threads)
+        assert run(campaign, "--out", out, "--candidates", CANDIDATES, "--threads", threads) == 0
+        reports.append((out / "report.json").read_bytes())
+    assert reports[0] == reports[1] == reports[2]
+    assert len(json.loads(reports[0])["effects"]) == 2

@@ -75,7 +75,8 @@ def report_study(folder: Path, key: Path | None) -> None:
 def command_of(results: "StudyResults") -> str:
     """Return what makes the runs again, as a shell takes it."""
     plugins = [word for name in results.study.get("plugins", ()) for word in ("--plugin", str(name))]
-    return shlex.join(["armid", "study", f"{results.study['name']}.toml", *plugins])
+    file = results.study.get("file", f"{results.study['name']}.toml")
+    return shlex.join(["armid", "study", str(file), *plugins])
 
 
 def models_of(results: "StudyResults") -> list[str]:

@@ -99,7 +99,8 @@ def run(
         function(kind.checked_by)(study)
     folder = RESULTS / study.name if out is None else Path(out)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
-        store.plan(function(kind.described_by)(study, folder), function(kind.planned_by)(study))
+        described = function(kind.described_by)(study, folder) | {"file": file_as_told(Path(path))}
+        store.plan(described, function(kind.planned_by)(study))
         if retry:
             store.forget_failed()
         counts = store.counts()
@@ -193,3 +194,8 @@ def absolute(plugins: Iterable[str]) -> tuple[str, ...]:
     """Return plug-ins with whole paths, so that workers in other folders find them."""
     split = (plugin.rpartition(":") for plugin in plugins)
     return tuple(f"{Path(file).resolve()}:{attribute}" if file else attribute for file, _, attribute in split)
+
+
+def file_as_told(path: Path) -> str:
+    """Return the study's file as the command named it; of a path on this machine alone the name."""
+    return path.name if path.is_absolute() else path.as_posix()
