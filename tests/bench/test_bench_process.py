@@ -10,6 +10,7 @@ from armid.bench import memory
 from armid.bench.framework import framework_rows, identification, pymoo_framework, sample_replays
 from armid.bench.memory import beyond_output, forget_peak, grown, measured_apart, memory_rows, peak_memory
 from armid.bench.sample import NOISE, child_environment, write_sample
+from armid.bench.scale import scale_rows
 from armid.bench.startup import startup_row
 from armid.model import ArmidError
 from armid.record import read_campaign
@@ -87,3 +88,11 @@ def test_start_up_says_why_the_command_failed() -> None:
 def test_a_child_finds_this_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", "elsewhere")
     assert child_environment()["PYTHONPATH"].endswith("elsewhere")
+
+
+@pytest.mark.slow
+def test_large_campaigns_are_identified_in_memory_that_is_told() -> None:
+    long, many = scale_rows(20_000, 10)
+    assert (long.what, many.what) == ("identify, 20,000 samples", "identify, 10 records")
+    for row in (long, many):
+        assert row.measured is None or row.measured > 50.0

@@ -8,6 +8,7 @@ from armid.bench.fitness import fitness_rows
 from armid.bench.framework import framework_rows
 from armid.bench.memory import memory_rows
 from armid.bench.row import Row
+from armid.bench.scale import scale_rows
 from armid.bench.startup import ARMID, startup_row
 
 Part = Callable[[], Row | list[Row]]
@@ -23,6 +24,7 @@ def bench_parts(quick: bool = False, command: Sequence[str] = ARMID) -> dict[str
             "fitness": partial(fitness_rows, rounds=5),
             "framework": partial(framework_rows, rounds=2),
             "memory": partial(memory_rows, n_candidates=400),
+            "scale": partial(scale_rows, n_samples=100_000, n_records=50),
             "second start": partial(startup_row, rounds=3, command=command),
         }
     return {
@@ -32,6 +34,7 @@ def bench_parts(quick: bool = False, command: Sequence[str] = ARMID) -> dict[str
         "fitness": fitness_rows,
         "framework": framework_rows,
         "memory": memory_rows,
+        "scale": scale_rows,
         "second start": partial(startup_row, command=command),
     }
 

@@ -45,7 +45,8 @@ def study_command(
     from armid.study.study import read_study  # noqa: PLC0415
 
     with Watch() as watch:
-        ending = run(read_study(study, absolute(plugins)), jobs, dask, out, time_limit, only, retry, watch.update)
+        known = read_study(study, absolute(plugins))
+        ending = run(known, jobs, dask, out, time_limit, only, retry, watch.update, study)
     for line in words(ending):
         print(line)
     if ending.interrupted:

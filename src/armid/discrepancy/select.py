@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from armid.discrepancy.evidence import WhiteRecords
+from armid.discrepancy.evidence import BLOCKS, WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from
 from armid.discrepancy.library import with_evidence
 from armid.discrepancy.names import LOOSE
+from armid.identifiability.purchase import BOX
 from armid.model import ArmidError
 
 Array = NDArray[np.float64]
+Part = NDArray[np.int64]
 # Chance at which noise alone gets an effect added, all candidates together.
 FAMILYWISE = 1e-3
 
@@ -58,18 +60,42 @@ def compare(smaller: Fit, larger: Fit, n_candidates: int, n_shapes: int) -> Verd
     p = min(1.0, n_candidates * n_shapes * float(f_distribution.sf(max(ratio, 0.0), 1, known)))
     if p >= FAMILYWISE or gain <= 0.0:
         return Verdict(float(gain), p, (np.nan, np.nan))
-    return Verdict(float(gain), p, (left_out(smaller), left_out(larger)))
+    return Verdict(float(gain), p, left_out(smaller, larger))
 
 
-def left_out(fit: Fit) -> float:
-    """Return the sum of squares on each manoeuvre (or block of time), left out of the fit in turn.
+def left_out(smaller: Fit, larger: Fit) -> tuple[float, float]:
+    """Return the sums of squares of two models on each manoeuvre (or block of time), left out of the fits in turn.
 
     Infinite where a fit without a part diverges on it.
     """
-    return float(sum(left_out_part(fit, part) for part in fit.records.evidence.parts()))
+    parts = parts_to_judge(smaller, larger)
+    before, after = (float(sum(left_out_part(fit, part) for part in parts)) for fit in (smaller, larger))
+    return before, after
 
 
-def left_out_part(fit: Fit, part: NDArray[np.int64]) -> float:
+def parts_to_judge(smaller: Fit, larger: Fit) -> list[Part]:
+    """Return what is left out in turn: whole manoeuvres, of two that do not determine each other blocks of time.
+
+    What one manoeuvre predicts of another says nothing of an effect where the parameters that it leaves undetermined
+    may change that prediction by more than the effect is to explain.
+    """
+    whole = larger.records.evidence.parts()
+    if len(whole) != 2:
+        return whole
+    judged = [np.array_split(part, BLOCKS) if is_undetermined(smaller, larger, part) else [part] for part in whole]
+    return [part for parts in judged for part in parts]
+
+
+def is_undetermined(smaller: Fit, larger: Fit, part: Part) -> bool:
+    """Tell whether the rest predicts a part with a larger variance than the mean square that it is to explain there."""
+    rest = np.delete(larger.jacobian, part, axis=0)
+    information = rest.T @ rest + BOX * np.eye(larger.n_free)
+    slopes = larger.jacobian[part]
+    spread = float(np.mean(np.einsum("ij,ij->i", slopes, np.linalg.solve(information, slopes.T).T)))
+    return spread > float(np.mean(smaller.residual[part] ** 2))
+
+
+def left_out_part(fit: Fit, part: Part) -> float:
     """Return the sum of squares on one part of a fit to the others."""
     records, z = shapes_held(fit)
     try:

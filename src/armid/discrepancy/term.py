@@ -160,4 +160,7 @@ def earned(smaller: Fit, larger: Fit) -> bool:
     known = min((level.n_slow for level in larger.records.evidence.levels if level.known), default=n_eff)
     p = float(f_distribution.sf(max(ratio, 0.0) / extra, extra, known))
     cheaper = criterion(larger, n_eff) < criterion(smaller, n_eff)
-    return p < FAMILYWISE and cheaper and left_out(larger) < left_out(smaller)
+    if p >= FAMILYWISE or not cheaper:
+        return False
+    before, after = left_out(smaller, larger)
+    return after < before

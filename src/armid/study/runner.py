@@ -71,7 +71,7 @@ def run_study(
     from armid.study.results import load_study  # noqa: PLC0415 - pandas takes time to import, and workers need none
 
     study = read_study(path, absolute(plugins))
-    ending = run(study, jobs, dask, out, time_limit, only, retry)
+    ending = run(study, jobs, dask, out, time_limit, only, retry, file=path)
     if ending.interrupted:
         raise KeyboardInterrupt
     return load_study(ending.folder)
@@ -86,10 +86,12 @@ def run(
     only: str = "*",
     retry: bool = False,
     told: Told = lambda counts, outcome: None,
+    file: str | Path = "",
 ) -> Ending:
     """Run what is missing of a study that was read; arguments and errors as `run_study`.
 
     told: called with the counts at the start once, then with each finished run. Ctrl-C ends it without an error.
+    file: the study's, as the command named it.
     """
     began = time.monotonic()
     chosen = pattern_of(only, study)
@@ -99,7 +101,8 @@ def run(
         function(kind.checked_by)(study)
     folder = RESULTS / study.name if out is None else Path(out)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
-        described = function(kind.described_by)(study, folder) | {"file": file_as_told(Path(path))}
+        told_as = file_as_told(Path(file or f"{study.name}.toml"))
+        described = function(kind.described_by)(study, folder) | {"file": told_as}
         store.plan(described, function(kind.planned_by)(study))
         if retry:
             store.forget_failed()

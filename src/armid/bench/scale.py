@@ -1,0 +1,83 @@
+"""Identification of a long record and of many records: that it works, and its peak memory in a process of its own."""
+
+import contextlib
+import io
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from armid.bench.memory import MEGABYTE, peak_memory
+from armid.bench.row import Row
+from armid.bench.sample import NOISE, REST, TOML, child_environment, write_sample
+from armid.bench.task import arm_task
+from armid.model import ArmidError
+from armid.record import write_campaign
+
+POPULATION, BUDGET, N_SAMPLES = 80, 160, 701
+RECORD = TOML[TOML.index("[[records]]") :]
+CHILD = "from armid.bench.scale import peak_of; print(peak_of({!r}))"
+
+
+def write_many(folder: Path, n_records: int, seed: int = 3) -> Path:
+    """Write a campaign of as many records of one motion, each with noise of its own."""
+    task, rng = arm_task(1, N_SAMPLES), np.random.default_rng(seed)
+    speed = np.concatenate([np.zeros(REST), task.run().output[0]])
+    times = np.arange(-REST, N_SAMPLES) * task.manoeuvre.interval
+    names = [f"lower_{i:03d}.csv" for i in range(n_records)]
+    noisy = [np.rad2deg(speed + rng.normal(0.0, NOISE, speed.size)) for _ in names]
+    columns = {n: {"time_s": times, "angular_velocity_deg_s": v} for n, v in zip(names, noisy, strict=True)}
+    text = TOML.replace(RECORD, "".join(RECORD.replace("lower.csv", name) for name in names))
+    return write_campaign(folder, text, columns)
+
+
+def peak_of(folder: str) -> int:
+    """Identify a campaign as the command does, and return the peak memory of this process [byte], -1 if not known.
+
+    Raises ArmidError when the command fails.
+    """
+    from armid.cli.main import main  # noqa: PLC0415 - the layer above, which only this process runs
+
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        try:
+            main(["identify", folder, "--budget", str(BUDGET)])
+        except SystemExit as end:
+            if end.code:
+                raise ArmidError(f"`armid identify` ended with exit code {end.code}") from None
+    peak = peak_memory()
+    return -1 if peak is None else peak
+
+
+def peak_apart(folder: Path) -> int:
+    """Return `peak_of` of a fresh process [byte].
+
+    Raises ArmidError when it fails.
+    """
+    command = [sys.executable, "-c", CHILD.format(str(folder))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=child_environment())
+    if done.returncode:
+        raise ArmidError(f"the identification of a large campaign failed: {done.stderr.strip().splitlines()[-1]}")
+    return int(done.stdout.split()[-1])
+
+
+def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
+    """Measure the peak memory of `armid identify` on a long record, and on many records."""
+    with tempfile.TemporaryDirectory(prefix="armid-") as place:
+        long = peak_apart(write_sample(Path(place) / "long", n_samples))
+        many = peak_apart(write_many(Path(place) / "many", n_records))
+    return [
+        scale_row(f"identify, {n_samples:,} samples", long, n_samples),
+        scale_row(f"identify, {n_records:,} records", many, n_records * N_SAMPLES),
+    ]
+
+
+def scale_row(what: str, peak: int, n_values: int) -> Row:
+    """Return the row of one peak [byte], beside what the signals of a population take."""
+    if peak < 0:
+        return Row(what, None, "MB", note="this system does not tell the peak memory of a process")
+    signals = POPULATION * n_values * 8
+    note = f"peak of the whole process, {BUDGET} simulations in populations of {POPULATION}"
+    return Row(what, peak / MEGABYTE, "MB", "a population's signals", peak / signals, note=note)

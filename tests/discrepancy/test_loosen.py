@@ -1,0 +1,51 @@
+"""Shapes that are fixed by declaration, set free where a model is among the best."""
+
+import numpy as np
+import pytest
+
+from armid.discrepancy.evidence import evidence_of
+from armid.discrepancy.library import library_of
+from armid.discrepancy.loosen import best_along, loosened
+from armid.discrepancy.search import Search
+from armid.model import EFFECTS, Model
+from armid.record import read_campaign
+
+MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
+
+
+def library(folder, name):
+    campaign = read_campaign(folder)
+    model = Model(campaign.plant)
+    evidence = evidence_of(campaign.train, model.plant)
+    return library_of(model, {name: EFFECTS[name]}, evidence, campaign.parameters, {}, {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "told", "shape", "expected", "within"), [
+    ("shell_rocking", ("rocking_hz=6", "rocking_stop=0.008"), "hardening", 0.0077, 0.001),
+    ("stribeck", ("stribeck=60", "stribeck_exponent=1"), "exponent", 1.0, 0.15),
+    ("controller_delay", ("controller_period=0.012",), "period", 0.012, 0.0015),
+    ("winding_heating", ("winding_heating=5e-5", "winding_cooling=2.5"), "cooling", 2.5, 0.4),
+])  # fmt: skip
+def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, told, shape, expected, within):
+    found = Search(library(stand(*MANOEUVRES, "--effect", *told), name))
+    last = found.run()[-1].best
+    assert last.active == (f"{name}+",)
+    assert last.values[f"{name}.{shape}"] == pytest.approx(expected, abs=within)
+    usual = found.fits[frozenset((name,))]
+    assert last.chi2 < usual.chi2
+    again = loosened(usual, name, found.library)
+    assert again.chi2 == pytest.approx(last.chi2, rel=1e-6)
+
+
+class Narrow:
+    """A sum of squares with a narrow valley along its second parameter."""
+
+    def chi2(self, Z):
+        return np.where(np.abs(Z[:, 1] - 0.7123) < 0.002, 1.0, 10.0) + (Z[:, 0] - 0.2) ** 2
+
+
+def test_a_narrow_valley_is_found_along_one_parameter():
+    best = best_along(Narrow(), np.array([0.5, 0.5]), 1)
+    assert best[0] == 0.5
+    assert best[1] == pytest.approx(0.7123, abs=0.002)
