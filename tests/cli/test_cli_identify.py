@@ -164,3 +164,13 @@ def test_the_interval_is_that_of_the_information(identified, paper_arm, arm, arm
         told = result["parameters"][name]
         assert told["high"] - told["value"] == pytest.approx(half, rel=1e-6)
         assert told["value"] - told["low"] == pytest.approx(half, rel=1e-6)
+
+
+def test_a_value_far_outside_the_declared_range_is_taken_with_a_warning(run, paper_arm_folder):
+    """3.05 for 3.05e6 is what a forgotten factor of the unit gives."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        ran = run("identify", paper_arm_folder, "--fix", "p0=3.05", *QUICK)
+    assert ran.code == 0
+    said = "--fix p0=3.05 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa; it is taken as it is"
+    assert ran.err == f"armid: warning: {said}\n"

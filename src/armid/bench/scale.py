@@ -1,7 +1,5 @@
 """Identification of a long record and of many records: that it works, and its peak memory in a process of its own."""
 
-import contextlib
-import io
 import subprocess
 import sys
 import tempfile
@@ -9,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armid.bench.memory import MEGABYTE, peak_memory
+from armid.bench.memory import MEGABYTE
 from armid.bench.row import Row
 from armid.bench.sample import NOISE, REST, TOML, child_environment, write_sample
 from armid.bench.task import arm_task
@@ -18,7 +16,17 @@ from armid.record import write_campaign
 
 POPULATION, BUDGET, N_SAMPLES = 80, 160, 701
 RECORD = TOML[TOML.index("[[records]]") :]
-CHILD = "from armid.bench.scale import peak_of; print(peak_of({!r}))"
+# What the command takes, told by the process that ran it: -1 where the system does not tell.
+CHILD = """
+from armid.cli.main import main
+from armid.bench.memory import peak_memory
+try:
+    main(["identify", {folder!r}, "--budget", "{budget}"])
+except SystemExit as end:
+    if end.code:
+        raise
+print(peak_memory() or -1)
+"""
 
 
 def write_many(folder: Path, n_records: int, seed: int = 3) -> Path:
@@ -33,30 +41,12 @@ def write_many(folder: Path, n_records: int, seed: int = 3) -> Path:
     return write_campaign(folder, text, columns)
 
 
-def peak_of(folder: str) -> int:
-    """Identify a campaign as the command does, and return the peak memory of this process [byte], -1 if not known.
-
-    Raises ArmidError when the command fails.
-    """
-    from armid.cli.main import main  # noqa: PLC0415 - the layer above, which only this process runs
-
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said):
-        try:
-            main(["identify", folder, "--budget", str(BUDGET)])
-        except SystemExit as end:
-            if end.code:
-                raise ArmidError(f"`armid identify` ended with exit code {end.code}") from None
-    peak = peak_memory()
-    return -1 if peak is None else peak
-
-
 def peak_apart(folder: Path) -> int:
-    """Return `peak_of` of a fresh process [byte].
+    """Identify a campaign as the command does, and return the peak memory of its process [byte], -1 if not known.
 
     Raises ArmidError when it fails.
     """
-    command = [sys.executable, "-c", CHILD.format(str(folder))]
+    command = [sys.executable, "-c", CHILD.format(folder=str(folder), budget=BUDGET)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=child_environment())
     if done.returncode:
         raise ArmidError(f"the identification of a large campaign failed: {done.stderr.strip().splitlines()[-1]}")

@@ -13,8 +13,8 @@ from armid.cli.options import (
     campaign_argument,
     effects_option,
     examples,
+    fixed_values,
     intervals,
-    numbers,
     opened,
     plugin_option,
 )
@@ -60,7 +60,7 @@ def close_loop_command(
 
     registry, read, model = opened(campaign, effects, plugins, window)
     wanted = looked_for(registry.effects, candidates, without)
-    overrides = intervals(bounds, "--bounds"), numbers(fix, "--fix")
+    overrides = intervals(bounds, "--bounds"), fixed_values(fix, model)
     refuse_unwritable(out)
     with Status() as status:
         found = close_loop(model, read, wanted, default_rng(seed), *overrides, threads=threads, told=status.tell)

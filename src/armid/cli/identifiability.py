@@ -17,9 +17,9 @@ from armid.cli.options import (
     campaign_argument,
     effects_option,
     examples,
+    fixed_values,
     intervals,
     number,
-    numbers,
     opened,
     plugin_option,
 )
@@ -77,7 +77,7 @@ def identifiability_command(
     if at and source is not None:
         raise ArmidError("--at and --from are both given: one point is expected")
     _, read, model = opened(campaign, effects, plugins, window)
-    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
+    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), fixed_values(fix, model))
     point = point_of(space, at, source)
     if out is not None:
         refuse_unwritable(out)

@@ -17,8 +17,8 @@ from armid.cli.options import (
     chosen,
     effects_option,
     examples,
+    fixed_values,
     intervals,
-    numbers,
     opened,
     plugin_option,
     value_of,
@@ -73,7 +73,7 @@ def identify_command(
     from armid.problem import space_of  # noqa: PLC0415
 
     registry, read, model = opened(campaign, effects, plugins, window)
-    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), numbers(fix, "--fix"))
+    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), fixed_values(fix, model))
     distance: Any = chosen(fitness, registry.fitness, "fitness")
     searcher = registry.identifier_of(identifier)
     searcher = searcher.with_options({n: value_of(v) for n, v in assignments(options, "--option").items()})

@@ -1,6 +1,8 @@
 """Options that several commands share, and how their texts become values."""
 
+import warnings
 from collections.abc import Iterable
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,6 +14,8 @@ from armid.registry import Registry, load_registry
 if TYPE_CHECKING:
     from armid.record import Campaign
 
+# By such a factor a value misses its declared range that was told in another unit.
+FAR = 100.0
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
 plugin_option = click.option(
     "--plugin", "plugins", multiple=True, metavar="FILE.py:attribute",
@@ -95,6 +99,19 @@ def value_of(text: str) -> float | int | bool | str:
 def numbers(texts: Iterable[str], option: str) -> dict[str, float]:
     """Return NAME -> number."""
     return {name: number(value, f"{option} {name}") for name, value in assignments(texts, option).items()}
+
+
+def fixed_values(texts: Iterable[str], model: Model) -> dict[str, float]:
+    """Return NAME -> number of --fix, SI; warn of one far outside the declared range, as a forgotten factor gives."""
+    found = numbers(texts, "--fix")
+    for name, value in found.items():
+        p = model.parameters.get(name)
+        if p is None or not isfinite(value):
+            continue
+        if abs(value) > FAR * max(abs(p.low), abs(p.high)) or FAR * value < p.low:
+            text = f"--fix {name}={value:g} is far outside the declared range, {p.low:g} to {p.high:g} {p.unit}"
+            warnings.warn(f"{text}; it is taken as it is", stacklevel=2)
+    return found
 
 
 def interval(text: str, option: str) -> tuple[float, float]:

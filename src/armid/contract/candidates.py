@@ -54,6 +54,11 @@ def corners(model: Model, effect: Effect) -> Array:
     return np.array([list((values | dict(zip(names, corner, strict=True))).values()) for corner in product(*bounds)])
 
 
+def strengths_of(effect: Effect) -> list[Parameter]:
+    """Return the parameters with a null value; one that is fixed by declaration is none, as nothing traces by it."""
+    return [p for p in effect.parameters if p.null is not None and p.fixed is None]
+
+
 def from_null(model: Model, effect: Effect, shares: Array) -> Array:
     """Return nominal values with each strength of an effect in turn at shares of its range from its null.
 
@@ -61,7 +66,7 @@ def from_null(model: Model, effect: Effect, shares: Array) -> Array:
     """
     start, names = nominal(model), list(model.parameters)
     moved = []
-    for name in (f"{effect.name}.{p.name}" for p in effect.parameters if p.null is not None):
+    for name in (f"{effect.name}.{p.name}" for p in strengths_of(effect)):
         p, rows = model.parameters[name], np.tile(start, (len(shares), 1))
         assert p.null is not None
         rows[:, names.index(name)] += shares * (p.high - p.low) * (1.0 if p.high > p.null else -1.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.contract.candidates import at_null, away, corners, from_null, nominal, over_box
+from armid.contract.candidates import at_null, away, corners, from_null, nominal, over_box, strengths_of
 from armid.contract.finding import Finding
 from armid.contract.manoeuvres import trial_manoeuvres
 from armid.contract.parameters import finding
@@ -84,7 +84,7 @@ def responds(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Findi
         output = simulate(model, m, both, calibrate(model, m, both, spans=False).schedule).output
         moved = np.abs(output[1:] - output[0]).max(axis=1).reshape(len(strengths), 2) / SMALL
         answers = np.where(moved[:, 1:] > answers[:, 1:], moved, answers)
-    names = [p.name for p in effect.parameters if p.null is not None]
+    names = [p.name for p in strengths_of(effect)]
     steady = (answers[:, 1] > 0.0) & (np.abs(answers[:, 0] - answers[:, 1]) <= BENT * answers[:, 1])
     bent = [n for n, kept in zip(names, steady, strict=True) if not kept]
     return finding("responds", bent, "at null the signal does not answer in proportion to {}: nothing would trace it",
