@@ -25,5 +25,6 @@ def advice_figure(found: DataFrame, limit: float) -> Any:
         axis.errorbar(rate, place, xerr=errors, fmt="os"[i], ms=6, lw=1.6, color=COLOURS[i], label=f"{choice} record")
     axis.set_yticks(range(len(found)), [f"{p} ({n})" for p, n in zip(found["pair"], found["n"], strict=True)])
     axis.set(ylim=(len(found) - 0.5, -0.5), xlim=(-2, 102), xlabel="told apart [%], with 95 % interval")
+    figure.get_layout_engine().set(w_pad=0.12)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
