@@ -10,9 +10,11 @@ from armid.record import write_campaign
 
 REST, NOISE = 100, np.deg2rad(0.2)
 
-TOML = f"""\
+HEAD = f"""\
 name = "bench"
 plant = "{PLANT}"
+"""
+RECORD = """\
 [[records]]
 file = "lower.csv"
 role = "train"
@@ -23,14 +25,19 @@ supply_V = 28.0
 """
 
 
-def write_sample(folder: Path, n_samples: int = 701, seed: int = 2) -> Path:
-    """Write the campaign: 0.1 s of rest, then n_samples at 1 kHz, with white noise of 0.2 deg/s."""
-    task = arm_task(1, n_samples)
+def write_sample(folder: Path, n_samples: int = 701, seed: int = 2, n_records: int = 1) -> Path:
+    """Write the campaign: 0.1 s of rest, then n_samples at 1 kHz, with white noise of 0.2 deg/s.
+
+    n_records: of the same motion, each with noise of its own.
+    """
+    task, rng = arm_task(1, n_samples), np.random.default_rng(seed)
     speed = np.concatenate([np.zeros(REST), task.run().output[0]])
     times = np.arange(-REST, n_samples) * task.manoeuvre.interval
-    noisy = np.rad2deg(speed + np.random.default_rng(seed).normal(0.0, NOISE, speed.size))
-    columns = {"time_s": times, "angular_velocity_deg_s": noisy}
-    return write_campaign(folder, TOML, {"lower.csv": columns})
+    names = [f"lower_{i}.csv" if i else "lower.csv" for i in range(n_records)]
+    noisy = [np.rad2deg(speed + rng.normal(0.0, NOISE, speed.size)) for _ in names]
+    columns = {n: {"time_s": times, "angular_velocity_deg_s": v} for n, v in zip(names, noisy, strict=True)}
+    text = HEAD + "".join(RECORD.replace("lower.csv", name) for name in names)
+    return write_campaign(folder, text, columns)
 
 
 def child_environment() -> dict[str, str]:

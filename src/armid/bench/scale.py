@@ -5,17 +5,13 @@ import sys
 import tempfile
 from pathlib import Path
 
-import numpy as np
-
 from armid.bench.memory import MEGABYTE
 from armid.bench.row import Row
-from armid.bench.sample import NOISE, REST, TOML, child_environment, write_sample
-from armid.bench.task import arm_task
+from armid.bench.sample import child_environment, write_sample
+from armid.bench.task import N_SAMPLES
 from armid.model import ArmidError
-from armid.record import write_campaign
 
-POPULATION, BUDGET, N_SAMPLES = 80, 160, 701
-RECORD = TOML[TOML.index("[[records]]") :]
+POPULATION, BUDGET = 80, 160
 # What the command takes, told by the process that ran it: -1 where the system does not tell.
 CHILD = """
 from armid.cli.main import main
@@ -27,18 +23,6 @@ except SystemExit as end:
         raise
 print(peak_memory() or -1)
 """
-
-
-def write_many(folder: Path, n_records: int, seed: int = 3) -> Path:
-    """Write a campaign of as many records of one motion, each with noise of its own."""
-    task, rng = arm_task(1, N_SAMPLES), np.random.default_rng(seed)
-    speed = np.concatenate([np.zeros(REST), task.run().output[0]])
-    times = np.arange(-REST, N_SAMPLES) * task.manoeuvre.interval
-    names = [f"lower_{i:03d}.csv" for i in range(n_records)]
-    noisy = [np.rad2deg(speed + rng.normal(0.0, NOISE, speed.size)) for _ in names]
-    columns = {n: {"time_s": times, "angular_velocity_deg_s": v} for n, v in zip(names, noisy, strict=True)}
-    text = TOML.replace(RECORD, "".join(RECORD.replace("lower.csv", name) for name in names))
-    return write_campaign(folder, text, columns)
 
 
 def peak_apart(folder: Path) -> int:
@@ -57,7 +41,7 @@ def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
     """Measure the peak memory of `armid identify` on a long record, and on many records."""
     with tempfile.TemporaryDirectory(prefix="armid-") as place:
         long = peak_apart(write_sample(Path(place) / "long", n_samples))
-        many = peak_apart(write_many(Path(place) / "many", n_records))
+        many = peak_apart(write_sample(Path(place) / "many", N_SAMPLES, n_records=n_records))
     return [
         scale_row(f"identify, {n_samples:,} samples", long, n_samples),
         scale_row(f"identify, {n_records:,} records", many, n_records * N_SAMPLES),

@@ -46,7 +46,7 @@ def study_command(
 
     with Watch() as watch:
         known = read_study(study, absolute(plugins))
-        ending = run(known, jobs, dask, out, time_limit, only, retry, watch.update, study)
+        ending = run(known, study, jobs, dask, out, time_limit, only, retry, watch.update)
     for line in words(ending):
         print(line)
     if ending.interrupted:

@@ -138,7 +138,7 @@ class Library:
         self, records: Sequence[Record], model: Model, space: Space, near: Mapping[str, float]
     ) -> tuple[Replay, ...]:
         """Make records ready to be simulated (see `made_ready`); near: values about which it is calibrated."""
-        return made_ready(records, model, space, near, 1)
+        return made_ready(records, model, space, near)
 
     def each(self, work: Callable[[S], T], items: Iterable[S]) -> list[T]:
         """Return the work of each item, in order, the items shared among the threads."""

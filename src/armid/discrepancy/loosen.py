@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from armid.discrepancy.evidence import WhiteRecords
 from armid.discrepancy.fit import Fit, fit_from
 from armid.discrepancy.library import Library
-from armid.discrepancy.names import LOOSE
+from armid.discrepancy.names import loose
 from armid.discrepancy.trace import at_null
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ def loosened(fit: Fit, name: str, library: Library) -> Fit:
 
     A declared shape that is not the machine's leaves a residual that another effect would be taken for.
     """
-    active = tuple(n + LOOSE if n == name else n for n in fit.active)
+    active = loose(fit.active, name)
     records = library.problem(active, fit.values)
     known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
     z = records.shares(np.array([known[n] for n in records.space.free_names]))

@@ -1,6 +1,6 @@
 """Keys of the candidates: one for each form of an effect, and a mark on those whose fixed shape was set free."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from armid.model import Effect
@@ -14,6 +14,15 @@ UNNAMED, SHOWN_AS = "unnamed_", "unnamed:"
 def base(key: str) -> str:
     """Return a key without the mark."""
     return key.removesuffix(LOOSE)
+
+
+def loose(active: Iterable[str], name: str) -> tuple[str, ...]:
+    """Return keys with the mark on one of them.
+
+    >>> loose(("coulomb", "tilt"), "coulomb")
+    ('coulomb+', 'tilt')
+    """
+    return tuple(key + LOOSE if key == name else key for key in active)
 
 
 def is_empirical(name: str) -> bool:

@@ -19,7 +19,7 @@ SUBSTEPS = (1, 2, 4, 8)
 
 
 def made_ready(
-    records: Sequence[Record], model: Model, space: Space, near: Mapping[str, float], threads: int
+    records: Sequence[Record], model: Model, space: Space, near: Mapping[str, float]
 ) -> tuple[Replay, ...]:
     """Make records ready to be simulated, on the engine's standard accuracy: the evidence's noise hides its error.
 
@@ -34,7 +34,7 @@ def made_ready(
         for key, piece in zip(keys, pieces, strict=True):
             if key not in known:
                 known[key] = quickly_calibrated(model, piece.manoeuvre, spread)
-        ready.append(Replay(record, model, pieces, tuple(known[key] for key in keys), threads))
+        ready.append(Replay(record, model, pieces, tuple(known[key] for key in keys)))
     return tuple(ready)
 
 
@@ -54,7 +54,7 @@ def with_finest(replays: Sequence[Replay]) -> Replay:
     each = zip(*(r.calibrations for r in replays), strict=True)
     finest = tuple(max(c, key=lambda one: one.schedule.substeps) for c in each)
     first = replays[0]
-    return Replay(first.record, first.model, first.pieces, finest, first.threads)
+    return Replay(first.record, first.model, first.pieces, finest)
 
 
 def neighbourhood(space: Space, near: Mapping[str, float]) -> tuple[Array, Array]:

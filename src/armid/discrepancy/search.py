@@ -12,7 +12,7 @@ from armid.discrepancy.diagnose import diagnose
 from armid.discrepancy.fit import Fit, fit_from, fit_globally
 from armid.discrepancy.library import Library
 from armid.discrepancy.loosen import loosened
-from armid.discrepancy.names import LOOSE, base
+from armid.discrepancy.names import LOOSE, base, loose
 from armid.discrepancy.ranking import SURE, different, leading, promising, ranked, within_reach
 from armid.discrepancy.select import Verdict, compare
 from armid.discrepancy.trace import Score, accurate, refitted, start_of, substituted, traced
@@ -141,16 +141,18 @@ class Search:
         for fit in fits:
             for name in fit.active:
                 if not name.endswith(LOOSE) and self.library.loosened(name):
-                    key = frozenset(n + LOOSE if n == name else n for n in fit.active)
-                    tried.setdefault(key, partial(loosened, fit, name, self.library))
+                    tried.setdefault(frozenset(loose(fit.active, name)), partial(loosened, fit, name, self.library))
         self.fit_each(tried)
 
     def extend(self, parent: Fit) -> None:
         """Fit a model with each of the leading candidates added, beyond the first few where it is in reach."""
         scores = leading(parent, self.trace(parent))
-        self.fit_each({key_with(parent, s): partial(refitted, parent, s, self.library) for s in scores[:SURE]})
-        near = [s for s in scores[SURE:] if within_reach(parent, s, self.fits)]
-        self.fit_each({key_with(parent, s): partial(refitted, parent, s, self.library) for s in near})
+        self.refit(parent, scores[:SURE])
+        self.refit(parent, [s for s in scores[SURE:] if within_reach(parent, s, self.fits)])
+
+    def refit(self, parent: Fit, scores: Iterable[Score]) -> None:
+        """Fit a model with each of some candidates added."""
+        self.fit_each({frozenset((*parent.active, s.name)): partial(refitted, parent, s, self.library) for s in scores})
 
     def fit_each(self, tried: Mapping[frozenset[str], Trial]) -> None:
         """Make the fits that are not known yet, side by side; one that diverges whatever its start is left out."""
@@ -194,8 +196,3 @@ def unless_diverged(trial: Callable[[], T]) -> T | None:
         return trial()
     except ArmidError:
         return None
-
-
-def key_with(parent: Fit, found: Score) -> frozenset[str]:
-    """Return the key of a model with a candidate added."""
-    return frozenset((*parent.active, found.name))

@@ -17,5 +17,6 @@ def side_by_side(work: Callable[[S], T], items: Iterable[S], threads: int) -> li
     todo = list(items)
     if threads < 2 or len(todo) < 2:
         return [work(item) for item in todo]
+    # A pool of its own: work that waited for the engine's lanes in the same pool would wait for itself.
     with ThreadPoolExecutor(threads, thread_name_prefix="armid") as pool:
         return list(pool.map(work, todo))

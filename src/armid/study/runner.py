@@ -71,7 +71,7 @@ def run_study(
     from armid.study.results import load_study  # noqa: PLC0415 - pandas takes time to import, and workers need none
 
     study = read_study(path, absolute(plugins))
-    ending = run(study, jobs, dask, out, time_limit, only, retry, file=path)
+    ending = run(study, path, jobs, dask, out, time_limit, only, retry)
     if ending.interrupted:
         raise KeyboardInterrupt
     return load_study(ending.folder)
@@ -79,6 +79,7 @@ def run_study(
 
 def run(
     study: AnyStudy,
+    file: str | Path,
     jobs: int | None = None,
     dask: str | None = None,
     out: str | Path | None = None,
@@ -86,12 +87,11 @@ def run(
     only: str = "*",
     retry: bool = False,
     told: Told = lambda counts, outcome: None,
-    file: str | Path = "",
 ) -> Ending:
     """Run what is missing of a study that was read; arguments and errors as `run_study`.
 
-    told: called with the counts at the start once, then with each finished run. Ctrl-C ends it without an error.
-    file: the study's, as the command named it.
+    file: the study's, as the command named it. told: called with the counts at the start once, then with each finished
+    run. Ctrl-C ends it without an error.
     """
     began = time.monotonic()
     chosen = pattern_of(only, study)
@@ -101,8 +101,7 @@ def run(
         function(kind.checked_by)(study)
     folder = RESULTS / study.name if out is None else Path(out)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
-        told_as = file_as_told(Path(file or f"{study.name}.toml"))
-        described = function(kind.described_by)(study, folder) | {"file": told_as}
+        described = function(kind.described_by)(study, folder) | {"file": file_as_told(Path(file))}
         store.plan(described, function(kind.planned_by)(study))
         if retry:
             store.forget_failed()
