@@ -9,7 +9,7 @@ anything: tables (CSV), pages (Markdown), report.json or result.json, and the fi
 as PNG of 90 dpi in 256 colours. A page loses its other figures and says once which command makes them.
 
 Run it with the Python that armid is installed in. A study that was interrupted goes on where it was. The records of
-`emps` and `dfki` are not part of the repository: README.md says how to import them into studies/campaigns first.
+`emps` and `dfki` are not part of the repository: README.md says how to import them into out/campaigns first.
 """
 
 import argparse
@@ -48,12 +48,12 @@ def study(name: str, *figures: str, before: tuple[tuple[str, str], ...] = ()) ->
     return Recipe((f"armid study studies/{name}.toml --out out/{name}", f"armid report out/{name}"), figures, before)
 
 
-def loop(name: str, campaign: str, *figures: str, more: tuple[str, ...] = ()) -> Recipe:
-    """Return the recipe of a closed loop on a campaign."""
-    return Recipe((f"armid close-loop studies/campaigns/{campaign} --out out/{name}", *more), figures)
+def loop(name: str, *figures: str, campaign: str = "", more: tuple[str, ...] = ()) -> Recipe:
+    """Return the recipe of a closed loop; campaign: its folder (studies/campaigns/NAME where none is given)."""
+    return Recipe((f"armid close-loop {campaign or f'studies/campaigns/{name}'} --out out/{name}", *more), figures)
 
 
-EMPS = "armid identify studies/campaigns/emps --effects coulomb,viscous,torque_offset"
+EMPS = "armid identify out/campaigns/emps --effects coulomb,viscous,torque_offset"
 STAND = "python studies/test_stand.py"
 ADVICE, ADVISED = "studies/campaigns/blind_advice", "studies/campaigns/blind_advised"
 RECIPES = {
@@ -69,16 +69,16 @@ RECIPES = {
         ("studies/campaigns/blind", f"{STAND} blind studies/campaigns/blind --seed 53"),
     )),
     "cramer_rao": study("cramer_rao", "cramer_rao"),
-    "dfki_pendulum": loop("dfki_pendulum", "dfki", "residuals"),
-    "emps": loop("emps", "emps", "residuals", more=(
-        "python studies/emps/inverse_model.py studies/campaigns/emps out/emps/inverse_model.md",
+    "dfki_pendulum": loop("dfki_pendulum", "residuals", campaign="out/campaigns/dfki"),
+    "emps": loop("emps", "residuals", campaign="out/campaigns/emps", more=(
+        "python studies/emps/inverse_model.py out/campaigns/emps out/emps/inverse_model.md",
     )),
     "emps_identified": Recipe((f"{EMPS} --fitness rmse --out out/emps_identified",)),
     "fitness": study("fitness", "fitness"),
-    "four_strokes": loop("four_strokes", "four_strokes", "parameters"),
-    "one_stroke": loop("one_stroke", "one_stroke", "parameters"),
+    "four_strokes": loop("four_strokes", "parameters"),
+    "one_stroke": loop("one_stroke", "parameters"),
     "paper_arm": Recipe(("armid identify studies/campaigns/paper_arm --out out/paper_arm",), ("fit",)),
-    "rocking_shell": loop("rocking_shell", "rocking_shell", "residuals", "ranking"),
+    "rocking_shell": loop("rocking_shell", "residuals", "ranking"),
     "table1": study("table1", "table1", "valley_noise_free"),
     "table1_short": study("table1_short"),
     "table2": study("table2", "table2"),

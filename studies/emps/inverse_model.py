@@ -65,7 +65,7 @@ def report(folder: Path) -> str:
     lines = [
         "# EMPS: the inverse model, a second view", "",
         "Force fitted by linear least squares to DATA_EMPS and applied unchanged to DATA_EMPS_PULSES; made by "
-        "`python studies/emps/inverse_model.py studies/campaigns/emps out/emps/inverse_model.md`.", "",
+        "`python studies/emps/inverse_model.py out/campaigns/emps out/emps/inverse_model.md`.", "",
         "| friction | record | force error | published | mass | published |", "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for form in ("symmetric", "asymmetric"):
