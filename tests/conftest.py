@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
 from armid.model import EFFECTS, Model
-from armid.problem import Replay, Space, replays, space_of
+from armid.problem.replay import Replay, replays
+from armid.problem.space import Space, space_of
 from armid.record import Campaign, read_campaign, write_table
 
 # How fast inputs are made hangs on what else the machine does.

@@ -11,7 +11,7 @@ import armid
 
 MODULES = sorted(m.name for m in pkgutil.walk_packages(armid.__path__, "armid.") if m.name != "armid.__main__")
 # equations of one line that are named after what they give, and overloads whose operator is their name
-SPELT_OUT = ("armid.model.plants.", "armid.simulation.lanes.")
+SPELT_OUT = ("armid.model.plants.", "armid.engine.simd")
 
 
 @pytest.mark.parametrize("name", sorted(armid.HOME))

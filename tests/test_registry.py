@@ -9,15 +9,16 @@ import pytest
 from pymoo.algorithms.soo.nonconvex.de import DE
 
 from armid import registry
-from armid.fitness import Fitness
+from armid.errors import ArmidError
 from armid.identifiers import Identifier
-from armid.model import ArmidError, Effect, Model, Parameter
+from armid.model import Effect, Model, Parameter
 from armid.model.plants.driven_axis import driven_axis
+from armid.problem.fitness import Fitness
 from armid.record import read_campaign
 from armid.registry import Registry, load_plugin, load_registry, place_in_plugin
 
 LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
-OWN = '''\
+OWN = """\
 from dataclasses import replace
 
 from armid import Effect, Fitness, Identifier, Parameter
@@ -47,7 +48,7 @@ coulomb = Effect("coulomb", (Parameter("c", "effort", 0.0, 0.5, null=0.0),), {"t
 pso = search
 rmse = largest
 text = "none of ours"
-'''
+"""
 
 
 def torque(omega, c):
@@ -195,4 +196,3 @@ def test_a_campaign_file_loads_no_code(tmp_path, own, key, value, fragment):
     with pytest.raises(ArmidError, match=fragment):
         read_campaign(tmp_path)
     assert not marker.exists()
-

@@ -7,22 +7,26 @@ from importlib import import_module
 from typing import Any
 
 WHERE = {
+    "armid.errors": ("ArmidError",),
     "armid.model": (
-        "EFFECTS", "PLANTS", "ArmidError", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
+        "EFFECTS", "PLANTS", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
         "Parameter", "Plant", "Scales", "State",
     ),
-    "armid.simulation": ("Schedule", "Simulation", "calibrate", "probes", "simulate"),
+    "armid.engine": ("Schedule", "Simulation", "calibrate", "probes", "simulate"),
     "armid.record": ("Campaign", "Record", "read_campaign", "write_campaign"),
-    "armid.fitness": ("FITNESS", "Fitness", "numerical_similarity", "similarity"),
-    "armid.problem": (
-        "IdentificationProblem", "Meter", "MeterTermination", "Space", "replays", "residuals", "space_of",
-    ),
+    "armid.problem.fitness": ("FITNESS", "Fitness"),
+    "armid.problem.meter": ("Meter", "MeterTermination"),
+    "armid.problem.problem": ("IdentificationProblem",),
+    "armid.problem.replay": ("replays", "residuals"),
+    "armid.problem.similarity": ("numerical_similarity", "similarity"),
+    "armid.problem.space": ("Space", "space_of"),
     "armid.identifiers": ("IDENTIFIERS", "Identifier", "PaperPSO", "identifier_of"),
-    "armid.identifiability": (
-        "Examination", "Information", "Profile", "estimate", "examine", "information_at", "refine", "sensitivities",
-    ),
-    "armid.identification": ("Identification", "identify"),
-    "armid.discrepancy": ("ClosedLoop", "close_loop", "report_of"),
+    "armid.estimation.examine": ("Examination", "examine"),
+    "armid.estimation.identify": ("Identification", "identify"),
+    "armid.estimation.information": ("Information", "information_at", "sensitivities"),
+    "armid.estimation.least_squares": ("estimate", "refine"),
+    "armid.estimation.profile": ("Profile",),
+    "armid.loop": ("ClosedLoop", "close_loop", "report_of"),
     "armid.registry": ("Registry", "load_registry"),
     "armid.study.results": ("StudyResults", "load_study"),
     "armid.study.runner": ("run_study",),

@@ -10,7 +10,8 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Any
 
-from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Plant, nearest
+from armid.errors import ArmidError, nearest
+from armid.model import EFFECTS, PLANTS, Effect, Plant
 
 PLUGIN_PREFIX = "armid_plugin_"
 KINDS = ("plants", "effects", "fitness", "identifiers")
@@ -28,20 +29,20 @@ class Registry:
     @property
     def fitness(self) -> dict[str, Any]:
         """Name -> Fitness."""
-        from armid.fitness import FITNESS, as_fitness  # noqa: PLC0415 - compiled code that `simulate` does not need
+        from armid.problem.fitness import FITNESS, as_fitness
 
         return FITNESS | {name: as_fitness(name, own) for name, own in self.own_fitness.items()}
 
     @property
     def identifiers(self) -> dict[str, Any]:
         """Name -> Identifier."""
-        from armid.identifiers import IDENTIFIERS, as_identifier  # noqa: PLC0415 - pymoo takes time to import
+        from armid.identifiers import IDENTIFIERS, as_identifier
 
         return IDENTIFIERS | {name: as_identifier(name, own) for name, own in self.own_identifiers.items()}
 
     def identifier_of(self, name: str) -> Any:
         """Return the Identifier of a name, a chain such as `pso+bobyqa` or `multistart:bobyqa`; errors in words."""
-        from armid.identifiers import identifier_of  # noqa: PLC0415 - pymoo takes time to import
+        from armid.identifiers import identifier_of
 
         return identifier_of(name, self.identifiers)
 

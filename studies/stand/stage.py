@@ -35,9 +35,7 @@ def closed_stage(motion: Motion, state: FloatArray, begin: float, samples: Float
     return _integrate(motion, state, span, tolerance, never, closed_loop=True, t_eval=samples)
 
 
-def closed_piece(
-    motion: Motion, state: FloatArray, span: tuple[float, float], tolerance: float, seen: Signal
-) -> Any:
+def closed_piece(motion: Motion, state: FloatArray, span: tuple[float, float], tolerance: float, seen: Signal) -> Any:
     """Integrate a span [s] in closed loop with a controller that knows the state `seen` at each time."""
     never = _ending(_to_switch(motion), False)
     return _integrate(motion, state, span, tolerance, never, closed_loop=True, seen=seen, dense_output=True)
@@ -62,9 +60,7 @@ def _integrate(
         return motion.rates(values, closed_loop, seen(time) if seen else None)
 
     events = [switch, _ending(_to_stops(motion), True)]
-    found: Any = solve_ivp(
-        rates, span, state, method="DOP853", events=events, rtol=tolerance, atol=tolerance, **wanted
-    )
+    found: Any = solve_ivp(rates, span, state, method="DOP853", events=events, rtol=tolerance, atol=tolerance, **wanted)
     if found.t_events[1].size:
         where = f"at {found.t_events[1][0]:.3f} s, and the stand has no end stops"
         raise RefusalError(f"{motion.manoeuvre.name} would leave the travel of -55 to 45 deg {where}")

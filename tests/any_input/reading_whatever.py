@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.record import Campaign, IrregularSamplingWarning, read_campaign
 
 ARM_TOML = """name = "c00"

@@ -10,10 +10,11 @@ from pymoo.optimize import minimize
 from reading_whatever import many, outcome
 
 from armid.cli.options import assignments, interval, intervals, numbers, value_of
-from armid.contract.trial_problem import Trial
+from armid.contract.identifier import Trial
 from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.model import PLANTS, Model
-from armid.problem import Meter, MeterTermination, space_of
+from armid.problem.meter import Meter, MeterTermination
+from armid.problem.space import space_of
 
 BUDGET = 30
 OPTIONS = (

@@ -12,7 +12,7 @@ from armid.bench.memory import beyond_output, forget_peak, grown, measured_apart
 from armid.bench.sample import NOISE, child_environment, write_sample
 from armid.bench.scale import scale_rows
 from armid.bench.startup import startup_row
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.record import read_campaign
 
 STAND_IN = (sys.executable, "-c", "import sys; assert sys.argv[1] == 'simulate' and sys.argv[3] == '--out'")

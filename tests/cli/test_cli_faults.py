@@ -11,7 +11,7 @@ LOOP = ("--candidates", "viscous", "--threads", "1")
 @pytest.fixture(scope="module")
 def axis(tmp_path_factory):
     """A small campaign."""
-    from armid.new import campaign_text, synthetic_records
+    from armid.cli.new import campaign_text, synthetic_records
     from armid.record import write_campaign
 
     return write_campaign(tmp_path_factory.mktemp("campaign") / "axis", campaign_text("axis"), synthetic_records())

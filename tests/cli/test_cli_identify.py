@@ -100,8 +100,9 @@ def test_a_user_s_effect_and_fitness(identified, mine):
     assert "cubic_drag.c" in result["parameters"]
 
 
-@pytest.mark.parametrize(("fitness", "target"),
-                         [("similarity", "0.9"), ("numerical_similarity", "0.9"), ("rmse", "0.2")])
+@pytest.mark.parametrize(
+    ("fitness", "target"), [("similarity", "0.9"), ("numerical_similarity", "0.9"), ("rmse", "0.2")]
+)
 def test_target_stops_early(identified, fitness, target):
     text, result = identified("--target", target, "--fitness", fitness, "--budget", "5000")
     assert result["used"] < 2000
@@ -154,8 +155,8 @@ def test_a_warning_is_one_line(run, tmp_path, write_axis):
 
 
 def test_the_interval_is_that_of_the_information(identified, paper_arm, arm, arm_space):
-    from armid.identifiability import information_at
-    from armid.problem import replays
+    from armid.estimation.information import information_at
+    from armid.problem.replay import replays
 
     _, result = identified("--window", "0:0.7")
     x = np.array([p["value"] for p in result["parameters"].values()])

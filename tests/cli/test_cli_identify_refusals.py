@@ -61,7 +61,7 @@ def test_a_bad_place_is_refused_before_the_search(refused, paper_arm_folder, tmp
     def never(*_, **__):
         raise AssertionError("the search was started")
 
-    monkeypatch.setattr("armid.identification.identify", never)
+    monkeypatch.setattr("armid.estimation.identify", never)
     (tmp_path / "file").write_text("")
     assert "is a file: a folder is expected" in refused("identify", paper_arm_folder, "--out", tmp_path / "file")
     assert "Not a directory" in refused("identify", paper_arm_folder, "--out", tmp_path / "file" / "out")

@@ -10,9 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from armid.fitness import FITNESS
-from armid.identification import identify
+from armid.estimation.identify import identify
 from armid.identifiers import IDENTIFIERS
+from armid.problem.fitness import FITNESS
 
 pty = pytest.importorskip("pty")
 

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from armid.new import KINDS
+from armid.cli.new import KINDS
 
 FILES = ("fitness", "identifier", pytest.param("effect", marks=pytest.mark.slow), "plant")
 
@@ -105,7 +105,7 @@ def test_check_takes_a_campaign_and_tells_what_does_not_hold(run, refused, tmp_p
     run("new", "campaign", "my_axis")
     toml = tmp_path / "my_axis" / "campaign.toml"
     text = toml.read_text()
-    toml.write_text(text + '[parameters.inertia]\nfixed = 1e-25\n')
+    toml.write_text(text + "[parameters.inertia]\nfixed = 1e-25\n")
     ran = run("check", toml)
     assert ran.code == 1
     assert "FAIL moves in synthetic_train.csv: simulated diverges" in ran.out

@@ -93,7 +93,7 @@ def test_what_a_campaign_fixes_is_taken_unless_it_is_set(run, paper_arm_folder, 
 
 
 def test_an_axis_from_its_first_sample_shown_from_zero_on(run, write_axis, axis_speed, tmp_path):
-    folder = write_axis(tmp_path / "axis", more='[parameters.mass]\nfixed = 2.0\n')
+    folder = write_axis(tmp_path / "axis", more="[parameters.mass]\nfixed = 2.0\n")
     early = folder / "move.csv"
     rows = early.read_text().split()
     shifted = [f"{float(row.split(',')[0]) - 0.5!r},{row.split(',', 1)[1]}" for row in rows[1:]]

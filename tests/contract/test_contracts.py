@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.contract import check_effect, check_fitness, check_identifier, check_plant, check_thing
-from armid.fitness import FITNESS, Fitness
+from armid.contract.check import check_thing
+from armid.contract.effect import check_effect
+from armid.contract.fitness import check_fitness
+from armid.contract.identifier import check_identifier
+from armid.contract.plant import check_plant
 from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.model import EFFECTS, PLANTS, Effect, Parameter, applicable
+from armid.problem.fitness import FITNESS, Fitness
 
 # Compiling takes some 10 s an effect and plant, so all but one of them are left to continuous integration. What every
 # effect keeps is tried on one compiled model of all of them (tests/model/effects); here, whole, one of each kind: a

@@ -12,10 +12,14 @@ import numpy as np
 import pytest
 from pymoo.algorithms.soo.nonconvex.de import DE
 
-from armid.contract import Finding, check_effect, check_fitness, check_identifier, check_plant
-from armid.fitness import Fitness
+from armid.contract.effect import check_effect
+from armid.contract.fitness import check_fitness
+from armid.contract.identifier import check_identifier
+from armid.contract.plant import check_plant
+from armid.contract.trials import Finding
 from armid.identifiers import as_identifier
 from armid.model import EFFECTS, PLANTS, Effect, Guard, Parameter, State
+from armid.problem.fitness import Fitness
 
 AXIS = {"driven_axis": replace(PLANTS["driven_axis"], variants=())}
 LEVEL = Parameter("level", "effort", 0.0, 1.0, null=0.0)
@@ -265,5 +269,3 @@ def test_the_global_generators_are_left_alone() -> None:
     state = random.getstate()
     check_identifier(as_identifier("own", DE))
     assert random.getstate() == state
-
-

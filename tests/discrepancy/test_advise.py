@@ -6,15 +6,29 @@ from functools import cached_property
 import numpy as np
 import pytest
 
-from armid.discrepancy.advise import OFTEN, THRESHOLD, Advice, advice_of, advise, normal_draws
-from armid.discrepancy.foresee import Forecast, Rival, chance, outside, spread_of
-from armid.discrepancy.rehearse import drawn, rehearse
-from armid.identifiability import WeightedRecords, estimate, manoeuvre_grid, noise_weights, refine
-from armid.identifiability.motions import Motions
-from armid.model import EFFECTS, ArmidError
-from armid.problem import Replay, Space, space_of
+from armid.engine import Calibration, Schedule, simulate
+from armid.errors import ArmidError
+from armid.estimation.design import Motions, manoeuvre_grid
+from armid.estimation.least_squares import WeightedRecords, estimate, noise_weights, refine
+from armid.loop.advice import (
+    OFTEN,
+    THRESHOLD,
+    Advice,
+    Forecast,
+    Rival,
+    advice_of,
+    advise,
+    chance,
+    drawn,
+    normal_draws,
+    outside,
+    rehearse,
+    spread_of,
+)
+from armid.model import EFFECTS
+from armid.problem.replay import Replay
+from armid.problem.space import Space, space_of
 from armid.record import Noise, Piece, Record
-from armid.simulation import Calibration, Schedule, simulate
 
 DEGREE = np.pi / 180.0
 NOISE = 0.5 * DEGREE
@@ -81,7 +95,7 @@ def test_chances_of_linear_models_are_those_of_brute_force(seed, apart, monkeypa
     forecast, _ = chance(a, b, ahead, normal_draws(7, 512), THRESHOLD)
     assert forecast == pytest.approx(told, abs=0.05)
     designs = dict(zip("AB", new))
-    monkeypatch.setattr("armid.discrepancy.rehearse.foreseen", lambda rival, *_: _[-1] @ designs[rival.name].T)
+    monkeypatch.setattr("armid.loop.advice.foreseen", lambda rival, *_: _[-1] @ designs[rival.name].T)
     won, apart = rehearse(rivals, 0, None, None, normal_draws(3, 60), THRESHOLD)
     assert won[0] == 1.0
     assert won[1] == pytest.approx(told, abs=0.08)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armid.discrepancy.alike import LIKELY, likest
+from armid.loop.equivalence import LIKELY, likest
 
 T = np.linspace(0.0, 1.0, 400)
 BASIS = np.linalg.qr(np.column_stack([np.ones_like(T), T]))[0]
@@ -27,6 +27,6 @@ def test_none_is_near_where_it_moves_otherwise_the_other_way_or_not_at_all(ray):
 
 
 def test_the_likeness_that_is_asked_for_lies_below_that_of_a_group():
-    from armid.discrepancy.group import ALIKE
+    from armid.loop.equivalence import ALIKE
 
     assert LIKELY < ALIKE

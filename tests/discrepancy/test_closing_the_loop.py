@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.discrepancy import close_loop, report_of
-from armid.model import EFFECTS, ArmidError, Model
+from armid.errors import ArmidError
+from armid.loop import close_loop, report_of
+from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
 pytestmark = pytest.mark.slow

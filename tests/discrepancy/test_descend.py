@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from armid.discrepancy.bins import square_along
-from armid.discrepancy.descend import descend, step_in_box
-from armid.discrepancy.fit import decomposed
+from armid.loop.diagnose import square_along
+from armid.loop.fit import decomposed, descend, step_in_box
 
 
 class Analytic:

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.discrepancy import close_loop, report_of
-from armid.discrepancy.figures import figures_of
-from armid.discrepancy.report import markdown
+from armid.loop import close_loop, report_of
+from armid.loop.document import markdown
+from armid.loop.figures import figures_of
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 

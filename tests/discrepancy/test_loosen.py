@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from armid.discrepancy.evidence import evidence_of
-from armid.discrepancy.library import library_of
-from armid.discrepancy.loosen import best_along, loosened
-from armid.discrepancy.search import Search
+from armid.loop.candidates import library_of
+from armid.loop.search import Search, best_along, loosened
+from armid.loop.whitening import evidence_of
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from armid.discrepancy.noise_level import coloured_level, white_level, yule_walker
+from armid.loop.whitening import coloured_level, white_level, yule_walker
 
 TERMS = np.array([1.5, -0.7])
 

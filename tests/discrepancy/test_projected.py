@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from armid.discrepancy import close_loop
-from armid.discrepancy.projected import projected, rest_of
+from armid.loop import close_loop
+from armid.loop.score_test import projected, rest_of
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 

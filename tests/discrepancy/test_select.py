@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from armid.discrepancy.select import is_undetermined, parts_to_judge
+from armid.loop.select import is_undetermined, parts_to_judge
 
 N = 100
 PARTS = [np.arange(N), np.arange(N, 2 * N), np.arange(2 * N, 3 * N)]

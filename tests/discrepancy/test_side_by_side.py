@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from armid.discrepancy.side_by_side import side_by_side
+from armid.loop.fit import side_by_side
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from armid.discrepancy.dependence import dependences, motions
-from armid.discrepancy.empirical import empirical_effect
-from armid.discrepancy.names import is_empirical, shown_name
-from armid.discrepancy.stretch import stretches
-from armid.discrepancy.unknown_input import missing_signal
+from armid.loop.candidates import is_empirical, shown_name
+from armid.loop.empirical import empirical_effect
+from armid.loop.missing_signal import dependences, missing_signal, motions, stretches
 from armid.model import Model
-from armid.problem import replays, space_of
+from armid.problem.replay import replays
+from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
 
 MASS, NOISE = 2.0, 2e-4

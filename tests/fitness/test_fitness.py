@@ -11,8 +11,8 @@ import pytest
 from numba import njit
 from numpy.typing import NDArray
 
-from armid.fitness import FITNESS, Fitness, as_fitness, join_records, numerical_similarity, similarity
-from armid.fitness.catalogue import dissimilarity
+from armid.problem.fitness import FITNESS, Fitness, as_fitness, dissimilarity, join_records
+from armid.problem.similarity import numerical_similarity, similarity
 
 Array = NDArray[np.float64]
 OF_RECORD = {"interval": 0.001, "noise": 0.2}
@@ -145,6 +145,6 @@ def test_likelihood_needs_noise() -> None:
 
 def test_importing_is_light() -> None:
     heavy = ("pymoo", "matplotlib", "seaborn", "pydantic", "pandas")
-    script = f"import sys, armid.fitness; print([m for m in {heavy!r} if m in sys.modules])"
+    script = f"import sys, armid.problem.fitness; print([m for m in {heavy!r} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"

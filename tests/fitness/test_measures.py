@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armid.fitness import chi_square, mean_square, nrmse, rmse
+from armid.problem.measures import chi_square, mean_square, nrmse, rmse
 
 rng = np.random.default_rng(1)
 X = rng.standard_normal(333)

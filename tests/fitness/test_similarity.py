@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armid.fitness import numerical_similarity, similarity
+from armid.problem.similarity import numerical_similarity, similarity
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 INTERVAL, EPSILON, XI, THRESHOLD = 0.001, 0.03, 0.030, 0.2

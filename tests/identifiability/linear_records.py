@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from armid.identifiability import WeightedRecords
-from armid.problem import Space
+from armid.estimation.least_squares import WeightedRecords
+from armid.problem.space import Space
 
 
 @dataclass(frozen=True, eq=False)

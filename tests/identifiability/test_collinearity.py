@@ -5,8 +5,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from armid.identifiability import collinearity_index, estimate, groups, information_at
-from armid.problem import replays
+from armid.estimation.collinearity import collinearity_index, groups
+from armid.estimation.information import information_at
+from armid.estimation.least_squares import estimate
+from armid.problem.replay import replays
 
 
 def fisher_of(*columns):

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from armid.identifiability import information_at
+from armid.engine import calibrate, probes
+from armid.estimation.information import information_at
 from armid.model import EFFECTS, Manoeuvre, Model
 from armid.model.plants.driven_axis import linear_axis
-from armid.problem import Replay, space_of
+from armid.problem.replay import Replay
+from armid.problem.space import space_of
 from armid.record import Noise, Piece, Record
-from armid.simulation import calibrate, probes
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 INTERVAL, NOISE, MASS, SLOPE, SPEED = 2e-3, 0.01, 1.8, 0.4, 0.3

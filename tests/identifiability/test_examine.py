@@ -6,21 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.identifiability import examine, information_at
-from armid.identifiability.figures import draw_profile, profile_figure, sensitivity_figure, smooth
-from armid.identifiability.profile import THRESHOLD
-from armid.identifiability.remarks import remarks
-from armid.identifiability.result import result_of
-from armid.identifiability.words import (
+from armid.errors import ArmidError
+from armid.estimation.examine import examine
+from armid.estimation.identifiability_document import (
     deviation_text,
     interval_text,
     offer_table,
     offer_text,
     parameter_table,
     profile_text,
+    remarks,
+    result_of,
 )
-from armid.model import EFFECTS, ArmidError
-from armid.problem import space_of
+from armid.estimation.identifiability_figures import draw_profile, profile_figure, sensitivity_figure, smooth
+from armid.estimation.information import information_at
+from armid.estimation.profile import THRESHOLD
+from armid.model import EFFECTS
+from armid.problem.space import space_of
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 NOISE = 0.25 * np.pi / 180.0

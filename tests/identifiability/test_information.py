@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from armid.identifiability import collinear, information_at, sensitivities
+from armid.estimation.information import collinear, information_at, sensitivities
 from armid.model import Effect, Parameter
-from armid.problem import replays, space_of
+from armid.problem.replay import replays
+from armid.problem.space import space_of
 from armid.record import read_campaign
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])

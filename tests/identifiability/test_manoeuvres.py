@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.identifiability.manoeuvres import Feasible, as_recorded, manoeuvre_grid, words
-from armid.identifiability.motions import Motions
-from armid.identifiability.travel import is_place, key_travel
+from armid.estimation.design import Feasible, Motions, as_recorded, is_place, key_travel, manoeuvre_grid, words
 from armid.model import ManoeuvreKey, Model
-from armid.problem import replays, space_of
+from armid.problem.replay import replays
+from armid.problem.space import space_of
 from armid.record import read_campaign
-from armid.record.constants import record_constants
+from armid.record.reader import record_constants
 from armid.record.schema import RecordSheet
 
 TRUTH = np.array([[3.05e6, 1.0, 0.55, 1.4]])

@@ -6,11 +6,9 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from armid.identifiability import estimate, noise_weights, profiles
-from armid.identifiability.profile import THRESHOLD
-from armid.identifiability.refine import fit
-from armid.identifiability.weighted import WeightedRecords
-from armid.problem import replays
+from armid.estimation.least_squares import WeightedRecords, estimate, fit, noise_weights
+from armid.estimation.profile import THRESHOLD, profiles
+from armid.problem.replay import replays
 
 
 def test_the_threshold_is_that_of_one_degree_of_freedom():

@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.identifiability import information_at, refine
-from armid.identifiability.information import Level
-from armid.identifiability.manoeuvres import manoeuvre_grid
-from armid.identifiability.motions import Motions
-from armid.identifiability.purchase import Offer, expected_level, gain, offers
-from armid.problem import replays
+from armid.estimation.design import Motions, Offer, expected_level, gain, manoeuvre_grid, offers
+from armid.estimation.information import Level, information_at
+from armid.estimation.least_squares import refine
+from armid.problem.replay import replays
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 NOISE = 0.25 * np.pi / 180.0

@@ -7,9 +7,8 @@ import pytest
 from linear_records import linear_records
 from scipy.optimize import lsq_linear
 
-from armid.identifiability import estimate, refine
-from armid.identifiability.refine import fit
-from armid.model import ArmidError
+from armid.errors import ArmidError
+from armid.estimation.least_squares import estimate, fit, refine
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from armid.identifiability import sensitivities
-from armid.problem import replays, space_of
+from armid.estimation.information import sensitivities
+from armid.problem.replay import replays
+from armid.problem.space import space_of
 from armid.record import read_campaign
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from armid.fitness import FITNESS
-from armid.identification import Identification, identify
+from armid.estimation.identify import Identification, identify
 from armid.identifiers import IDENTIFIERS
 from armid.model import Model
-from armid.problem import Space, space_of
+from armid.problem.fitness import FITNESS
+from armid.problem.space import Space, space_of
 from armid.record import Campaign
 
 

@@ -9,10 +9,11 @@ import pytest
 from pymoo.core.callback import Callback
 from pymoo.optimize import minimize
 
-from armid.fitness import FITNESS
-from armid.identification.identify import search
+from armid.estimation.identify import search
 from armid.identifiers import IDENTIFIERS, Identifier, Searching, can_run_alone, identifier_of, run_alone
-from armid.problem import IdentificationProblem, Meter, MeterTermination
+from armid.problem.fitness import FITNESS
+from armid.problem.meter import Meter, MeterTermination
+from armid.problem.problem import IdentificationProblem
 
 COMPOSED = ("pso+bobyqa", "cmaes+least_squares", "multistart:cobyla", "random+multistart:slsqp", "ga+cobyla+sbplx")
 ALONE = [n for n in (*IDENTIFIERS, *COMPOSED) if can_run_alone(identifier_of(n, IDENTIFIERS).build(100))]
@@ -119,6 +120,6 @@ def test_a_budget_within_a_generation_is_cut_off_exactly(posed) -> None:
 @pytest.mark.parametrize("name", ["bobyqa", "least_squares", "pso+bobyqa"])
 def test_no_thread_is_started(posed, monkeypatch, name) -> None:
     problem, meter = posed()
-    monkeypatch.setattr("armid.identifiers.thread.Thread.start", partial(pytest.fail, "a thread was started"))
+    monkeypatch.setattr("armid.identifiers.search.Thread.start", partial(pytest.fail, "a thread was started"))
     search(problem, meter, identifier_of(name, IDENTIFIERS), 1, None)
     assert meter.used > 10

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from armid.fitness import similarity
-from armid.identification import campaign_errors, record_errors
-from armid.problem import replays
+from armid.estimation.identify import campaign_errors, record_errors
+from armid.problem.replay import replays
+from armid.problem.similarity import similarity
 
 CANDIDATE = np.array([3.1e6, 0.98, 0.56, 1.35])
 

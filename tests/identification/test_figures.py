@@ -7,7 +7,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from armid.identification.figures import chosen, convergence_figure, fit_figure
+from armid.estimation.identify_figures import chosen, convergence_figure, fit_figure
 from armid.record import read_campaign
 
 DPI = 130

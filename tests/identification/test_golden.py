@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from armid.fitness import FITNESS
-from armid.identification import identify
+from armid.estimation.identify import identify
 from armid.identifiers import IDENTIFIERS
 from armid.model import Model
-from armid.problem import space_of
+from armid.problem.fitness import FITNESS
+from armid.problem.space import space_of
 from armid.record import Campaign, read_campaign
 
 ROOT = Path(__file__).parents[2]

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 
-from armid.fitness import FITNESS, Fitness
-from armid.identification import identify
+from armid.errors import ArmidError
+from armid.estimation.identify import identify
 from armid.identifiers import IDENTIFIERS
-from armid.model import EFFECTS, ArmidError, Model
-from armid.problem import space_of
+from armid.model import EFFECTS, Model
+from armid.problem.fitness import FITNESS, Fitness
+from armid.problem.space import space_of
 from armid.record import read_campaign
 
 CLEAN = ("--noise-deg-s", "0", "--quantisation-deg-s", "0", "--repeats", "1", "--holdout", "empty")

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from armid.identification import record_errors
-from armid.identification.remarks import remarks
-from armid.identification.result import result_of
-from armid.identification.words import error_table, parameter_table
-from armid.problem import space_of
+from armid.estimation.identify import record_errors
+from armid.estimation.identify_document import error_table, parameter_table, remarks, result_of
+from armid.problem.space import space_of
 
 PARAMETER = {"value", "unit", "low", "high", "bound_low", "bound_high", "bound_active"}
 ERROR = {"rmse", "nrmse", "chi2_per_sample", "s", "s1", "s2"}

@@ -3,8 +3,8 @@
 import pytest
 from pymoo.algorithms.soo.nonconvex.ga import GA
 
+from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, as_identifier
-from armid.model import ArmidError
 
 
 def test_the_swarm_takes_its_options():

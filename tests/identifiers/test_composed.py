@@ -14,9 +14,9 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 from searches import Bowl, identifier, ran
 
+from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
-from armid.identifiers.multistart import spread
-from armid.model import ArmidError
+from armid.identifiers.chain import spread
 
 Array = NDArray[np.float64]
 OWN = IDENTIFIERS | {

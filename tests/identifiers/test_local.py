@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 from searches import Bowl, identifier, ran
 
-from armid.identifiers.differences import CENTRAL, FORWARD, slopes, stencil
-from armid.identifiers.local import Height, NoFitnessError, pulled
-from armid.identifiers.nlopt_local import ALGORITHMS, Calls, optimised
+from armid.identifiers.least_squares import CENTRAL, FORWARD, slopes, stencil
+from armid.identifiers.nlopt import ALGORITHMS, Calls, optimised
+from armid.identifiers.search import Height, NoFitnessError, pulled
 
 Array = NDArray[np.float64]
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")

@@ -8,10 +8,14 @@ import pytest
 from pymoo.optimize import minimize
 from searches import identifier
 
-from armid.fitness import FITNESS
-from armid.identification import identify
-from armid.model import ArmidError, Model
-from armid.problem import IdentificationProblem, Meter, MeterTermination, replays, space_of
+from armid.errors import ArmidError
+from armid.estimation.identify import identify
+from armid.model import Model
+from armid.problem.fitness import FITNESS
+from armid.problem.meter import Meter, MeterTermination
+from armid.problem.problem import IdentificationProblem
+from armid.problem.replay import replays
+from armid.problem.space import space_of
 from armid.record import Campaign, read_campaign, write_table
 
 # The paper's Table I.

@@ -22,8 +22,7 @@ from scipy.stats import ks_2samp
 
 from armid.identifiers import IDENTIFIERS, Identifier, as_identifier
 from armid.identifiers.pso import PaperPSO
-from armid.problem.meter import Meter
-from armid.problem.termination import MeterTermination
+from armid.problem.meter import Meter, MeterTermination
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from pymoo.problems import get_problem
 from pymoo.util.display.single import SingleObjectiveOutput
 from searches import COMPOSED, Bowl, identifier, ran
 
-from armid.fitness import FITNESS
+from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS
-from armid.identifiers.searching import Searching
-from armid.model import ArmidError
+from armid.identifiers.adapter import Searching
+from armid.problem.fitness import FITNESS
 
 ALL = (*IDENTIFIERS, *COMPOSED)
 ON_SCALARS = [name for name in ALL if "least_squares" not in name]

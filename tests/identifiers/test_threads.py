@@ -13,7 +13,7 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from searches import Bowl, identifier, ran
 
-from armid.identifiers.thread import Asker, as_search
+from armid.identifiers.search import Asker, as_search
 
 IN_THREADS = ("nelder_mead", "lbfgs", "least_squares", "multistart:bobyqa", "random+bobyqa")
 

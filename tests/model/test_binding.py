@@ -2,7 +2,8 @@
 
 import pytest
 
-from armid.model import EFFECTS, PLANTS, ArmidError, Constant, Effect, Guard, Model, Parameter, Plant, Scales, State
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS, Constant, Effect, Guard, Model, Parameter, Plant, Scales, State
 
 ARM = PLANTS["shell_transfer_arm"]
 LEVEL = (Parameter("level", "effort", 0, 1, null=0.0),)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from armid.model import EFFECTS, ArmidError, Effect, Guard, Parameter, State
+from armid.errors import ArmidError
+from armid.model import EFFECTS, Effect, Guard, Parameter, State
 
 LEVEL = Parameter("level", "effort", 0.0, 1.0, null=0.0)
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from armid.model import PLANTS, ArmidError, Constant, Effect, Guard, Model, Parameter, Plant, State
+from armid.errors import ArmidError
+from armid.model import PLANTS, Constant, Effect, Guard, Model, Parameter, Plant, State
 
 ARM, AXIS = PLANTS["shell_transfer_arm"], PLANTS["driven_axis"]
 LEVEL = (Parameter("level", "effort", 0.0, 1.0, null=0.0),)

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Guard, Model, Parameter, State
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS, Effect, Guard, Model, Parameter, State
 
 ARM = PLANTS["shell_transfer_arm"]
 GOLDEN = Path(__file__).parents[1] / "golden"

@@ -2,7 +2,8 @@
 
 import pytest
 
-from armid.model import ArmidError, Parameter
+from armid.errors import ArmidError
+from armid.model import Parameter
 from armid.model.parameter import check_name
 
 

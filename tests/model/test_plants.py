@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from armid.model import PLANTS, ArmidError, Model
+from armid.errors import ArmidError
+from armid.model import PLANTS, Model
 from armid.model.plants import shell_transfer_arm as arm
 
 PLANT = PLANTS["shell_transfer_arm"]

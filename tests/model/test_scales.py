@@ -2,8 +2,9 @@
 
 import pytest
 
-from armid.model import ArmidError, Parameter, Scales
-from armid.model.scales import resolve
+from armid.errors import ArmidError
+from armid.model import Parameter, Scales
+from armid.model.parameter import resolve
 
 ARM = Scales(effort=1000.0, speed=2.0)
 AXIS = Scales(effort=150.0, speed=0.3, effort_unit="N", length_unit="m")

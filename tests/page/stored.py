@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
-from armid.study.report import Report, Section
-from armid.study.tables import Column, Table
+from armid.study.analyses.table import Column, Table
+from armid.study.report import Report
+from armid.study.report import ReportSection as Section
 
 EVIL = '<script>document.title="broken"</script><img src=x onerror=alert(1)>"\'&'
 SVG = """<?xml version="1.0"?>

@@ -7,8 +7,9 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from stored import EVIL, SVG, study_report, write_loop
 
-from armid.page import LOOP, html, page_of_folder
-from armid.page.study_page import study_page
+from armid.cli.report import LOOP, page_of_folder
+from armid.report.html import html
+from armid.study.document import study_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -51,6 +52,7 @@ def test_opens_quietly_and_does_not_scroll_sideways(pages, opened, name, width, 
 
 def contrast(first, second):
     """Return the ratio of two colours' luminances as the web's guidelines define it (WCAG 2)."""
+
     def luminance(colour):
         linear = [c / 255 / 12.92 if c / 255 <= 0.04045 else ((c / 255 + 0.055) / 1.055) ** 2.4 for c in colour]
         return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

@@ -5,8 +5,8 @@ import re
 import pytest
 from stored import SVG
 
-from armid.model import ArmidError
-from armid.page.inline import inline
+from armid.errors import ArmidError
+from armid.report.svg import inline
 
 
 def around(inner: str) -> str:

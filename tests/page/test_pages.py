@@ -7,11 +7,12 @@ from html.parser import HTMLParser
 import pytest
 from stored import EVIL, SVG, loop_details, loop_report, study_report, write_loop
 
-from armid.model import ArmidError
-from armid.page import LOOP, html, page_of_folder, result_in
-from armid.page.equations import changed
-from armid.page.loop_page import loop_page
-from armid.page.study_page import study_page
+from armid.cli.report import LOOP, page_of_folder, result_in
+from armid.errors import ArmidError
+from armid.loop.document import loop_page
+from armid.report.document import changed
+from armid.report.html import html
+from armid.study.document import study_page
 
 
 class Elements(HTMLParser):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armid.display import thinned
+from armid.report.style import thinned
 
 
 @given(st.integers(0, 4000), st.integers(4, 600), st.integers(0, 2**32 - 1))

@@ -9,9 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from armid.problem.meter import Log, Meter
+from armid.problem.meter import Log, Meter, MeterTermination
 from armid.problem.meter import __file__ as meter_file
-from armid.problem.termination import MeterTermination
 
 
 def simulate(meter: Meter, fitness: list[float], failed: list[bool] | None = None) -> None:

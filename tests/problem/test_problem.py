@@ -12,10 +12,14 @@ from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
 from pymoo.algorithms.soo.nonconvex.pso import PSO
 from pymoo.optimize import minimize
 
-from armid.fitness import FITNESS, Fitness, similarity
+from armid.errors import ArmidError
 from armid.identifiers import PaperPSO
-from armid.model import ArmidError
-from armid.problem import PENALTY, IdentificationProblem, Meter, MeterTermination, Replay, replays, space_of
+from armid.problem.fitness import FITNESS, Fitness
+from armid.problem.meter import PENALTY, Meter, MeterTermination
+from armid.problem.problem import IdentificationProblem
+from armid.problem.replay import Replay, replays
+from armid.problem.similarity import similarity
+from armid.problem.space import space_of
 from armid.record import read_campaign
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])

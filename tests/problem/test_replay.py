@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.model import EFFECTS, ArmidError, Model
-from armid.problem import accuracy_for, replay_of, replays, space_of
+from armid.engine import Schedule, simulate
+from armid.errors import ArmidError
+from armid.model import EFFECTS, Model
+from armid.problem.replay import accuracy_for, replay_of, replays
+from armid.problem.space import space_of
 from armid.record import read_campaign
-from armid.simulation import Schedule, simulate
 
 TRUTH = np.array([[3.05e6, 1.0, 0.55, 1.4]])
 

@@ -5,9 +5,11 @@ import pytest
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.population import Population
 
-from armid.fitness import FITNESS
-from armid.model import ArmidError
-from armid.problem import RESIDUALS, IdentificationProblem, Meter, replays, residuals
+from armid.errors import ArmidError
+from armid.problem.fitness import FITNESS
+from armid.problem.meter import RESIDUALS, Meter
+from armid.problem.problem import IdentificationProblem
+from armid.problem.replay import replays, residuals
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 ASKED = ["F", "G", "H", RESIDUALS]

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from armid.model import EFFECTS, ArmidError
-from armid.problem import space_of
+from armid.errors import ArmidError
+from armid.model import EFFECTS
+from armid.problem.space import space_of
 from armid.record import Override
 
 

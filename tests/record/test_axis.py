@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from armid.model import ArmidError, Input, Manoeuvre, Plant
+from armid.errors import ArmidError
+from armid.model import Input, Manoeuvre, Plant
 from armid.model.plants.driven_axis import driven_axis
 from armid.record import read_campaign
 

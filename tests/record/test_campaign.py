@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Parameter
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS, Effect, Parameter
 from armid.record import Override, read_campaign
 
 DEGREE = np.pi / 180

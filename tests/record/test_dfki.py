@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armid.cli.main import main
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.record import read_campaign
 from armid.record.importers import import_dfki
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.record import read_campaign
-from armid.record.importers import import_emps
-from armid.record.importers.emps import velocity_of
+from armid.record.importers import import_emps, velocity_of
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 MEASURED = Path(os.environ.get("ARMID_MEASURED", REPOSITORY.parent / "shared" / "data")) / "emps"

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.model import ArmidError, Constant, Input
+from armid.errors import ArmidError
+from armid.model import Constant, Input
 from armid.model.plants.driven_axis import driven_axis
 from armid.record import read_campaign
 

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.record import read_campaign
 
 HEADER = "time_s,angular_velocity_deg_s"

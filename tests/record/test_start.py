@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armid.record import read_campaign
-from armid.record.start import Track, smoothed, state_at
+from armid.record.pieces import Track, smoothed, state_at
 
 TIMES = np.arange(1500) / 500
 MOTION = 3.0 * np.sin(8.0 * TIMES) + 0.5 * np.sin(25.0 * TIMES)

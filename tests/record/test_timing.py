@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.record import IrregularSamplingWarning, read_campaign
-from armid.record.grid import moved_onto_grid, onto_grid
-from armid.record.timing import timing_of
+from armid.record.resample import moved_onto_grid, onto_grid, timing_of
 
 
 def motion(times):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.record import write_campaign
 from armid.record.table import read_table
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armid.study.report import report_of
+from armid.study.document import report_of
 
 
 def test_who_is_nearest_is_who_the_table_says(made):
@@ -14,8 +14,9 @@ def test_who_is_nearest_is_who_the_table_says(made):
     for setting in ("noise-free", "0.3 deg/s"):
         own = table[table["setting"] == setting]
         best = own.loc[own["largest_median"].idxmin()]
-        assert f"{setting}: {best['variant']}, median largest error of a run {100 * best['largest_median']:.3g} %" in (
-            report.answer[0]
+        assert (
+            f"{setting}: {best['variant']}, median largest error of a run {100 * best['largest_median']:.3g} %"
+            in (report.answer[0])
         )
         assert f"within {100 * best['largest_p95']:.3g} %" in report.answer[0]
     paper = table[table["variant"] == "the paper's pso"].iloc[0]

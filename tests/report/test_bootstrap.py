@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from armid.study.metrics import median_interval
+from armid.study.analyses.histories import median_interval
 
 
 def exact_interval(sample, confidence=0.95):

@@ -3,8 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from armid.study.figures import convergence_figure
-from armid.study.metrics import band
+from armid.study.analyses.convergence import band, convergence_figure
 
 
 def test_quartiles_are_values_that_runs_had():

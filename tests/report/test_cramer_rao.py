@@ -5,9 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.study.figures import cramer_rao_figure
-from armid.study.metrics import efficiency
-from armid.study.tables import cramer_rao, cramer_rao_summary
+from armid.study.analyses.cramer_rao import cramer_rao, cramer_rao_figure, cramer_rao_summary, efficiency
 
 
 def test_by_hand():

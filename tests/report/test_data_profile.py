@@ -4,8 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from armid.study.figures import data_profile_figure
-from armid.study.metrics import data_profile, remaining_share
+from armid.study.analyses.ecdf import data_profile_figure
+from armid.study.analyses.histories import data_profile, remaining_share
 
 
 def test_by_hand():

@@ -5,8 +5,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armid.study.figures import ecdf_figure
-from armid.study.metrics import share_hit
+from armid.study.analyses.ecdf import ecdf_figure, share_hit
 
 HIT = st.one_of(st.integers(1, 100).map(float), st.just(np.inf))
 HITS = st.lists(st.lists(HIT, min_size=3, max_size=3), min_size=1)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import mannwhitneyu
 
-from armid.study.metrics import a12, size_in_words
+from armid.study.analyses.ranks import a12, size_in_words
 
 SAMPLES = st.lists(st.integers(0, 9).map(float), min_size=1, max_size=15)
 

@@ -4,9 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from armid.study.figures import error_map_figure
-from armid.study.figures.error_map import brief
-from armid.study.metrics import error_map, outcomes
+from armid.study.analyses.errors import brief, error_map, error_map_figure
+from armid.study.analyses.outcomes import outcomes
 
 
 def test_medians_in_the_orders_given(made):

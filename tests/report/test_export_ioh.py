@@ -6,9 +6,8 @@ import warnings
 import numpy as np
 import pytest
 
-from armid.study.export import export_ioh
-from armid.study.export.ioh import WORST, lines
-from armid.study.trace import RunTrace
+from armid.study.export import WORST, export_ioh, lines
+from armid.study.outcome import RunTrace
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +110,7 @@ def test_no_text_of_a_study_file_is_given_to_a_program_that_evaluates_it(exporte
 
 
 def test_large_seeds_become_places(made, tmp_path):
-    from armid.study.export.ioh import instance_numbers
+    from armid.study.export import instance_numbers
 
     results = made(seeds=2)
     assert instance_numbers(results.runs) == {1: 1, 2: 2}

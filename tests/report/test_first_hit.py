@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armid.study.metrics import ERROR_TARGETS, TOLERANCES, first_hits, held
+from armid.study.analyses.histories import ERROR_TARGETS, first_hits, held
+from armid.study.analyses.success import TOLERANCES
 
 POINT = st.tuples(st.integers(1, 500), st.floats(0.0, 2.0))
 SERIES = st.lists(POINT, min_size=1, max_size=20, unique_by=lambda p: p[0])

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from armid.study.metrics import ERROR_TARGETS, histories, outcomes, truths_of
+from armid.study.analyses.histories import ERROR_TARGETS, histories
+from armid.study.analyses.outcomes import outcomes, truths_of
 
 
 def test_hits_and_held_values_of_each_run(made):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armid.study.metrics import outcomes
+from armid.study.analyses.outcomes import outcomes
 
 
 def test_a_label_on_one_fitness_keeps_its_name_and_on_several_tells_which(made):

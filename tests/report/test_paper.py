@@ -4,8 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.study.metrics import percentile_among, published_values, spread
-from armid.study.tables import overview
+from armid.study.analyses.outcomes import published_values
+from armid.study.analyses.overview import overview
+from armid.study.analyses.table1 import percentile_among
+from armid.study.analyses.table2 import spread
 
 # Table II of the paper: five identifications, and the mean and "mean square error" that it prints below them.
 TABLE2 = {
@@ -41,7 +43,7 @@ def test_percentile_counts_equal_ones_by_half_and_failed_runs_as_worse():
 
 
 def test_overview_begins_with_the_paper(made, table1_cases):
-    from armid.study.metrics import by_parameter, outcomes
+    from armid.study.analyses.outcomes import by_parameter, outcomes
 
     results = made()
     found = outcomes(results.runs, results.parameters)

@@ -6,10 +6,7 @@ import pandas as pd
 import pytest
 from scipy.stats import chi2
 
-from armid.study.figures import critical_difference_figure
-from armid.study.metrics import p_matrix, rank_tests
-from armid.study.metrics.ranks import signed_rank
-from armid.study.tables import mean_ranks, pairs
+from armid.study.analyses.ranks import critical_difference_figure, mean_ranks, p_matrix, pairs, rank_tests, signed_rank
 
 # Table 6 of Demsar, J. Mach. Learn. Res. 7 (2006) 1: AUC of four classifiers on 14 data sets. On the last but one the
 # two to the right are printed alike, 0.975, but ranked 2 and 3: 0.97501 stands for the digits that are not printed.

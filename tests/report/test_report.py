@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.model import ArmidError
-from armid.study.report import report_of, write_report
-from armid.study.report.evidence import Evidence
-from armid.study.report.page import page
+from armid.errors import ArmidError
+from armid.study.document import report_of
+from armid.study.markdown import page, write_report
+from armid.study.report import Evidence
 
 
 def written(results, folder):

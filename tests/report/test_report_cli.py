@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armid.cli.main import main
-from armid.study.report import write
+from armid.study import markdown as write
 from armid.study.results import load_study
 from armid.study.runner import run_study
 

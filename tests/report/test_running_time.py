@@ -5,9 +5,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.study.figures import running_time_figure
-from armid.study.metrics import ERROR_TARGETS, expected_running_time
-from armid.study.tables import running_time
+from armid.study.analyses.histories import ERROR_TARGETS
+from armid.study.analyses.running_time import expected_running_time, running_time, running_time_figure
 
 
 def test_by_hand():

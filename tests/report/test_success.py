@@ -5,9 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.study.figures import success_figure
-from armid.study.metrics import success_rates, wilson
-from armid.study.tables import success
+from armid.study.analyses.success import success, success_figure, success_rates, wilson
 
 
 def outcomes_with(errors):

@@ -5,8 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.study.figures import table2_figure
-from armid.study.tables import table2
+from armid.study.analyses.table2 import table2, table2_figure
 
 VALUES = {"record 1": [1.0, 3.0], "record 2": [5.0, 9.0]}
 

@@ -4,9 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from armid.study.figures import valley_figure
-from armid.study.figures.valley import MOST_POINTS, thinned
-from armid.study.metrics import by_parameter, end_points, outcomes
+from armid.study.analyses.outcomes import by_parameter, outcomes
+from armid.study.analyses.valley import MOST_POINTS, end_points, thinned, valley_figure
 
 
 @pytest.fixture(scope="module")

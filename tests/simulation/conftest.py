@@ -6,8 +6,8 @@ from functools import cache
 import pytest
 from arm_cases import box_of, index_rows, manoeuvre_of
 
+from armid.engine import Schedule, calibrate, probes
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
-from armid.simulation import Schedule, calibrate, probes
 
 
 @pytest.fixture(scope="session")

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from armid.contract.reference import PlainModel
-from armid.model import PLANTS, ArmidError, Manoeuvre, Model
-from armid.simulation import Schedule, along, simulate
+from armid.engine import Schedule, along, simulate
+from armid.errors import ArmidError
+from armid.model import PLANTS, Manoeuvre, Model
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 

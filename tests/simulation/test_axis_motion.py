@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from armid.engine import Schedule, Simulation, calibrate, simulate
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
-from armid.simulation import Schedule, Simulation, calibrate, simulate
 
 Array = NDArray[np.float64]
 INTERVAL, N_SAMPLES = 0.01, 201

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from arm_cases import box_of, drawn
 
-from armid.model import PLANTS, ArmidError, Manoeuvre, Model
-from armid.simulation import Schedule, calibrate, probes, simulate
+from armid.engine import Schedule, calibrate, probes, simulate
+from armid.errors import ArmidError
+from armid.model import PLANTS, Manoeuvre, Model
 
 
 def test_probes_fill_the_box(arm: Model) -> None:
@@ -39,7 +40,7 @@ def test_a_long_record_is_calibrated_in_parts(
 ) -> None:
     spread = probes(*box_of(arm))
     whole = calibrate(arm, manoeuvres["lower"], spread, spans=False)
-    monkeypatch.setattr(import_module("armid.simulation.calibrate"), "MOST_VALUES", 1000)
+    monkeypatch.setattr(import_module("armid.engine.calibrate"), "MOST_VALUES", 1000)
     parts = calibrate(arm, manoeuvres["lower"], spread)
     assert parts.schedule.substeps == whole.schedule.substeps
     assert parts.schedule.plan is None

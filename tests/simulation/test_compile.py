@@ -13,16 +13,17 @@ import numba
 import numpy as np
 import pytest
 
-from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Manoeuvre, Model, Parameter
-from armid.simulation import cache_folder, compile_model, simulate
-from armid.simulation.compile import load_module, module_name
-from armid.simulation.generate import generate_module
+from armid.engine import cache_folder, compile_model, simulate
+from armid.engine.compile import load_module, module_name
+from armid.engine.generate import generate_module
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
 
 SCRIPT = """
 import json
 import numpy as np
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
-from armid.simulation import compile_model, simulate
+from armid.engine import compile_model, simulate
 model = Model(PLANTS["driven_axis"]) + EFFECTS["viscous"]
 found = simulate(model, Manoeuvre(0.01, 50, inputs={"u": np.ones(50)}), [[1.0, 0.5]])
 kernel, _ = compile_model(model)
@@ -126,7 +127,7 @@ def packed_and_scalar(model: Model, manoeuvre: Manoeuvre, monkeypatch: pytest.Mo
     # A kernel that comes from the cache cannot show its instructions: it is compiled anew.
     kernel, width = compile_model(model)
     fresh = numba.njit(error_model="numpy", nogil=True)(kernel.py_func)
-    monkeypatch.setattr(importlib.import_module("armid.simulation.simulate"), "compile_model", lambda _: (fresh, width))
+    monkeypatch.setattr(importlib.import_module("armid.engine.simulate"), "compile_model", lambda _: (fresh, width))
     simulate(model, manoeuvre, [[0.5 * (p.low + p.high) for p in model.parameters.values()]])
     text = "\n".join(fresh.inspect_asm().values())
     arithmetic = r"\bv(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)"

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armid.model import PLANTS, ArmidError, Effect, Manoeuvre, Model, Parameter
-from armid.simulation import simulate
+from armid.engine import simulate
+from armid.errors import ArmidError
+from armid.model import PLANTS, Effect, Manoeuvre, Model, Parameter
 
 MANOEUVRE = Manoeuvre(0.01, 20, inputs={"u": np.ones(20)})
 TABLE = {"a": 1.0}

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from armid.contract.reference import simulate_plainly
-from armid.model import ArmidError, Input, Manoeuvre, Model, Parameter, Plant, Scales, State
-from armid.simulation import Schedule, simulate
+from armid.engine import Schedule, simulate
+from armid.errors import ArmidError
+from armid.model import Input, Manoeuvre, Model, Parameter, Plant, Scales, State
 
 INTERVAL, N, OFF = 0.01, 101, 40
 TIMES = INTERVAL * np.arange(N)

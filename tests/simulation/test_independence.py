@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from arm_cases import Array, drawn
 
+from armid.engine import Schedule, Simulation, simulate
 from armid.model import Effect, Manoeuvre, Model, Parameter
-from armid.simulation import Schedule, Simulation, simulate
 
 
 def cubic_drive(omega, gain):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armid.simulation import lane_numpy
-from armid.simulation.lane_math import FAR
-from armid.simulation.lanes import make_access, store
+from armid.engine import simd_math as lane_numpy
+from armid.engine.simd import make_access, store
+from armid.engine.simd_math import FAR
 
 Array = NDArray[np.float64]
 WIDTH = 8

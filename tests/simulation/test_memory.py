@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from arm_cases import drawn
 
+from armid.engine import simulate
 from armid.model import Manoeuvre, Model
-from armid.simulation import simulate
 
 KILOBYTE = 1024
 

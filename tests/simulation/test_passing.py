@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from arm_cases import Array, drawn
 
+from armid.engine import Schedule, simulate
+from armid.engine.generate import FEWEST, strengths_of
 from armid.model import EFFECTS, Manoeuvre, Model
-from armid.simulation import Schedule, simulate
-from armid.simulation.passing import FEWEST, strengths_of
 
 pytestmark = pytest.mark.slow
 NAMES = ("coulomb", "viscous", "tilt", "gas_heat_loss", "gyro_lag", "shell_rocking", "controller_delay", "gyro_bias")

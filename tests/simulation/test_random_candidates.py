@@ -7,8 +7,8 @@ import pytest
 from arm_cases import Array, box_of, drawn
 from arm_stand import stand_speed
 
+from armid.engine import Schedule, Simulation, calibrate, probes, simulate
 from armid.model import Manoeuvre, Model
-from armid.simulation import Schedule, Simulation, calibrate, probes, simulate
 
 ERROR = {"standard": 1e-5, "fine": 2e-7}
 N_CANDIDATES, SEED = 300, 20261121

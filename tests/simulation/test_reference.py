@@ -7,8 +7,8 @@ import pytest
 from arm_cases import REFERENCE, candidate_of, drawn, index_rows
 from arm_stand import stand_speed
 
+from armid.engine import Schedule, simulate
 from armid.model import Manoeuvre, Model
-from armid.simulation import Schedule, simulate
 
 ERROR = {"standard": 1e-5, "fine": 2e-7}
 # After the current has changed its sign, this file is off by 7e-7 rad/s: there the test stand and the engine with very

@@ -5,8 +5,8 @@ import pytest
 from arm_stand import stand_speed
 from numpy.typing import NDArray
 
+from armid.engine import Schedule, simulate
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
-from armid.simulation import Schedule, simulate
 
 CANDIDATE = np.array([3.05e6, 1.0, 0.55, 1.4])
 # At the stop of 0.01 rad of a tray of 6 Hz the spring is twice as stiff.

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from arm_cases import drawn
 
-from armid.model import PLANTS, ArmidError, Manoeuvre, Model
-from armid.simulation import Schedule, simulate
+from armid.engine import Schedule, simulate
+from armid.errors import ArmidError
+from armid.model import PLANTS, Manoeuvre, Model
 
 
 def test_shapes(arm: Model) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from arm_cases import Array, drawn
 
-from armid.fitness import rmse
+from armid.engine import Schedule, simulate
 from armid.model import Manoeuvre, Model
-from armid.simulation import Schedule, simulate
+from armid.problem.measures import rmse
 
 N_POINTS, STEP, DISAGREEMENT = 2000, 1e-6, 1e-3
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from armid.engine import Schedule, Simulation, simulate
+from armid.engine.transpile import SourceText
 from armid.model import PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, Plant, Scales, State
-from armid.simulation import Schedule, Simulation, simulate
-from armid.simulation.source import SourceText
 
 ALL = [*user.VECTOR, *user.BY_LANE]
 LEVELS = np.array([0.0, 0.25, 0.6])
@@ -170,7 +170,7 @@ def test_selections_work_on_plain_numbers_too() -> None:
 
 def test_the_same_equations_give_the_same_module() -> None:
     """A module is named by its text: nothing that differs from run to run may get into it."""
-    from armid.simulation.generate import generate_module
+    from armid.engine.generate import generate_module
 
     texts = {generate_module(Model(ramp) + Effect("e", (Parameter("level", "1", 0.0, 1.0),), {"output": user.loop}), 8)
              for _ in range(3)}  # fmt: skip

@@ -117,8 +117,10 @@ def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path
 
 def test_the_key_lies_beside_the_campaigns_and_not_among_them(small: Path) -> None:
     assert sorted(each.name for each in small.parent.iterdir()) == ["small.toml", "suite", "suite.key.json"]
-    assert sorted(each.name for each in small.iterdir()) == ["c000", "c001", "c002", "c003"] == sorted(
-        key_of(small)["campaigns"]
+    assert (
+        sorted(each.name for each in small.iterdir())
+        == ["c000", "c001", "c002", "c003"]
+        == sorted(key_of(small)["campaigns"])
     )
     assert {each.suffix for each in small.rglob("*") if each.is_file()} == {".toml", ".md", ".csv"}
 

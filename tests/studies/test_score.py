@@ -175,9 +175,7 @@ def test_scores_from_the_command_line(suite: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"), [("{", "is no JSON"), ("{}", "is no report of a closed loop"), ("[]", "is no report")]
 )
-def test_refuses_what_is_no_report(
-    text: str, sentence: str, suite: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_refuses_what_is_no_report(text: str, sentence: str, suite: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (suite.with_name("results") / "c001" / "report.json").write_text(text)
     assert main([str(suite), str(suite.with_name("results"))]) == 2
     said = capsys.readouterr().err

@@ -148,9 +148,7 @@ def test_a_worm_can_lose_exponentially_with_speed() -> None:
 
 
 def test_heat_that_is_lost_again_ends_below_heat_that_is_kept() -> None:
-    kept, lost = (
-        moved(Effects(winding_heating=4e-5, winding_cooling=rate)).states["heat"] for rate in (0.0, 2.0)
-    )
+    kept, lost = (moved(Effects(winding_heating=4e-5, winding_cooling=rate)).states["heat"] for rate in (0.0, 2.0))
     assert kept[-1] == kept.max()
     assert 0.2 * kept[-1] < lost[-1] < 0.9 * kept[-1]
 

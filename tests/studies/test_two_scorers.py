@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.study.loops.judge import ANSWERS, judged
-from armid.study.loops.targets import targets_of
+from armid.study.blind.scores import ANSWERS, judged, targets_of
 from stand.score.judge import judge
 from stand.score.targets import targets_of as targets_of_stand
 

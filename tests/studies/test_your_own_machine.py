@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from armid.cli.main import main
-from armid.contract import check_thing
+from armid.contract.check import check_thing
 from armid.model import Model
-from armid.problem import replays, space_of
+from armid.problem.replay import replays
+from armid.problem.space import space_of
 from armid.record import IrregularSamplingWarning, read_campaign
 from armid.registry import load_registry
 

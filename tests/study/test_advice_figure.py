@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from armid.study.figures.loop_advice import advice_figure
-from armid.study.figures.style import save
+from armid.study.analyses.drawing import save
+from armid.study.blind.figures import advice_figure
 
 
 def test_each_pair_has_its_row_and_both_records(tmp_path):

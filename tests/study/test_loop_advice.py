@@ -4,11 +4,11 @@ import pandas as pd
 import pytest
 from loop_suite import STUDY, fake_campaigns
 
-from armid.model import ArmidError
-from armid.study.loops.advice import advice_targets, answer_of, rates, separations, sign_test
-from armid.study.loops.claim import Claim
-from armid.study.loops.plan import planned_loops
-from armid.study.report.advice import advice_parts
+from armid.errors import ArmidError
+from armid.study.blind.report import advice_parts
+from armid.study.blind.scores import Claim, advice_targets, rates, separations, sign_test
+from armid.study.blind.scores import advice_answer as answer_of
+from armid.study.loops import planned_loops
 from armid.study.study import read_study
 
 PAIR = ["coulomb", "brush_drop"]

@@ -8,9 +8,9 @@ import pytest
 from loop_suite import STUDY, fake_campaigns
 
 from armid.cli.main import main
-from armid.model import EFFECTS, ArmidError
-from armid.study.loops.plan import planned_loops
-from armid.study.loops.study import describe_loops
+from armid.errors import ArmidError
+from armid.model import EFFECTS
+from armid.study.loops import describe_loops, planned_loops
 from armid.study.study import read_study
 
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ import pytest
 
 from armid.cli.main import main
 from armid.study.results import StudyResults
-from armid.study.store_file import FILE_NAME
+from armid.study.store import FILE_NAME
 
 DAMAGES = {
     "UPDATE study SET value = 'garbage' WHERE key = 'description'": "the description of the study cannot be read",

@@ -9,10 +9,10 @@ import sys
 import pytest
 from small_study import RUNS_A_SEED, same_results
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.study.results import load_study
 from armid.study.runner import run_study
-from armid.study.store_file import FILE_NAME
+from armid.study.store import FILE_NAME
 
 SEEDS = 6
 READER = """
@@ -145,7 +145,7 @@ def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(w
     assert not retried.runs["started_at"].equals(first.runs["started_at"]) or retried.runs["seconds"].iloc[-1] > 0
     with open(mine, "a", encoding="utf-8") as text:
         text.write("\n# mended\n")
-    from armid.study.known import load_known
+    from armid.study.spec import load_known
 
     assert load_known(told["plugins"]).own("identifiers", "raises+bobyqa") != {}
     changed = run_study(file, **told)

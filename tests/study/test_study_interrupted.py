@@ -12,7 +12,7 @@ import pytest
 from small_study import RUNS_A_SEED, same_results
 
 from armid.study.results import load_study
-from armid.study.store_file import FILE_NAME
+from armid.study.store import FILE_NAME
 
 SEEDS = 6
 

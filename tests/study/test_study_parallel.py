@@ -9,7 +9,7 @@ import time
 import pytest
 from small_study import RUNS_A_SEED, same_results
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.study.results import load_study
 from armid.study.runner import run_study
 
@@ -73,6 +73,6 @@ def n_runs(out):
 
 def test_a_cluster_that_is_not_there(write_study, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("armid.study.dask_crew.CONNECT_S", 0.5)
+    monkeypatch.setattr("armid.study.dask_pool.CONNECT_S", 0.5)
     with pytest.raises(ArmidError, match=r"the Dask cluster at tcp://127\.0\.0\.1:1 does not answer"):
         run_study(write_study(), dask="tcp://127.0.0.1:1", out=tmp_path / "out")

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from small_study import RUNS_A_SEED, same_results
 
+from armid.study.cases import DEGREE, clean_records
 from armid.study.plan import planned_runs
-from armid.study.records import DEGREE, clean_records
 from armid.study.results import load_study
+from armid.study.run_cache import Workshop
 from armid.study.runner import run_study
 from armid.study.study import read_study
-from armid.study.workshop import Workshop
 
 STUDIES = Path(__file__).parents[2] / "studies"
 RANDOM = """\

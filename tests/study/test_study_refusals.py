@@ -2,7 +2,7 @@
 
 import pytest
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.study.runner import run_study
 from armid.study.study import read_study
 

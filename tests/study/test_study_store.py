@@ -7,13 +7,11 @@ from contextlib import closing
 
 import pytest
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.study.outcome import DONE, Outcome
 from armid.study.plan import Planned
-from armid.study.process_identity import ProcessIdentity, is_gone, start_of, this_place, this_process
 from armid.study.results import load_study
-from armid.study.store import Store
-from armid.study.store_file import FILE_NAME
+from armid.study.store import FILE_NAME, ProcessIdentity, Store, is_gone, start_of, this_place, this_process
 
 DESCRIPTION = {"name": "made", "cases": []}
 

@@ -7,7 +7,7 @@ import numpy as np
 from armid.bench.row import Row
 from armid.bench.task import arm_task
 from armid.bench.timing import Work, fastest
-from armid.fitness import numerical_similarity, similarity
+from armid.problem.similarity import numerical_similarity, similarity
 
 
 def fitness_rows(rounds: int = 20, n_candidates: int = 80) -> list[Row]:

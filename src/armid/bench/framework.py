@@ -15,12 +15,15 @@ from armid.bench.row import Bound, Row
 from armid.bench.sample import write_sample
 from armid.bench.task import PLANT
 from armid.bench.timing import CPU, Stopwatch
-from armid.fitness import FITNESS, Fitness
+from armid.engine import STANDARD
 from armid.identifiers import IDENTIFIERS
 from armid.model import PLANTS, Model
-from armid.problem import IdentificationProblem, Meter, MeterTermination, Replay, replays, space_of
+from armid.problem.fitness import FITNESS, Fitness
+from armid.problem.meter import Meter, MeterTermination
+from armid.problem.problem import IdentificationProblem
+from armid.problem.replay import Replay, replays
+from armid.problem.space import space_of
 from armid.record import read_campaign
-from armid.simulation import STANDARD
 
 N_PARTICLES, N_ITERATIONS = 80, 150
 

@@ -10,7 +10,7 @@ import numpy as np
 from armid.bench.row import Bound, Row
 from armid.bench.sample import child_environment
 from armid.bench.task import arm_task
-from armid.simulation import simulate
+from armid.engine import simulate
 
 MEGABYTE = 2**20
 # The allocator of glibc then gives back what is freed at once; else that would hide what is taken next.
@@ -25,7 +25,7 @@ def peak_memory() -> int | None:
     if found:
         return int(found[1]) * 1024
     try:
-        import resource  # noqa: PLC0415 - not on Windows
+        import resource
     except ImportError:
         return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

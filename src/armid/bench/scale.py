@@ -9,7 +9,7 @@ from armid.bench.memory import MEGABYTE
 from armid.bench.row import Row
 from armid.bench.sample import child_environment, write_sample
 from armid.bench.task import N_SAMPLES
-from armid.model import ArmidError
+from armid.errors import ArmidError
 
 POPULATION, BUDGET = 80, 160
 # What the command takes, told by the process that ran it: -1 where the system does not tell.

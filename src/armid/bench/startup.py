@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from armid.bench.row import Bound, Row
 from armid.bench.sample import child_environment, write_sample
 from armid.bench.timing import WALL, fastest
-from armid.model import ArmidError
-from armid.simulation import cache_folder
+from armid.engine import cache_folder
+from armid.errors import ArmidError
 
 ARMID = (sys.executable, "-m", "armid")
 IMPORTS = (sys.executable, "-c", "import numpy, scipy, pandas")

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.engine import Schedule, Simulation, calibrate, probes, simulate
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
-from armid.problem import Space, space_of
-from armid.simulation import Schedule, Simulation, calibrate, probes, simulate
+from armid.problem.space import Space, space_of
 
 Array = NDArray[np.float64]
 PLANT, INTERVAL = "shell_transfer_arm", 1e-3

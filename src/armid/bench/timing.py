@@ -13,9 +13,7 @@ CPU: Clock = time.process_time if time.get_clock_info("process_time").resolution
 WALL: Clock = time.perf_counter
 
 
-def fastest(
-    works: Mapping[Key, Work], rounds: int = 10, clock: Clock = CPU, slot: float = 0.02
-) -> dict[Key, float]:
+def fastest(works: Mapping[Key, Work], rounds: int = 10, clock: Clock = CPU, slot: float = 0.02) -> dict[Key, float]:
     """Return the shortest time of each work [s].
 
     Each work runs once to warm up; then, in every round, all of them in turn for `slot` seconds, at least once.

@@ -7,22 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armid.cli.made_by import made_by
-from armid.cli.new_files import NewFiles, refuse_unwritable
 from armid.cli.options import (
+    NewFiles,
     campaign_argument,
     effects_option,
     examples,
     fixed_values,
     intervals,
+    made_by,
     opened,
     plugin_option,
+    refuse_unwritable,
 )
-from armid.cli.pages import write_page
-from armid.model import ArmidError, Effect, nearest
+from armid.errors import ArmidError, nearest
+from armid.model import Effect
 
 if TYPE_CHECKING:
-    from armid.discrepancy import ClosedLoop
+    from armid.loop import ClosedLoop
 
 
 @click.command("close-loop", short_help="Find the effects that the declared model lacks.", epilog=examples(
@@ -31,17 +32,31 @@ if TYPE_CHECKING:
     "armid close-loop CAMPAIGN --out DIR --plugin mine.py:my_drag",
 ))  # fmt: skip
 @campaign_argument
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder for report.html, report.md, report.json and the figures.")
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for report.html, report.md, report.json and the figures.",
+)
 @effects_option
 @click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]")
 @click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
-@click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
-              help="Free a parameter, of the model or of a candidate, between bounds, SI. Repeatable.")
+@click.option(
+    "--bounds",
+    multiple=True,
+    metavar="NAME=LOW:HIGH",
+    help="Free a parameter, of the model or of a candidate, between bounds, SI. Repeatable.",
+)
 @click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
 @click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0),
-              help="Seed of everything random; searches here start from evenly spread points, so that nothing is.")
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(0),
+    help="Seed of everything random; searches here start from evenly spread points, so that nothing is.",
+)
 @click.option("--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations.")
 @plugin_option
 def close_loop_command(
@@ -54,9 +69,9 @@ def close_loop_command(
     that is missing (or says that it cannot), adds it and identifies again, until nothing earns its parameters. Records
     held out are simulated after the last decision. Every verdict exits with 0.
     """
-    from numpy.random import default_rng  # noqa: PLC0415 - other commands do not need it
+    from numpy.random import default_rng
 
-    from armid.discrepancy import close_loop  # noqa: PLC0415 - scipy and compiled code that other commands do not need
+    from armid.loop import close_loop
 
     registry, read, model = opened(campaign, effects, plugins, window)
     wanted = looked_for(registry.effects, candidates, without)
@@ -89,17 +104,16 @@ def names_of(text: str, option: str, effects: dict[str, Effect]) -> list[str]:
 
 def report(found: "ClosedLoop") -> None:
     """Print the table of steps, the parameters, and remarks."""
-    from rich.console import Console  # noqa: PLC0415 - takes time to import
-    from rich.table import Table  # noqa: PLC0415
+    from rich.console import Console
+    from rich.table import Table
 
-    from armid.discrepancy.report import error_headers, error_rows  # noqa: PLC0415
-    from armid.discrepancy.words import parameter_rows, remarks, step_headers, step_rows  # noqa: PLC0415
+    from armid.loop.document import error_rows, parameter_rows, remarks, report_error_headers, step_headers, step_rows
 
     console = Console(width=None if sys.stdout.isatty() else 140)
     tables: list[tuple[str, list[str], list[list[str]]]] = [
         ("Steps", step_headers(found), step_rows(found)),
         ("Parameters", ["parameter", "before", "after", "trusted"], parameter_rows(found)),
-        ("Errors", error_headers(found), error_rows(found)),
+        ("Errors", report_error_headers(found), error_rows(found)),
     ]
     for title, headers, rows in tables:
         if rows:
@@ -114,12 +128,16 @@ def report(found: "ClosedLoop") -> None:
 
 def write(found: "ClosedLoop", out: Path) -> None:
     """Write report.html, report.md, report.json, details.json and the figures, all or none."""
-    from armid.discrepancy import report_of  # noqa: PLC0415
-    from armid.discrepancy.details import details_of  # noqa: PLC0415
-    from armid.discrepancy.figures import figures_of  # noqa: PLC0415 - takes time to import
-    from armid.discrepancy.figures.residuals import residual_figure  # noqa: PLC0415
-    from armid.discrepancy.report import markdown  # noqa: PLC0415
-    from armid.page import LOOP  # noqa: PLC0415
+    from armid.cli.report import LOOP, write_page
+    from armid.loop import report_of
+    from armid.loop.document import (
+        details_of,
+        markdown,
+    )
+    from armid.loop.figures import (
+        figures_of,
+        residual_figure,
+    )
 
     figures = figures_of(found)
     with NewFiles(out) as files:
@@ -143,8 +161,8 @@ class Status:
 
     def __enter__(self) -> "Status":
         if sys.stderr.isatty():
-            from rich.console import Console  # noqa: PLC0415
-            from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+            from rich.console import Console
+            from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
             columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
             self.bar = Progress(*columns, console=Console(stderr=True), transient=True)

@@ -9,8 +9,8 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.new_files import NewFiles, refuse_unwritable
 from armid.cli.options import (
+    NewFiles,
     accuracy_of,
     accuracy_option,
     assignments,
@@ -22,12 +22,14 @@ from armid.cli.options import (
     number,
     opened,
     plugin_option,
+    refuse_unwritable,
 )
-from armid.model import ArmidError, nearest
+from armid.errors import ArmidError, nearest
 
 if TYPE_CHECKING:
-    from armid.identifiability.examine import Examination
-    from armid.problem import Space
+    from armid.estimation.examine import Examination
+    from armid.problem.space import Space
+
 
 Array = NDArray[np.float64]
 # The rounding of a speed is larger.
@@ -40,20 +42,37 @@ LEAST_NOISE = 1e-15
 ))  # fmt: skip
 @campaign_argument
 @effects_option
-@click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
-              help="Free a parameter between bounds, SI. Repeatable.")
+@click.option(
+    "--bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable."
+)
 @click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
-@click.option("--at", default="", metavar="NAME=VALUE,...",
-              help="Examine this point, SI, instead of the least-squares estimate.")
-@click.option("--from", "source", type=click.Path(path_type=Path), metavar="RESULT.json",
-              help="Examine the point that `armid identify` found.")
+@click.option(
+    "--at", default="", metavar="NAME=VALUE,...", help="Examine this point, SI, instead of the least-squares estimate."
+)
+@click.option(
+    "--from",
+    "source",
+    type=click.Path(path_type=Path),
+    metavar="RESULT.json",
+    help="Examine the point that `armid identify` found.",
+)
 @click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
-@click.option("--noise", type=float, metavar="RMS",
-              help="White noise to assume for every record, rad/s or m/s, in place of what was measured.")
-@click.option("--rank", default="volume", show_default=True, metavar="volume|worst|shrinkage",
-              help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder for identifiability.json and the figures.")
+@click.option(
+    "--noise",
+    type=float,
+    metavar="RMS",
+    help="White noise to assume for every record, rad/s or m/s, in place of what was measured.",
+)
+@click.option(
+    "--rank",
+    default="volume",
+    show_default=True,
+    metavar="volume|worst|shrinkage",
+    help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.",
+)
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for identifiability.json and the figures."
+)
 @accuracy_option
 @plugin_option
 def identifiability_command(
@@ -65,9 +84,9 @@ def identifiability_command(
     Cramer-Rao intervals, parameters that move together, the profile likelihood of each parameter. Holdout records are
     not looked at.
     """
-    from armid.identifiability.examine import examine  # noqa: PLC0415 - compiled code that other commands do not need
-    from armid.identifiability.purchase import SHRINKAGE, VOLUME, WORST  # noqa: PLC0415
-    from armid.problem import space_of  # noqa: PLC0415
+    from armid.estimation.design import SHRINKAGE, VOLUME, WORST
+    from armid.estimation.examine import examine
+    from armid.problem.space import space_of
 
     if rank not in (VOLUME, WORST, SHRINKAGE):
         raise ArmidError(f"--rank '{rank}': {nearest(rank, (VOLUME, WORST, SHRINKAGE))}")
@@ -121,10 +140,13 @@ def free_values(space: "Space", given: dict[str, float], where: str) -> Array:
 
 def report(found: "Examination") -> None:
     """Print tables and remarks."""
-    from rich.console import Console  # noqa: PLC0415 - takes time to import
+    from rich.console import Console
 
-    from armid.identifiability.remarks import remarks  # noqa: PLC0415
-    from armid.identifiability.words import offer_table, parameter_table  # noqa: PLC0415
+    from armid.estimation.identifiability_document import (
+        offer_table,
+        parameter_table,
+        remarks,
+    )
 
     console = Console(width=None if sys.stdout.isatty() else 132)
     console.print(parameter_table(found))
@@ -135,8 +157,8 @@ def report(found: "Examination") -> None:
 
 def write(found: "Examination", out: Path) -> None:
     """Write identifiability.json and the figures, all or none."""
-    from armid.identifiability.figures import profile_figure, sensitivity_figure  # noqa: PLC0415
-    from armid.identifiability.result import result_of  # noqa: PLC0415
+    from armid.estimation.identifiability_document import result_of
+    from armid.estimation.identifiability_figures import profile_figure, sensitivity_figure
 
     with NewFiles(out) as files:
         text = json.dumps(result_of(found), indent=2, allow_nan=False) + "\n"

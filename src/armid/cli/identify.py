@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armid.cli.made_by import made_by
-from armid.cli.new_files import NewFiles, refuse_unwritable
 from armid.cli.options import (
+    NewFiles,
     accuracy_of,
     accuracy_option,
     assignments,
@@ -19,14 +18,15 @@ from armid.cli.options import (
     examples,
     fixed_values,
     intervals,
+    made_by,
     opened,
     plugin_option,
+    refuse_unwritable,
     value_of,
 )
-from armid.cli.pages import write_page
 
 if TYPE_CHECKING:
-    from armid.identification import Identification
+    from armid.estimation.identify import Identification
 
 
 @click.command("identify", epilog=examples(
@@ -35,25 +35,48 @@ if TYPE_CHECKING:
     "armid identify CAMPAIGN --effects coulomb --bounds coulomb.level=0:80 --fix n=1.4",
 ))  # fmt: skip
 @campaign_argument
-@click.option("--identifier", default="pso", show_default=True,
-              help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.")
-@click.option("--option", "options", multiple=True, metavar="NAME=VALUE",
-              help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
-              "0.5:0.3 for three phases), pso.velocity_limit=0.2. Repeatable.")
+@click.option(
+    "--identifier",
+    default="pso",
+    show_default=True,
+    help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.",
+)
+@click.option(
+    "--option",
+    "options",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
+    "0.5:0.3 for three phases), pso.velocity_limit=0.2. Repeatable.",
+)
 @click.option("--fitness", default="similarity", show_default=True, help="What is minimised: see `armid list fitness`.")
 @effects_option
-@click.option("--bounds", multiple=True, metavar="NAME=LOW:HIGH",
-              help="Free a parameter between bounds, SI. Repeatable.")
+@click.option(
+    "--bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable."
+)
 @click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
 @click.option("--window", default="", metavar="A:B", help="What fitness and errors see of every record, s.")
-@click.option("--budget", default=12_000, show_default=True,
-              help="Simulations: one candidate through all train records counts as one.")
-@click.option("--target", type=float,
-              help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0),
-              help="Seed of everything random; the same gives the same result.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder for report.html, result.json and the figures.")
+@click.option(
+    "--budget",
+    default=12_000,
+    show_default=True,
+    help="Simulations: one candidate through all train records counts as one.",
+)
+@click.option(
+    "--target",
+    type=float,
+    help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.",
+)
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(0),
+    help="Seed of everything random; the same gives the same result.",
+)
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for report.html, result.json and the figures."
+)
 @accuracy_option
 @plugin_option
 def identify_command(
@@ -67,10 +90,10 @@ def identify_command(
     noise), warnings in words, and errors. Without --out nothing is written. Ctrl-C ends the search, judges the best so
     far, and exits with 130.
     """
-    from armid.fitness import SIMILARITIES  # noqa: PLC0415 - compiled code that other commands do not need
-    from armid.identification import INTERRUPTED  # noqa: PLC0415 - pymoo takes time to import
-    from armid.identification import identify as run  # noqa: PLC0415
-    from armid.problem import space_of  # noqa: PLC0415
+    from armid.estimation.identify import INTERRUPTED
+    from armid.estimation.identify import identify as run
+    from armid.problem.fitness import SIMILARITIES
+    from armid.problem.space import space_of
 
     registry, read, model = opened(campaign, effects, plugins, window)
     space = space_of(model, read.parameters, intervals(bounds, "--bounds"), fixed_values(fix, model))
@@ -91,10 +114,13 @@ def identify_command(
 
 def report(found: "Identification") -> None:
     """Print tables and remarks."""
-    from rich.console import Console  # noqa: PLC0415 - takes time to import
+    from rich.console import Console
 
-    from armid.identification.remarks import remarks  # noqa: PLC0415
-    from armid.identification.words import error_table, parameter_table  # noqa: PLC0415
+    from armid.estimation.identify_document import (
+        error_table,
+        parameter_table,
+        remarks,
+    )
 
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(parameter_table(found))
@@ -107,10 +133,12 @@ def report(found: "Identification") -> None:
 
 def write(found: "Identification", out: Path) -> None:
     """Write report.html, result.json, details.json and the figures, all or none."""
-    from armid.identification.details import details_of  # noqa: PLC0415
-    from armid.identification.figures import convergence_figure, fit_figure  # noqa: PLC0415
-    from armid.identification.result import result_of  # noqa: PLC0415
-    from armid.page import IDENTIFICATION  # noqa: PLC0415
+    from armid.cli.report import IDENTIFICATION, write_page
+    from armid.estimation.identify_document import (
+        details_of,
+        result_of,
+    )
+    from armid.estimation.identify_figures import convergence_figure, fit_figure
 
     with NewFiles(out) as files:
         files.path("result.json").write_text(json.dumps(result_of(found), indent=2, allow_nan=False) + "\n")
@@ -132,8 +160,8 @@ class Progress:
 
     def __enter__(self) -> "Progress":
         if sys.stderr.isatty():
-            from rich.console import Console  # noqa: PLC0415
-            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
             self.bar = Progress(
                 TextColumn("{task.completed:.0f}/{task.total:.0f} simulations"), BarColumn(),

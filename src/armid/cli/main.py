@@ -6,20 +6,18 @@ from typing import Any
 
 import click
 
-from armid.cli.bench import bench_command
-from armid.cli.check import check_command
+from armid.cli.check import bench_command, check_command
 from armid.cli.close_loop import close_loop_command
-from armid.cli.export import export_group
 from armid.cli.identifiability import identifiability_command
 from armid.cli.identify import identify_command
-from armid.cli.importing import import_group
 from armid.cli.listing import list_command
 from armid.cli.new import new_command
 from armid.cli.options import examples
 from armid.cli.report import report_command
 from armid.cli.simulate import simulate_command
 from armid.cli.study import study_command
-from armid.model import ArmidError
+from armid.cli.transfer import export_group, import_group
+from armid.errors import ArmidError
 from armid.registry import place_in_plugin
 
 BAD_INPUT, INTERRUPTED = 2, 130

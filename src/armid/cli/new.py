@@ -1,13 +1,24 @@
 """`armid new`: a commented starting file."""
 
+import ast
 import os.path
+import re
+import sys
+import sysconfig
+from collections.abc import Collection
+from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
+from string import Template
 
 import click
+import numpy as np
+from numpy.typing import NDArray
 
-from armid.cli.new_files import NewFiles
-from armid.cli.options import chosen, examples
-from armid.model import ArmidError
+from armid.cli.options import NewFiles, chosen, examples
+from armid.errors import ArmidError
+from armid.model.effect import RESERVED
+from armid.model.parameter import check_name
 from armid.registry import load_registry
 
 CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifiers", "plant": "plants"}
@@ -18,8 +29,14 @@ CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifi
 ))  # fmt: skip
 @click.argument("kind", metavar="effect|fitness|identifier|plant|campaign")
 @click.argument("name", metavar="NAME")
-@click.option("--out", default=".", show_default="this folder", type=click.Path(path_type=Path), metavar="FOLDER",
-              help="Folder to write to.")
+@click.option(
+    "--out",
+    default=".",
+    show_default="this folder",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Folder to write to.",
+)
 def new_command(kind: str, name: str, out: Path) -> None:
     """Write a commented starting file of your own that passes `armid check`.
 
@@ -27,7 +44,7 @@ def new_command(kind: str, name: str, out: Path) -> None:
     becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and say so. Nothing
     that exists is overwritten.
     """
-    from armid.new import KINDS, check_new_name  # noqa: PLC0415 - other commands do not need it
+    pass
 
     chosen(kind, dict.fromkeys(KINDS), "kind")
     taken = getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else {}
@@ -41,11 +58,108 @@ def new_command(kind: str, name: str, out: Path) -> None:
 
 def write(kind: str, name: str, target: Path) -> None:
     """Write the file or the folder, whole or not at all."""
-    from armid.new import campaign_text, python_file, synthetic_records  # noqa: PLC0415 - as above
-    from armid.record import write_campaign  # noqa: PLC0415
+    pass
+    from armid.record import write_campaign
 
     if kind not in CATALOGUES:
         write_campaign(target, campaign_text(name), synthetic_records())
         return
     with NewFiles(target.parent) as files:
         files.path(target.name).write_text(python_file(kind, name), encoding="utf-8")
+
+
+CAMPAIGN = "campaign"
+KINDS = ("effect", "fitness", "identifier", "plant", CAMPAIGN)
+FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+
+
+def template(file: str) -> Template:
+    """Return the text of a file of templates; `$name` in it stands for the user's name."""
+    return Template((files("armid.cli") / "templates" / file).read_text(encoding="utf-8"))
+
+
+def python_file(kind: str, name: str) -> str:
+    """Return the text of a Python file that declares one thing of a user.
+
+    kind: "effect", "fitness", "identifier" or "plant". name: of the thing, and of the file without its ending.
+    """
+    return template(f"{kind}.py.txt").substitute(name=name)
+
+
+def check_new_name(kind: str, name: str, taken: Collection[str] = ()) -> None:
+    """Refuse a name that a starting file could not have.
+
+    taken: names of the same kind that are registered.
+
+    Raises ArmidError for a name that is no Python name (for a campaign: no plain name of a folder), is registered, is
+    used in the file itself, or is that of a module, which the file would hide.
+    """
+    if kind == CAMPAIGN:
+        if not FOLDER_NAME.fullmatch(name) or name.endswith("."):
+            raise ArmidError(f"campaign '{name}' is no usable name: letters, digits, '_', '-' and '.' are expected")
+        return
+    check_name(name, kind)
+    if name in taken or (kind == "effect" and name in RESERVED):
+        raise ArmidError(f"{kind} '{name}' is there already: another name is expected")
+    if name in names_in(python_file(kind, "_")):
+        raise ArmidError(f"{kind} '{name}' cannot have this name, which the file itself uses: another is expected")
+    if is_module(name):
+        raise ArmidError(f"{kind} '{name}' cannot have this name: {name}.py would hide the module '{name}'")
+
+
+def names_in(text: str) -> set[str]:
+    """Return every name that a Python file uses or binds."""
+    found = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Name):
+            found.add(node.id)
+        elif isinstance(node, ast.FunctionDef | ast.alias):
+            found.add(getattr(node, "asname", None) or node.name)
+        elif isinstance(node, ast.arg):
+            found.add(node.arg)
+    return found
+
+
+def is_module(name: str) -> bool:
+    """Tell whether Python or a package that is installed has a module of the name."""
+    found = find_spec(name)
+    if name == __package__.partition(".")[0] or name in sys.stdlib_module_names:
+        return True
+    return found is not None and str(found.origin).startswith(tuple(sysconfig.get_paths().values()))
+
+
+Array = NDArray[np.float64]
+# The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
+INERTIA, FRICTION, NOISE = 0.05, 0.03, 0.01
+INTERVAL, N_SAMPLES = 0.005, 401
+# File -> size [N m] and frequency [Hz] of the drive, seed of the noise.
+RECORDS = {"synthetic_train.csv": (1.0, 0.8, 1), "synthetic_holdout.csv": (0.7, 1.3, 2)}
+FIRST_STEP = 0.1
+DIGITS = 6
+
+
+def campaign_text(name: str) -> str:
+    """Return the text of campaign.toml."""
+    return template("campaign.toml.txt").substitute(name=name, inertia=INERTIA, friction=FRICTION, noise=NOISE)
+
+
+def synthetic_records() -> dict[str, dict[str, Array]]:
+    """Return file -> header -> values, shape (401,), of the made-up axis; the same at every call."""
+    return {file: record(*told) for file, told in RECORDS.items()}
+
+
+def record(size: float, frequency: float, seed: int) -> dict[str, Array]:
+    """Return header -> values of one record: a drive that steps to and fro, and the speed with noise.
+
+    J dv/dt = u - c v with u constant between samples is solved exactly:
+    v' = v exp(-c dt/J) + u/c (1 - exp(-c dt/J)).
+    """
+    times = INTERVAL * np.arange(N_SAMPLES)
+    drive = np.where(times < FIRST_STEP, 0.0, size * np.sign(np.cos(2.0 * np.pi * frequency * (times - FIRST_STEP))))
+    kept = np.exp(-FRICTION * INTERVAL / INERTIA)
+    speed = np.zeros(N_SAMPLES)
+    for i in range(N_SAMPLES - 1):
+        speed[i + 1] = kept * speed[i] + drive[i] / FRICTION * (1.0 - kept)
+    measured = speed + NOISE * np.random.default_rng(seed).standard_normal(N_SAMPLES)
+    columns = {"time_s": times, "angular_velocity_rad_s": measured, "drive_N_m": drive}
+    return {header: np.round(values, DIGITS) for header, values in columns.items()}

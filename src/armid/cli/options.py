@@ -1,18 +1,24 @@
 """Options that several commands share, and how their texts become values."""
 
+import os
+import shlex
 import warnings
 from collections.abc import Iterable
+from contextlib import suppress
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from armid.model import ArmidError, Model, nearest
+from armid.errors import ArmidError, nearest
+from armid.model import Model
 from armid.registry import Registry, load_registry
 
 if TYPE_CHECKING:
     from armid.record import Campaign
+
 
 # By such a factor a value misses its declared range that was told in another unit.
 FAR = 100.0
@@ -45,7 +51,7 @@ def opened(campaign: Path, effects: str, plugins: Iterable[str], window: str = "
 
     Raises ArmidError for whatever of them cannot be used.
     """
-    from armid.record import read_campaign  # noqa: PLC0415 - `armid list` and `armid new` read no record
+    from armid.record import read_campaign
 
     registry = load_registry(plugins)
     read = read_campaign(campaign, registry.plants, registry.effects)
@@ -156,3 +162,75 @@ def model_of(campaign: "Campaign", effects: str, registry: Registry) -> Model:
             raise ArmidError(f"effect '{name}' is not known: {nearest(name, registry.effects)}")
         model = model + (effect.in_form(form) if form else effect)
     return model
+
+
+def made_by() -> dict[str, Any]:
+    """Return the command that is running, as a shell takes it, and the value of each of its options."""
+    context = click.get_current_context()
+    words = [str(word) for word in context.find_root().obj or ()]
+    return {
+        "command": shlex.join(["armid", *words]),
+        "settings": {name: plain(value) for name, value in context.params.items()},
+    }
+
+
+def plain(value: Any) -> Any:
+    """Return an option as JSON can hold it."""
+    if isinstance(value, tuple | list):
+        return [plain(v) for v in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+class NewFiles:
+    """Write files beside a folder and move them in when all are there, so that nothing half-written is found.
+
+    names: the files so far. A folder that is made for them goes again when nothing comes into it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.names: list[str] = []
+
+    def __enter__(self) -> "NewFiles":
+        if self.folder.exists() and not self.folder.is_dir():
+            raise ArmidError(f"--out {self.folder} is a file: a folder is expected")
+        self._is_new = not self.folder.exists()
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._beside = TemporaryDirectory(dir=self.folder, prefix=".armid-")
+        return self
+
+    @property
+    def place(self) -> Path:
+        """Where the files are until all are there."""
+        return Path(self._beside.name)
+
+    def path(self, name: str) -> Path:
+        """Return where to write a file for now.
+
+        Raises ArmidError when a folder has its name.
+        """
+        if (self.folder / name).is_dir():
+            raise ArmidError(f"--out {self.folder} holds a folder {name}: a place for a file of that name is expected")
+        self.names.append(name)
+        path = self.place / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            for name in self.names:
+                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+                os.replace(self.place / name, self.folder / name)
+        self._beside.cleanup()
+        if self._is_new:
+            with suppress(OSError):
+                self.folder.rmdir()
+
+
+def refuse_unwritable(folder: Path) -> None:
+    """Refuse a folder before the work, not after it.
+
+    Raises ArmidError for a file, OSError for a place where nothing can be written.
+    """
+    with NewFiles(folder):
+        pass

@@ -1,15 +1,20 @@
 """`armid report`: one page, tables and figures from stored results."""
 
+import json
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from armid.cli.new_files import NewFiles
-from armid.cli.options import examples
-from armid.model import ArmidError
+from armid.cli.options import NewFiles, examples
+from armid.errors import ArmidError
+from armid.estimation.identify_document import FIGURES as IDENTIFY_FIGURES
+from armid.estimation.identify_document import identify_page
+from armid.loop.document import FIGURES as LOOP_FIGURES
+from armid.loop.document import loop_page
+from armid.report.document import Page
 
 if TYPE_CHECKING:
     from armid.study.report import Report
@@ -20,8 +25,12 @@ if TYPE_CHECKING:
     "armid report results/table1_short", "armid report results/four_strokes",
 ))  # fmt: skip
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--key", type=click.Path(path_type=Path), metavar="FILE",
-              help="Truth of blind campaigns. [default: the file that the study names]")
+@click.option(
+    "--key",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Truth of blind campaigns. [default: the file that the study names]",
+)
 def report_command(folder: Path, key: Path | None) -> None:
     """Write report.html, one self-contained page, beside stored results.
 
@@ -30,7 +39,7 @@ def report_command(folder: Path, key: Path | None) -> None:
     and SVG are written too, and the main table is printed; one that is not complete is reported as far as it is, and
     the report says so.
     """
-    from armid.page import STUDY, result_in  # noqa: PLC0415 - jinja2 and seaborn take time to import
+    pass
 
     result = result_in(folder)
     if result == STUDY:
@@ -43,7 +52,7 @@ def report_command(folder: Path, key: Path | None) -> None:
 
 def report_folder(folder: Path, result: str) -> None:
     """Write the page of a closed loop or an identification."""
-    from armid.page import PAGE, html, page_of_folder  # noqa: PLC0415
+    from armid.report.html import html
 
     text = html(page_of_folder(folder, result, str(folder)))
     with NewFiles(folder) as files:
@@ -53,10 +62,13 @@ def report_folder(folder: Path, result: str) -> None:
 
 def report_study(folder: Path, key: Path | None) -> None:
     """Write the page, tables and figures of a study, and print its main table."""
-    from armid.page import PAGE, html  # noqa: PLC0415
-    from armid.page.study_page import study_page  # noqa: PLC0415
-    from armid.study.report import report_of, write_report  # noqa: PLC0415 - pandas takes time to import
-    from armid.study.results import load_study  # noqa: PLC0415
+    from armid.report.html import html
+    from armid.study.document import (
+        report_of,
+        study_page,
+    )
+    from armid.study.markdown import write_report
+    from armid.study.results import load_study
 
     results = load_study(folder)
     report = report_of(results, key)
@@ -87,11 +99,11 @@ def models_of(results: "StudyResults") -> list[str]:
 
 def show(report: "Report") -> None:
     """Print state and main table; what its first column repeats becomes a line of its own."""
-    from rich.box import SIMPLE_HEAD  # noqa: PLC0415 - takes time to import
-    from rich.console import Console  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
 
-    from armid.study.tables import shown_rows  # noqa: PLC0415
+    from armid.study.analyses.table import shown_rows
 
     console = Console(width=None if sys.stdout.isatty() else 150)
     table = Table(title=report.main.title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
@@ -108,3 +120,83 @@ def show(report: "Report") -> None:
     console.print(table)
     for text in (report.main.words, report.state):
         console.print(text, highlight=False, markup=False)
+
+
+STUDY, LOOP, IDENTIFICATION = "study.sqlite", "report.json", "result.json"
+MADE_BY = {STUDY: "armid study", LOOP: "armid close-loop", IDENTIFICATION: "armid identify"}
+DETAILS = "details.json"
+
+
+def result_in(folder: Path) -> str:
+    """Return the file that says what a folder holds; a study's store may be named itself.
+
+    Raises ArmidError for a folder without any, and for one with the results of two commands.
+    """
+    if folder.name == STUDY:
+        return STUDY
+    there = [name for name in MADE_BY if (folder / name).is_file()]
+    if len(there) == 1 or STUDY in there:
+        return there[0]
+    if there:
+        raise ArmidError(f"{folder} holds {' and '.join(there)}, which two commands wrote: one of them is expected")
+    names = [f"{name} of `{command}`" for name, command in MADE_BY.items()]
+    raise ArmidError(f"{folder} holds no result: {', '.join(names[:-1])} or {names[-1]} is expected")
+
+
+def read_json(path: Path, command: str) -> dict[str, Any]:
+    """Return a stored JSON table.
+
+    Raises ArmidError for a file that is none.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ArmidError(f"{path} is no JSON ({error}): what `{command}` wrote is expected") from error
+    if not isinstance(found, dict):
+        raise ArmidError(f"{path} holds no table: what `{command}` wrote is expected")
+    return found
+
+
+def details_in(folder: Path, command: str) -> dict[str, Any]:
+    """Return the details beside a result, empty where an earlier version of armid wrote none."""
+    path = folder / DETAILS
+    return read_json(path, command) if path.is_file() else {}
+
+
+def drawings_in(folder: Path, names: tuple[str, ...]) -> dict[str, str]:
+    """Return name -> text of the SVG files that are there, in order."""
+    files = {name: folder / f"{name}.svg" for name in names}
+    return {name: path.read_text(encoding="utf-8") for name, path in files.items() if path.is_file()}
+
+
+PAGE = "report.html"
+MAKERS = {LOOP: (loop_page, LOOP_FIGURES), IDENTIFICATION: (identify_page, IDENTIFY_FIGURES)}
+
+
+def page_of_folder(folder: Path, result: str, name: str) -> Page:
+    """Return the page of a closed loop or of an identification.
+
+    folder: where the files are; result: which of them holds the result, see `result_in`; name: of the folder, in the
+    command that makes the page again.
+
+    Raises ArmidError for files that are not what the commands write.
+    """
+    make, figures = MAKERS[result]
+    stored = read_json(folder / result, MADE_BY[result])
+    details = details_in(folder, MADE_BY[result])
+    svgs = drawings_in(folder, tuple(figures))
+    try:
+        return make(stored, details, svgs, f"armid report {name}")
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise ArmidError(
+            f"{folder / result}, or details.json beside it, is not what `{MADE_BY[result]}` writes "
+            f"({type(error).__name__}: {error}): a folder that it wrote is expected"
+        ) from error
+
+
+def write_page(files: NewFiles, result: str, folder: Path) -> None:
+    """Write report.html from files that are about to be moved into a folder; result: the one that holds the result."""
+    from armid.report.html import html
+
+    text = html(page_of_folder(files.place, result, str(folder)))
+    files.path(PAGE).write_text(text, encoding="utf-8")

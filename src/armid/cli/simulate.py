@@ -7,8 +7,8 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.new_files import NewFiles
 from armid.cli.options import (
+    NewFiles,
     accuracy_of,
     accuracy_option,
     campaign_argument,
@@ -18,9 +18,10 @@ from armid.cli.options import (
     opened,
     plugin_option,
 )
-from armid.model import ArmidError, Model, nearest
+from armid.engine import accuracy_against, calibrate, simulate
+from armid.errors import ArmidError, nearest
+from armid.model import Model
 from armid.record import Campaign, Override, Piece, Record, write_table
-from armid.simulation import accuracy_against, calibrate, simulate
 
 Array = NDArray[np.float64]
 SIGNAL = {"rad/s": "angular_velocity_rad_s", "m/s": "velocity_m_s"}

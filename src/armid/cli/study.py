@@ -11,6 +11,7 @@ from armid.cli.options import examples, plugin_option
 if TYPE_CHECKING:
     from armid.study.runner import Ending
 
+
 MOST_NAMED = 300
 
 
@@ -22,12 +23,22 @@ MOST_NAMED = 300
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("--jobs", type=click.IntRange(1), help="Worker processes. [default: as many as processors]")
 @click.option("--dask", metavar="tcp://HOST:PORT", help="Scheduler of a Dask cluster, in place of own processes.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder of the results. [default: results/NAME]")
-@click.option("--time-limit", default=600.0, show_default=True, metavar="S",
-              help="A run that takes longer is stopped and counts as failed, s.")
-@click.option("--only", default="*", metavar="CASE/IDENTIFIER",
-              help="Run these only; * and ? stand for any letters, CASE alone for all identifiers.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder of the results. [default: results/NAME]"
+)
+@click.option(
+    "--time-limit",
+    default=600.0,
+    show_default=True,
+    metavar="S",
+    help="A run that takes longer is stopped and counts as failed, s.",
+)
+@click.option(
+    "--only",
+    default="*",
+    metavar="CASE/IDENTIFIER",
+    help="Run these only; * and ? stand for any letters, CASE alone for all identifiers.",
+)
 @click.option("--retry", is_flag=True, help="Perform failed runs anew.")
 @plugin_option
 def study_command(
@@ -40,9 +51,12 @@ def study_command(
     Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not. Ends
     with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
-    from armid.study.progress import Watch  # noqa: PLC0415
-    from armid.study.runner import absolute, run  # noqa: PLC0415 - compiled code that other commands do not need
-    from armid.study.study import read_study  # noqa: PLC0415
+    from armid.study.runner import (
+        Watch,
+        absolute,
+        run,
+    )
+    from armid.study.study import read_study
 
     with Watch() as watch:
         known = read_study(study, absolute(plugins))
@@ -57,16 +71,16 @@ def study_command(
 
 def show_table(folder: Path) -> None:
     """Print the main table of the report, the rest of which takes longer."""
-    from armid.cli.report import show  # noqa: PLC0415
-    from armid.study.report import summary_of  # noqa: PLC0415 - pandas takes time to import
-    from armid.study.results import load_study  # noqa: PLC0415
+    from armid.cli.report import show
+    from armid.study.document import summary_of
+    from armid.study.results import load_study
 
     show(summary_of(load_study(folder)))
 
 
 def words(ending: "Ending") -> list[str]:
     """Return what a reader must know of how it ended, one sentence each."""
-    from armid.study.progress import span  # noqa: PLC0415
+    from armid.study.runner import span
 
     counts, name = ending.counts, ending.study.name
     speed = f", {ending.simulations / ending.seconds:,.0f} simulations/s" if ending.simulations else ""

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.contract.finding import Finding
-from armid.fitness import Fitness
-from armid.model import ArmidError
+from armid.contract.trials import Finding
+from armid.errors import ArmidError
+from armid.problem.fitness import Fitness
 
 Array = NDArray[np.float64]
 INTERVAL, NOISE = 1e-3, 0.01

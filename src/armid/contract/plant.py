@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from armid.contract.candidates import nominal
-from armid.contract.effect_on_plant import agrees, deterministic, finite
-from armid.contract.finding import Finding
-from armid.contract.manoeuvres import trial_manoeuvres
-from armid.contract.parameters import check_parameters, finding
-from armid.model import ArmidError, Model, Plant
-from armid.simulation import simulate
+from armid.contract.effect import agrees, deterministic, finite
+from armid.contract.trials import Finding, check_parameters, finding, nominal, trial_manoeuvres
+from armid.engine import simulate
+from armid.errors import ArmidError
+from armid.model import Model, Plant
 
 UNITS = ("rad/s", "m/s")
 

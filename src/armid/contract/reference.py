@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from armid.model import ArmidError, Manoeuvre, Model
+from armid.errors import ArmidError
+from armid.model import Manoeuvre, Model
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-10

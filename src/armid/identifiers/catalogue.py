@@ -1,19 +1,35 @@
-"""The identifiers by name."""
+"""Identifiers by name, the composed ones too."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from armid.identifiers.cmaes import CmaesOptions, cmaes_method
-from armid.identifiers.identifier import Identifier
+from armid.errors import ArmidError, nearest
+from armid.identifiers.adapter import Searching
+from armid.identifiers.chain import PREFIX, chain_of, multistart_of
+from armid.identifiers.cmaes import CmaesOptions, UniformOptions, cmaes_method, uniform_method
+from armid.identifiers.identifier import Identifier, checked_count, checked_population, options_of
 from armid.identifiers.least_squares import LeastSquaresOptions, least_squares_method
-from armid.identifiers.nlopt_local import GradientOptions, LocalOptions, nlopt_method
-from armid.identifiers.of_pymoo import differential, genetic, pymoo_swarm
-from armid.identifiers.options import checked_count, checked_population, options_of
+from armid.identifiers.nlopt import GradientOptions, LocalOptions, nlopt_method
 from armid.identifiers.pso import PaperPSO
+from armid.identifiers.pymoo_algorithms import differential, genetic, pymoo_swarm
 from armid.identifiers.search import Method
-from armid.identifiers.searching import Searching
-from armid.identifiers.uniform import UniformOptions, uniform_method
+
+
+def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
+    """Return the identifier of a name, of `multistart:LOCAL`, or of a chain `GLOBAL+LOCAL[+LOCAL]`.
+
+    known: name -> identifier, those that may stand in a name; a user's own among them.
+    Raises ArmidError with the nearest name for one that is not known, and for a composition that makes no sense.
+    """
+    if name in known:
+        return known[name]
+    parts = name.split("+")
+    if len(parts) > 1:
+        return chain_of([identifier_of(part, known) for part in parts])
+    if name.startswith(PREFIX):
+        return multistart_of(identifier_of(name.removeprefix(PREFIX), known))
+    raise ArmidError(f"identifier '{name}' is not known: {nearest(name, known)}")
 
 
 def swarm(budget: int, **options: Any) -> PaperPSO:

@@ -1,20 +1,50 @@
 """Identifiers one after another: a global phase, then local ones from the best that was found."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import accumulate
 from typing import Any
 
+import numpy as np
 from pymoo.core.algorithm import Algorithm
 
-from armid.identifiers.driven import search_of, takes_start
-from armid.identifiers.identifier import Identifier
-from armid.identifiers.options import checked_share
-from armid.identifiers.phases import of_phases
+from armid.engine import golden_steps
+from armid.errors import ArmidError, nearest
+from armid.identifiers.adapter import Searching, search_of, takes_start
+from armid.identifiers.identifier import Identifier, checked_share
 from armid.identifiers.search import Array, Ask, Asker, Best, Dropped, Method, Search, Task, Told
-from armid.identifiers.searching import Searching
-from armid.model.errors import ArmidError
+
+
+def of_phases(
+    options: Mapping[str, Any], phases: Sequence[Identifier], own: Sequence[str], whose: str
+) -> tuple[Identifier, ...]:
+    """Return the phases with their options: NAME.OPTION belongs to each phase of that name.
+
+    own: options of the whole, which are passed over; whose: how a message names the whole.
+    Raises ArmidError for an option of no phase; what a phase does not know it refuses itself when it is built.
+    """
+    named: dict[str, dict[str, Any]] = {simple_name(phase): {} for phase in phases}
+    for key, value in options.items():
+        name, dot, option = key.partition(".")
+        if dot and name in named:
+            named[name][option] = value
+        elif key not in own:
+            known = [*own, *(f"{phase}.{option or key}" for phase in named)]
+            raise ArmidError(f"{whose} has no option '{key}', {nearest(key, known)}")
+    return tuple(phase.with_options(told(phase, named[simple_name(phase)])) for phase in phases)
+
+
+def simple_name(phase: Identifier) -> str:
+    """Return the name by which options call a phase: that of the local one for a multistart."""
+    return phase.name.rpartition(":")[2]
+
+
+def told(phase: Identifier, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options as the phase itself wants them: a multistart passes them on by name."""
+    prefix = f"{simple_name(phase)}." if phase.name != simple_name(phase) else ""
+    return {f"{prefix}{option}": value for option, value in options.items()}
+
 
 Build = Callable[[], Algorithm]
 
@@ -143,3 +173,52 @@ class Seen:
         """Count candidates and keep the best."""
         self.used += len(X)
         self.best.see(X, told.F)
+
+
+PREFIX = "multistart:"
+
+
+def multistart_of(local: Identifier) -> Identifier:
+    """Return the identifier that starts a local one from points spread over the box until the budget is used.
+
+    Options of the local one carry its name, as in `bobyqa.tolerance`.
+    Raises ArmidError for a global one.
+    """
+    if local.is_global:
+        raise ArmidError(f"identifier '{local.name}' is global, {PREFIX} expects a local one")
+    return Identifier(
+        f"{PREFIX}{local.name}", partial(built_multistart, local), f"{local.name} from ever new starts", is_global=True,
+        uses_gradient=local.uses_gradient, needs_residuals=local.needs_residuals,
+    )  # fmt: skip
+
+
+def built_multistart(local: Identifier, budget: int, **options: Any) -> Searching:
+    """Build the algorithm; refuse with ArmidError a local one that takes no start, and options that nobody knows."""
+    (told,) = of_phases(options, (local,), (), f"'{PREFIX}{local.name}'")
+    build = partial(told.build, budget)
+    algorithm = build()
+    if not takes_start(algorithm):
+        raise ArmidError(f"identifier '{local.name}' takes no start x0, {PREFIX} expects one that does")
+    return Searching(multistart_method(build), budget)
+
+
+def multistart_method(build: Callable[[], Algorithm]) -> Method:
+    """Return the search that starts a fresh local one at the task's start, if it has one, then at spread points."""
+
+    def method(task: Task) -> Search:
+        cube = task.cube
+        start = task.start
+        for point in spread(task.random, cube.n):
+            yield from search_of(build(), task.at(cube.candidates(point)[0] if start is None else start))
+            start = None
+        return True
+
+    return method
+
+
+def spread(random: np.random.Generator, n: int) -> Iterator[Array]:
+    """Yield points that fill the unit cube ever more evenly: a Kronecker sequence from a random point, (n,) each."""
+    steps, point = golden_steps(n), random.random(n)
+    while True:
+        yield point
+        point = (point + steps) % 1.0

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from armid.identifiers.options import checked, checked_population, checked_share
+from armid.identifiers.identifier import checked, checked_population, checked_share
 from armid.identifiers.search import Array, Ask, Method, Search, Task
-from armid.problem import PENALTY
+from armid.problem.meter import PENALTY
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def cmaes_method(options: CmaesOptions) -> Method:
 
 def one_run(task: Task, start: Array, initial_step: float, n_candidates: int) -> Search:
     """Search until CMA-ES finds nothing more from this start."""
-    from cma import CMAEvolutionStrategy  # noqa: PLC0415 - takes time to import
+    from cma import CMAEvolutionStrategy
 
     strategy = CMAEvolutionStrategy(start, initial_step, settings(task, n_candidates))
     cube = task.cube
@@ -68,3 +68,24 @@ def settings(task: Task, n_candidates: int) -> dict[str, Any]:
         "bounds": [0.0, 1.0], "popsize": n_candidates, "randn": normal, "seed": np.nan, "verbose": -10, "verb_log": 0,
         "verb_disp": 0, "signals_filename": "",
     }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class UniformOptions:
+    """Hold the options of random search. n_candidates: drawn at a time."""
+
+    n_candidates: int = 80
+
+    def __post_init__(self) -> None:
+        checked_population("n_candidates", self.n_candidates)
+
+
+def uniform_method(options: UniformOptions) -> Method:
+    """Return the search that draws candidates uniformly from the box and learns nothing."""
+
+    def method(task: Task) -> Search:
+        cube = task.cube
+        while True:
+            yield Ask(cube.candidates(task.random.random((options.n_candidates, cube.n))))
+
+    return method

@@ -8,9 +8,9 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
-from armid.identifiers.options import OF_PYMOO, OF_SETUP, checked, checked_count, checked_population, refuse_unknown
-from armid.identifiers.population import SwarmEvaluator, as_population, box
-from armid.model.errors import ArmidError
+from armid.errors import ArmidError
+from armid.identifiers.identifier import OF_PYMOO, OF_SETUP, checked, checked_count, checked_population, refuse_unknown
+from armid.identifiers.search import SwarmEvaluator, as_population, box
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from armid.model.errors import ArmidError, nearest
+from armid.errors import ArmidError, nearest
 from armid.model.parameter import Parameter, check_name
 
 Equation = Callable[..., Any]

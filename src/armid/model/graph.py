@@ -4,8 +4,8 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+from armid.errors import ArmidError, nearest
 from armid.model.effect import Effect, Equation
-from armid.model.errors import ArmidError, nearest
 from armid.model.plant import Plant
 
 LEAVES = ("parameter", "constant", "state", "input", "latch", "time")

@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from armid.errors import ArmidError, nearest
 from armid.model.effect import Effect, State
 from armid.model.equations import equations_text
-from armid.model.errors import ArmidError, nearest
 from armid.model.graph import Graph, build_graph
-from armid.model.parameter import Parameter
+from armid.model.parameter import Parameter, resolve
 from armid.model.plant import Plant
-from armid.model.scales import resolve
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,3 +81,25 @@ class Model:
                 raise ArmidError(f"constant '{name}' is not one of plant '{self.plant.name}': "
                                  f"{nearest(name, self.constants)}")  # fmt: skip
         return [float(given.get(name, value)) for name, value in self.constants.items()]
+
+
+def refusal_of(effect: Effect, plant: Plant) -> str:
+    """Return the sentence with which a plant refuses an effect, "" where it takes it."""
+    try:
+        Model(plant) + effect
+    except ArmidError as error:
+        return str(error)
+    return ""
+
+
+def applicable(effects: Mapping[str, Effect], plant: Plant) -> dict[str, Effect]:
+    """Return the effects of which a plant offers the ports and names; nothing is compiled.
+
+    effects: name -> effect. An effect of which only another form fits comes in that form.
+    """
+    found = {}
+    for name, effect in effects.items():
+        fitting = next((e for e in effect.every_form if not refusal_of(e, plant)), None)
+        if fitting is not None:
+            found[name] = fitting
+    return found

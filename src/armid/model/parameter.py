@@ -1,9 +1,11 @@
-"""An unknown of a machine: name, unit, bounds, null value."""
+"""The natural sizes of a machine, so that one effect serves a 0.2 N m pendulum and a 600 N m arm."""
 
 import keyword
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
+from typing import Any
 
-from armid.model.errors import ArmidError
+from armid.errors import ArmidError, nearest
 
 
 def check_name(name: str, what: str) -> None:
@@ -44,3 +46,71 @@ class Parameter:
         check_name(self.name, "parameter")
         if not self.low < self.high:
             raise ArmidError(f"parameter '{self.name}' has low {self.low} and high {self.high}: low < high is expected")
+
+
+WORDS = ("effort", "speed", "inertia", "s", "1")
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Declare the sizes of effort and speed of a machine.
+
+    effort, speed: typical largest effort and speed, SI.
+    effort_unit: "N m" or "N"; length_unit: "rad" or "m" (speed is in length_unit/s).
+    """
+
+    effort: float
+    speed: float
+    effort_unit: str = "N m"
+    length_unit: str = "rad"
+
+    @property
+    def speed_unit(self) -> str:
+        """Unit of speed."""
+        return f"{self.length_unit}/s"
+
+    @property
+    def inertia_unit(self) -> str:
+        """Unit of effort over acceleration."""
+        return "kg" if self.length_unit == "m" else "kg m2"
+
+
+def powers_of(unit: str) -> dict[str, int] | None:
+    """Return word -> exponent of a product of scales, or None when the unit is a physical one."""
+    if not re.fullmatch(r"\w+(\^\d)?([*/]\w+(\^\d)?)*", unit) or not re.search(r"effort|speed|inertia", unit):
+        return None
+    powers: dict[str, int] = {}
+    for sign, word, power in re.findall(r"(^|[*/])(\w+)(?:\^(\d))?", unit):
+        if word not in WORDS:
+            raise ArmidError(f"unit '{unit}' holds '{word}': {nearest(word, WORDS)}")
+        powers[word] = powers.get(word, 0) + (-1 if sign == "/" else 1) * int(power or 1)
+    return powers
+
+
+def physical_unit(powers: dict[str, int], scales: Scales) -> str:
+    """Return the SI unit of a product of scales, such as `N m s/rad`."""
+    if powers == {"inertia": 1}:
+        return scales.inertia_unit
+    units = {
+        scales.effort_unit: powers.get("effort", 0),
+        scales.inertia_unit: powers.get("inertia", 0),
+        "s": powers.get("s", 0) - powers.get("speed", 0),
+        scales.length_unit: powers.get("speed", 0),
+    }
+    above = " ".join(u if p == 1 else f"{u}{p}" for u, p in units.items() if p > 0)
+    below = " ".join(u if p == -1 else f"{u}{-p}" for u, p in units.items() if p < 0)
+    return f"{above or '1'}/{below}" if below else above or "1"
+
+
+def resolve(parameter: Parameter, scales: Scales) -> Parameter:
+    """Return the parameter with bounds, null and fixed value in SI."""
+    powers = powers_of(parameter.unit)
+    if powers is None:
+        return parameter
+    sizes = {"effort": scales.effort, "speed": scales.speed, "inertia": scales.effort / scales.speed}
+    size = 1.0
+    for word, power in powers.items():
+        size *= sizes.get(word, 1.0) ** power
+    values = {name: getattr(parameter, name) for name in ("low", "high", "null", "fixed", "nominal")}
+    scaled: dict[str, Any] = {name: None if value is None else value * size for name, value in values.items()}
+    return replace(parameter, unit=physical_unit(powers, scales), **scaled)

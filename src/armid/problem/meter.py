@@ -1,11 +1,14 @@
 """The meter: the budget of a run, cut off exactly, and the one log of its evaluations."""
 
+from abc import abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pymoo.core.problem import Problem
+from pymoo.core.termination import Termination
 
-from armid.model.errors import ArmidError
+from armid.errors import ArmidError
 
 Array = NDArray[np.float64]
 
@@ -152,4 +155,98 @@ def _grown(array: NDArray[Any], room: int) -> NDArray[Any]:
     """Return a longer array that starts with the given one."""
     longer = np.empty((room, *array.shape[1:]), array.dtype)
     longer[: len(array)] = array
+    return longer
+
+
+class MeterTermination(Termination):  # type: ignore[misc]
+    """End when the meter's budget is used up or its target is reached; never earlier.
+
+    meter: the one that the problem counts with. It is shared, not copied, when pymoo copies the termination.
+    n_max_gen: end after so many generations as well (None: as many as the budget allows).
+    Raises ArmidError for n_max_gen below 1.
+    """
+
+    def __init__(self, meter: Meter, n_max_gen: int | None = None) -> None:
+        super().__init__()
+        if n_max_gen is not None and n_max_gen < 1:
+            raise ArmidError(f"n_max_gen is {n_max_gen}, expected a whole number above 0")
+        self.meter = meter
+        self.n_max_gen = n_max_gen
+
+    def _update(self, algorithm: Any) -> float:
+        """Return the share of the budget, or of the generations, that is used; 1 ends the search."""
+        if self.meter.reached:
+            return 1.0
+        generations = algorithm.n_gen / self.n_max_gen if self.n_max_gen is not None else 0.0
+        return float(max(self.meter.used / self.meter.budget, generations))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "MeterTermination":
+        """Copy all but the meter: `minimize` copies its termination, and a copied meter would stand still."""
+        twin = MeterTermination(self.meter, self.n_max_gen)
+        twin.force_termination, twin.perc = self.force_termination, self.perc
+        return twin
+
+
+# Finite, for identifiers that cannot live with infinity, and worse than any fitness (a sum of squares over the square
+# of a tiny noise is large).
+PENALTY = 1e100
+# What an evaluator asks for by this name in `evaluate_values_of`: the weighted residual vector of each candidate.
+RESIDUALS = "residuals"
+
+
+class Metered(Problem):  # type: ignore[misc]
+    """Minimise what `evaluated` returns, within the budget of a meter; without one there is no limit.
+
+    A candidate that fails gets PENALTY and is counted; so does one asked for beyond the budget, but it is neither
+    simulated nor counted. Candidates that the meter remembers from an earlier run are counted, not simulated.
+    """
+
+    def __init__(self, meter: Meter | None, **of_pymoo: Any) -> None:
+        super().__init__(**of_pymoo)
+        self.meter = meter
+
+    @abstractmethod
+    def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
+        """Return fitness, (n_candidates,), +inf where one failed, and if asked residuals, (n_candidates, n_total)."""
+
+    def _evaluate(self, X: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        values, residuals = self.answered(X, RESIDUALS in out)
+        if residuals is not None:
+            out[RESIDUALS] = residuals
+        out["F"] = values[:, np.newaxis]
+
+    def answered(self, X: Array, residuals: bool = False) -> tuple[Array, Array | None]:
+        """Return what pymoo is told of candidates: fitness, (n_candidates,), and residuals if asked and any is granted.
+
+        Rows of residuals beyond the budget are NaN.
+        """
+        granted = len(X) if self.meter is None else self.meter.grant(len(X))
+        if not granted:
+            return np.full(len(X), PENALTY), None
+        asked = X[:granted]
+        values, vectors = self._remembered_or_evaluated(asked, residuals)
+        failed = ~np.isfinite(values)
+        if failed.any():
+            values = np.where(failed, PENALTY, values)
+        if self.meter is not None:
+            self.meter.record(asked, values, failed)
+        if granted == len(X):
+            return values, vectors
+        return padded(values, len(X), PENALTY), None if vectors is None else padded(vectors, len(X), np.nan)
+
+    def _remembered_or_evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
+        """Take what the meter remembers; residuals are in no log, so that candidates with them are simulated again."""
+        if self.meter is None or residuals:
+            return self.evaluated(X, residuals)
+        known = self.meter.recall(X)
+        if len(known) == len(X):
+            return known, None
+        found, _ = self.evaluated(X[len(known) :], residuals)
+        return (np.concatenate([known, found]) if len(known) else found), None
+
+
+def padded(values: Array, n: int, filler: float) -> Array:
+    """Return rows with others behind them that hold the filler, n in all."""
+    longer = np.full((n, *values.shape[1:]), filler)
+    longer[: len(values)] = values
     return longer

@@ -6,12 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.fitness import Fitness, joined, record_weights
-from armid.model import ArmidError
-from armid.problem.meter import Meter
-from armid.problem.metered import Metered
-from armid.problem.replay import Replay
-from armid.problem.residual import weighted
+from armid.errors import ArmidError
+from armid.problem.fitness import Fitness, joined, record_weights
+from armid.problem.meter import Meter, Metered
+from armid.problem.replay import Replay, weighted
 from armid.problem.space import Space
 
 Array = NDArray[np.float64]

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.model import ArmidError, Model, nearest
+from armid.errors import ArmidError, nearest
+from armid.model import Model
 from armid.record import Override
 
 Array = NDArray[np.float64]

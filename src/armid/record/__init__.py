@@ -2,8 +2,8 @@
 
 from armid.record.campaign import Campaign, read_campaign
 from armid.record.record import Irregularity, Noise, Piece, Record
+from armid.record.resample import IrregularSamplingWarning
 from armid.record.schema import Override
-from armid.record.timing import IrregularSamplingWarning
 from armid.record.writer import write_campaign, write_table
 
 __all__ = [

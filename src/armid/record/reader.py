@@ -1,32 +1,183 @@
 """One record out of its CSV file and its entry in the campaign."""
 
+import os.path
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.model import ArmidError, Manoeuvre, Plant
-from armid.record.columns import (
+from armid.errors import ArmidError, nearest, shown
+from armid.model import Manoeuvre, ManoeuvreKey, Plant
+from armid.record.noise import noise_of, smallest_step
+from armid.record.pieces import (
+    POSITION,
+    SPEED,
+    Track,
+    is_constant,
+    part,
+    piece_length,
+    restarted,
+    track_of,
+    with_window,
+)
+from armid.record.record import Piece, Record
+from armid.record.resample import Timing, moved_onto_grid, onto_grid, timing_of
+from armid.record.schema import KindError, RecordSheet, number
+from armid.record.table import (
+    LARGEST,
     POSITIONS,
     TIME,
+    Table,
     input_columns,
     position_of,
+    read_table,
     si_factor,
     speed_column,
     speed_of,
     time_column,
 )
-from armid.record.constants import record_constants
-from armid.record.grid import moved_onto_grid, onto_grid
-from armid.record.noise import noise_of, smallest_step
-from armid.record.pieces import is_constant, part, piece_length, restarted, with_window
-from armid.record.record import Piece, Record
-from armid.record.schema import RecordSheet
-from armid.record.start import POSITION, SPEED, Track, track_of
-from armid.record.table import Table, read_table
-from armid.record.timing import Timing, timing_of
+
+NAME = "campaign.toml"
+SUFFIX = ".csv"
+
+
+def campaign_path(path: str | Path) -> Path:
+    """Return the campaign.toml that a folder or a file stands for.
+
+    Raises ArmidError when there is none.
+    """
+    if not os.path.exists(path):
+        raise ArmidError(f"campaign {shown(str(path))} does not exist, a folder with a {NAME} is expected")
+    if os.path.isfile(path):
+        return Path(path)
+    if not os.path.isfile(os.path.join(path, NAME)):
+        raise ArmidError(f"campaign {shown(str(path))} holds no {NAME}, a folder with one is expected")
+    return Path(path) / NAME
+
+
+def folder_name(toml: Path) -> str:
+    """Return what messages put before the files of a campaign: `c00/`."""
+    name = toml.parent.name or toml.parent.resolve().name
+    return f"{name if name.isprintable() else shown(name)}/" if name else ""
+
+
+def load_toml(path: Path, named: str = "") -> dict[str, Any]:
+    """Return the tables of a TOML file; named: how messages name it, "": by its own name.
+
+    Raises ArmidError, with the line, for what is no UTF-8 text or no TOML.
+    """
+    where = named or path.name
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ArmidError(f"{where} cannot be read: {error.strerror or error}") from error
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise ArmidError(f"{where}, line {line}: not readable as text, TOML in UTF-8 is expected") from error
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ArmidError(f"{where} is nested too deeply, plain tables of TOML are expected") from error
+    except ValueError as error:
+        # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
+        raise ArmidError(f"{where} is no valid TOML: {str(error)[:200]}") from error
+
+
+def record_path(folder: Path, file: str, where: str) -> Path:
+    """Return where the file of a record is.
+
+    Raises ArmidError for a name that leads out of the folder (also through a link), is no CSV file, or does not exist.
+    """
+    pure = PurePosixPath(file.replace("\\", "/"))
+    if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
+        raise ArmidError(f"{where}: file {shown(file)} leads out of the campaign's folder, a file inside is expected")
+    if pure.suffix.lower() != SUFFIX or not file.isprintable():
+        raise ArmidError(f"{where}: file {shown(file)} is no CSV file, a name that ends in {SUFFIX} is expected")
+    path = os.path.join(folder, file)
+    if not os.path.isfile(path):
+        there = sorted(p.name for p in folder.glob(f"*{SUFFIX}"))
+        raise ArmidError(f"{where}: file {shown(file)} does not exist, {nearest(file, there)}")
+    real = Path(os.path.realpath(path))
+    if not real.is_relative_to(os.path.realpath(folder)):
+        raise ArmidError(f"{where}: file {shown(file)} links out of the campaign's folder, a file inside is expected")
+    return real
+
+
+MEASURED_STATE = ("start_position", "start_speed")
+ROUNDING = 1e-9
+
+
+def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordSheet, where: str) -> dict[str, float]:
+    """Return the constants of a record's manoeuvre, SI: the campaign's, then its keys, then [records.constants].
+
+    Raises ArmidError for an unknown constant, a missing key, a value of another kind or outside its range.
+    """
+    check_names(plant, shared, "constants of the campaign", where)
+    check_names(plant, sheet.constants, "constants", where)
+    own = {k.constant: key_value(k, sheet.keys[k.key], where) for k in plant.keys if k.key in sheet.keys}
+    constants = {**shared, **own, **sheet.constants}
+    for key in plant.keys:
+        check_key(key, constants, where)
+    return constants
+
+
+def check_names(plant: Plant, given: Mapping[str, float], what: str, where: str) -> None:
+    """Refuse a constant that the plant does not have, or that the record's own start sets."""
+    known = [c.name for c in plant.constants]
+    for name in given:
+        if name not in known:
+            raise ArmidError(f"{where}: {shown(name)} in {what} is no constant of plant '{plant.name}', "
+                             f"{nearest(name, known)}")  # fmt: skip
+        if not plant.from_rest and name in MEASURED_STATE:
+            raise ArmidError(f"{where}: '{name}' in {what} is set, but it comes from the first samples of a record: "
+                             "another constant is expected")  # fmt: skip
+
+
+def key_value(key: ManoeuvreKey, value: object, where: str) -> float:
+    """Return the constant (SI) that a key of the plant sets."""
+    if key.boolean:
+        if isinstance(value, bool):
+            return float(value)
+        raise ArmidError(f"{where}: key '{key.key}' is {shown(value)}, true or false is expected")
+    try:
+        return key.factor * number(value)
+    except KindError as error:
+        raise ArmidError(f"{where}: key '{key.key}' is {shown(value)}, a finite number is expected") from error
+
+
+def check_key(key: ManoeuvreKey, constants: Mapping[str, float], where: str) -> None:
+    """Refuse a manoeuvre without a required key, outside the machine's travel, or without a motion."""
+    if key.constant not in constants:
+        if key.required:
+            raise ArmidError(f"{where}: key '{key.key}' is missing, {range_of(key)} is expected, here or as "
+                             f"{key.constant} under [constants]")  # fmt: skip
+        return
+    value = constants[key.constant] / key.factor
+    if key.unlike and constants[key.constant] == constants.get(key.unlike):
+        raise ArmidError(f"{where}: {key.key} is {value:.9g}, where the record starts: a motion is expected")
+    slack = ROUNDING * abs(value)
+    low = key.low if key.low is not None else -LARGEST / abs(key.factor)
+    high = key.high if key.high is not None else LARGEST / abs(key.factor)
+    if not low - slack <= value <= high + slack or (key.boolean and value not in (0.0, 1.0)):
+        raise ArmidError(f"{where}: {key.key} is {value:.9g}, {range_of(key)} is expected")
+
+
+def range_of(key: ManoeuvreKey) -> str:
+    """Return in words what a key may be."""
+    if key.boolean:
+        return "true or false"
+    if key.low is None and key.high is None:
+        return "a finite number"
+    if key.low is None or key.high is None:
+        return f"at most {key.high:g}" if key.low is None else f"at least {key.low:g}"
+    return f"a value from {key.low:g} to {key.high:g}"
+
 
 Array = NDArray[np.float64]
 SATURATED_SAMPLES = 5

@@ -8,9 +8,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.model import ArmidError
-from armid.record.campaign_file import NAME
-from armid.record.shown import shown
+from armid.errors import ArmidError, shown
+from armid.record.reader import NAME
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""Studies: a question, its runs, their store; read from `armid.study.study`, `runner` and `results`."""
+"""Studies: a question, its runs, their store, its report."""

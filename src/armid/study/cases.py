@@ -1,25 +1,251 @@
 """Cases out of the study's file: simulated ones, random ones, and campaigns."""
 
+import hashlib
+import os.path
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from armid.model import ArmidError, Model, Plant
-from armid.problem import Space
-from armid.record.constants import record_constants
-from armid.record.pieces import SLACK
+from armid.engine import FINE, Schedule, calibrate, simulate
+from armid.errors import ArmidError, shown
+from armid.model import Manoeuvre, Model, Plant
+from armid.problem.space import Space, space_of
+from armid.record import Campaign, Noise, Override, Record, read_campaign
+from armid.record.pieces import SLACK, is_constant, part, with_window
+from armid.record.reader import campaign_path, record_constants
+from armid.record.resample import FEWEST_SAMPLES
 from armid.record.schema import RecordSheet, unknown_name, validated
-from armid.record.shown import shown
-from armid.record.timing import FEWEST_SAMPLES
-from armid.study.box import box_of
-from armid.study.campaign_case import campaign_case
-from armid.study.case import Case, Stroke
-from armid.study.known import Known
-from armid.study.latin import spread
-from armid.study.sheet import WHOLE, CaseSheet, ManoeuvreSheet, RandomSheet, StudySheet
+from armid.study.spec import WHOLE, CaseSheet, Known, ManoeuvreSheet, RandomSheet, StudySheet, chosen
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Hold a manoeuvre that is simulated: its constants (SI), length [s] and role."""
+
+    constants: Mapping[str, float]
+    duration_s: float
+    role: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """Hold a campaign that is read.
+
+    campaign: folder, relative to the study's file. records: files of it. digest: hash of these files and of
+    campaign.toml, so that runs on other records are other runs.
+    """
+
+    campaign: str
+    records: tuple[str, ...]
+    digest: str
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Hold one case.
+
+    truth: parameter -> true value, SI, empty where not known; all parameters of the model where the records are
+    simulated. published: values of others to stand beside. space: bounds and fixed values.
+    strokes: manoeuvres to simulate, or source: the campaign to read.
+    """
+
+    name: str
+    model: Model
+    space: Space
+    truth: Mapping[str, float] = field(default_factory=dict)
+    published: Mapping[str, float] = field(default_factory=dict)
+    strokes: tuple[Stroke, ...] = ()
+    source: Source | None = None
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """Free parameter -> bounds, SI."""
+        box = zip(self.space.names, self.space.low, self.space.high, self.space.free, strict=True)
+        return {name: (float(low), float(high)) for name, low, high, free in box if free}
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """Fixed parameter -> value, SI."""
+        values = zip(self.space.names, self.space.fixed, self.space.free, strict=True)
+        return {name: float(value) for name, value, free in values if not free}
+
+
+def box_of(
+    model: Model, overrides: Mapping[str, Override], sheet: StudySheet, entry: CaseSheet | None, where: str
+) -> Space:
+    """Return bounds and fixed values; what the case fixes or frees holds against what the study says.
+
+    Raises ArmidError for an unknown parameter, impossible bounds, and one both bounded and fixed in the same place.
+    """
+    own_bounds, own_fixed = (entry.bounds, entry.fixed) if entry else ({}, {})
+    fixed = {name: v for name, v in sheet.fixed.items() if name not in own_bounds} | dict(own_fixed)
+    bounds = {name: b for name, b in sheet.bounds.items() if name not in own_fixed} | dict(own_bounds)
+    try:
+        return space_of(model, overrides, bounds, fixed)
+    except ArmidError as error:
+        raise ArmidError(f"{where}: {error}") from error
+
+
+def campaign_case(entry: CaseSheet, sheet: StudySheet, known: Known, folder: Path, where: str) -> Case:
+    """Return a case of the train and holdout records of a campaign.
+
+    Raises ArmidError for a campaign that cannot be read, has another plant, or holds no such record.
+    """
+    assert entry.campaign is not None
+    path = campaign_folder(folder, entry.campaign, where)
+    campaign = with_records(read_campaign(path, known.plants, known.effects), entry.records, where)
+    if campaign.plant.name not in {v.name for v in known.plants[sheet.plant].variants} | {sheet.plant}:
+        raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{sheet.plant}' is expected")
+    model = Model(campaign.plant)
+    for name in dict.fromkeys((*campaign.effects, *sheet.effects)):
+        model = model + chosen(known.effects, name, "effect", where)
+    space = box_of(model, campaign.parameters, sheet, entry, where)
+    check_windows_of_campaign(campaign, sheet, where)
+    files = tuple(r.file for r in campaign.records)
+    source = Source(entry.campaign, files, digest_of(path, files))
+    return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source)
+
+
+def check_windows_of_campaign(campaign: Campaign, sheet: StudySheet, where: str) -> None:
+    """Refuse a window that holds too little of a record."""
+    for window in sheet.windows_s:
+        if not isinstance(window, str):
+            for record in campaign.records:
+                with_window(record, window, f"{where}, windows_s")
+
+
+def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
+    """Return where the campaign of a study is.
+
+    Raises ArmidError for a path that leads out of the folder of the study's file, also through a link.
+    """
+    pure = PurePosixPath(campaign.replace("\\", "/"))
+    if pure.is_absolute() or PureWindowsPath(campaign).drive or ".." in pure.parts or not campaign.isprintable():
+        raise ArmidError(f"{where}: campaign {shown(campaign)} leads out of the folder of the study, a folder inside "
+                         "is expected")  # fmt: skip
+    try:
+        toml = campaign_path(folder / pure)
+    except ArmidError as error:
+        raise ArmidError(f"{where}: {error}") from error
+    if not Path(os.path.realpath(toml)).is_relative_to(os.path.realpath(folder)):
+        raise ArmidError(f"{where}: campaign {shown(campaign)} links out of the folder of the study, a folder inside "
+                         "is expected")  # fmt: skip
+    return toml.parent
+
+
+def with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -> Campaign:
+    """Return the campaign with some of its records, None: all.
+
+    Raises ArmidError for a file that is none of its records, and where none is left to train on.
+    """
+    if files is None:
+        return campaign
+    there = [r.file for r in campaign.records]
+    for file in files:
+        if file not in there:
+            raise unknown_name("record", file, there, where)
+    some = replace(campaign, records=tuple(r for r in campaign.records if r.file in files))
+    if not some.train:
+        raise ArmidError(f"{where}: none of the records {', '.join(files)} has the role 'train'")
+    return some
+
+
+def digest_of(folder: Path, files: Sequence[str]) -> str:
+    """Return a hash of campaign.toml and some CSV files of a campaign."""
+    digest = hashlib.sha256()
+    for name in ("campaign.toml", *files):
+        content = (folder / name).read_bytes()
+        digest.update(f"{name}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
+
+
+Array = NDArray[np.float64]
+DEGREE = np.pi / 180.0
+KNOWN = "known"
+# Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
+# fourth power: of the arm it is then about 1e-11 rad/s.
+FINER = 8
+
+
+def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ...]:
+    """Return the records of a simulated case over their whole length, without noise.
+
+    settings: of a run. Raises ArmidError where the truth diverges or does not move.
+    """
+    truth = np.array([settings["truth"][name] for name in model.parameters])
+    return tuple(
+        clean_record(f"manoeuvre {i}", stroke, settings["interval_s"], truth, model)
+        for i, stroke in enumerate(settings["strokes"], 1)
+    )
+
+
+def clean_record(name: str, stroke: Mapping[str, Any], interval: float, truth: Array, model: Model) -> Record:
+    """Return one record, simulated at a whole candidate."""
+    n_samples = round(stroke["duration_s"] / interval) + 1
+    manoeuvre = Manoeuvre(interval, n_samples, stroke["constants"])
+    coarse = calibrate(model, manoeuvre, truth[np.newaxis], FINE, spans=False).schedule
+    run = simulate(model, manoeuvre, truth[np.newaxis], Schedule(FINER * coarse.substeps))
+    if run.failed[0]:
+        raise ArmidError(f"{name}: the simulation diverges at the truth, a motion is expected")
+    if is_constant(run.output[0]):
+        raise ArmidError(f"{name}: the machine does not move at the truth, a motion is expected")
+    silence = Noise(0.0, 0.0, 0.0, 1.0, n_samples, KNOWN)
+    record = Record(
+        file=name, role=stroke["role"], unit=model.plant.output_unit, manoeuvre=manoeuvre, measured=run.output[0],
+        rest=np.empty(0), noise=silence, pieces=(), whole_pieces=(),
+    )  # fmt: skip
+    return with_signal(record, run.output[0])
+
+
+def with_signal(record: Record, measured: Array) -> Record:
+    """Return the record with another signal over its whole length, in one piece."""
+    pieces = (part(record.manoeuvre, measured, 0, measured.size, {}),)
+    return replace(record, measured=measured, pieces=pieces, whole_pieces=pieces)
+
+
+def in_window(record: Record, window: Sequence[float] | str) -> Record:
+    """Return the record in a window [s]; the word for all of it leaves what its file says."""
+    return record if window == WHOLE else with_window(record, (float(window[0]), float(window[1])), record.file)
+
+
+def noisy_records(records: Sequence[Record], settings: Mapping[str, Any]) -> tuple[Record, ...]:
+    """Return the records with white noise of the gyro added, of an rms that is known and need not be estimated.
+
+    The same study seed, case, level and seed give the same noise whoever searches, on whatever fitness and window.
+    """
+    rng, rms = noise_generator(settings), DEGREE * settings["noise_deg_s"]
+    noisy = []
+    for record in records:
+        known = Noise(rms, 0.0, 0.0, 1.0, record.measured.size, KNOWN)
+        signal = record.measured + rms * rng.standard_normal(record.measured.size)
+        noisy.append(with_signal(replace(record, noise=known), signal))
+    return tuple(noisy)
+
+
+def noise_generator(settings: Mapping[str, Any]) -> np.random.Generator:
+    """Return the source of a run's noise: of the study's seed, the case, the level and the run's seed alone."""
+    told = "\0".join(str(settings[word]) for word in ("noise_seed", "case", "noise_deg_s", "seed"))
+    return np.random.default_rng(np.frombuffer(hashlib.sha256(told.encode()).digest(), dtype="<u4"))
+
+
+def spread(space: Space, n: int, seed: int, margin: float) -> list[dict[str, float]]:
+    """Return n truths, parameter -> value in SI: a Latin hypercube over the box of the free parameters.
+
+    Each range is cut into n equal parts and each part is hit once. margin: share of the range kept free at each side.
+    Written out, as the points that a library draws from a seed change between its versions, and with them the cases.
+    Source: McKay, Beckman, Conover 1979, doi:10.2307/1268522.
+    """
+    rng = np.random.default_rng(seed)
+    low, high = space.low[space.free], space.high[space.free]
+    parts = np.array([rng.permutation(n) for _ in low]).T
+    points = (parts + rng.random(parts.shape)) / n
+    whole = space.complete(low + (high - low) * (margin + (1.0 - 2.0 * margin) * points))
+    return [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
+
 
 MOST_SAMPLES = 10**7
 
@@ -80,9 +306,7 @@ def simulated_case(
     if model.plant.inputs:
         raise ArmidError(f"{where}: plant '{model.plant.name}' is driven by {model.plant.inputs[0].name}, which no "
                          "manoeuvre tells: a campaign is expected")  # fmt: skip
-    strokes = tuple(
-        stroke_of(m, sheet, model.plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres)
-    )
+    strokes = tuple(stroke_of(m, sheet, model.plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
     if not any(s.role == "train" for s in strokes):
         raise ArmidError(f"{where}: no manoeuvre has the role 'train', at least one is expected")
     case = Case(name, model, space, completed(truth, model, where), dict(published), strokes)

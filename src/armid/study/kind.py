@@ -60,7 +60,7 @@ def function(place: str) -> Any:
 
 
 IDENTIFY = Kind(
-    "armid.study.identify_run:identify_run",
+    "armid.study.run:identify_run",
     {
         "identified": Table((
             "used INTEGER", "n_failed INTEGER", "value REAL", "stopped TEXT", "train_rmse REAL", "train_s REAL",
@@ -75,18 +75,18 @@ IDENTIFY = Kind(
     read_by="armid.study.study:read_identifying",
     described_by="armid.study.study:description",
     planned_by="armid.study.plan:planned_runs",
-    reported_by="armid.study.report.build:identify_report",
-    summed_up_by="armid.study.report.build:identify_summary",
+    reported_by="armid.study.document:identify_report",
+    summed_up_by="armid.study.document:identify_summary",
     checked_by="armid.study.runner:check_motion",
 )  # fmt: skip
 CLOSE_LOOP = Kind(
-    "armid.study.loops.run:close_loop_run",
+    "armid.study.loops:close_loop_run",
     {"loops": Table(("verdict TEXT NOT NULL", "cpu_seconds REAL NOT NULL", "report TEXT NOT NULL"))},
-    read_by="armid.study.loops.study:read_loops",
-    described_by="armid.study.loops.study:describe_loops",
-    planned_by="armid.study.loops.plan:planned_loops",
-    reported_by="armid.study.report.loops:loops_report",
-    summed_up_by="armid.study.report.loops:loops_summary",
+    read_by="armid.study.loops:read_loops",
+    described_by="armid.study.loops:describe_loops",
+    planned_by="armid.study.loops:planned_loops",
+    reported_by="armid.study.blind.report:loops_report",
+    summed_up_by="armid.study.blind.report:loops_summary",
 )
 
 KINDS: dict[str, Kind] = {IDENTIFIES: IDENTIFY, CLOSES_LOOP: CLOSE_LOOP}

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
-from armid.study.case import Case
-from armid.study.entry import Entry
-from armid.study.study import Study, canonical, window_text
+from armid.study.cases import Case
+from armid.study.study import Entry, Study, canonical, window_text
 
 # Hexadecimal digits of a run's id: two of a million runs meet with a probability of 1e-8.
 ID_LENGTH = 16

@@ -1,26 +1,26 @@
 """Run what is missing of a study."""
 
+import sys
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from armid.identification.interrupt import ctrl_c_waits
-from armid.model import ArmidError, nearest
-from armid.study.any_study import AnyStudy
-from armid.study.crew import Crew, LocalCrew
+from armid.errors import ArmidError, nearest
+from armid.estimation.identify import ctrl_c_waits
+from armid.study.cases import clean_records
 from armid.study.kind import KINDS, function
-from armid.study.lane import Workplace
 from armid.study.outcome import Outcome
 from armid.study.plan import case_settings
-from armid.study.records import clean_records
+from armid.study.pool import Crew, LocalCrew, Workplace
 from armid.study.store import Counts, Store
-from armid.study.study import Study, read_study
+from armid.study.study import AnyStudy, Study, read_study
 
 if TYPE_CHECKING:
     from armid.study.results import StudyResults
+
 
 TIME_LIMIT_S = 600.0
 RESULTS = Path("results")
@@ -68,7 +68,7 @@ def run_study(
 
     Raises ArmidError for a study that cannot be run, KeyboardInterrupt after Ctrl-C; finished runs are kept then.
     """
-    from armid.study.results import load_study  # noqa: PLC0415 - pandas takes time to import, and workers need none
+    from armid.study.results import load_study
 
     study = read_study(path, absolute(plugins))
     ending = run(study, path, jobs, dask, out, time_limit, only, retry)
@@ -147,10 +147,10 @@ def performed(store: Store, crew: Crew, interrupted: Callable[[], bool]) -> Iter
 def crew_of(jobs: int | None, dask: str | None, workplace: Workplace, n_runs: int) -> Crew:
     """Return who performs the runs."""
     if dask is not None:
-        from armid.study.dask_crew import DaskCrew  # noqa: PLC0415 - distributed is an extra
+        from armid.study.dask_pool import DaskCrew
 
         return DaskCrew(dask, workplace)
-    from joblib import cpu_count  # noqa: PLC0415 - takes time to import
+    from joblib import cpu_count
 
     return LocalCrew(min(jobs or cpu_count(), n_runs), workplace)
 
@@ -201,3 +201,56 @@ def absolute(plugins: Iterable[str]) -> tuple[str, ...]:
 def file_as_told(path: Path) -> str:
     """Return the study's file as the command named it; of a path on this machine alone the name."""
     return path.name if path.is_absolute() else path.as_posix()
+
+
+class Watch:
+    """Count runs and simulations, and show a bar with rate and time left on a terminal, nothing elsewhere."""
+
+    def __init__(self) -> None:
+        self.finished, self.simulations = 0, 0
+        self._began = time.monotonic()
+        self._bar: Any = None
+
+    def __enter__(self) -> "Watch":
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn
+
+            self._bar = Progress(
+                TextColumn("{task.completed:.0f}/{task.total:.0f} runs"), BarColumn(),
+                TextColumn("{task.fields[rate]}"), TextColumn("{task.fields[left]}"),
+                console=Console(stderr=True), refresh_per_second=4,
+            )  # fmt: skip
+            self._task = self._bar.add_task("", total=1, visible=False, rate="", left="")
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def update(self, counts: Counts, outcome: Outcome | None) -> None:
+        """Move the bar: counts at the start, and a run that has finished since."""
+        if outcome is None:
+            self._began = time.monotonic()
+        else:
+            self.finished, self.simulations = self.finished + 1, self.simulations + outcome.used
+        if self._bar is not None:
+            seconds = max(time.monotonic() - self._began, 1e-9)
+            missing = counts.missing - self.finished
+            left = f"{span(seconds / self.finished * missing)} left" if self.finished else "starting"
+            told = {"completed": counts.planned - missing, "rate": self.rate(seconds), "left": left}
+            self._bar.update(self._task, total=counts.planned, visible=True, **told)
+
+    def rate(self, seconds: float) -> str:
+        """Return simulations a second, or finished runs a minute where no run counts its simulations."""
+        if self.simulations or not self.finished:
+            return f"{self.simulations / seconds:,.0f} simulations/s"
+        return f"{60.0 * self.finished / seconds:.3g} runs/min"
+
+
+def span(seconds: float) -> str:
+    """Return a length of time with as much detail as anyone wants: 40 s, 12 min, 3.2 h."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400.0 else f"{seconds / 3600:.1f} h"

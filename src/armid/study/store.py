@@ -2,19 +2,222 @@
 
 import hashlib
 import json
+import os
+import platform
 import sqlite3
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from armid.model import ArmidError
-from armid.study.damage import description_of
-from armid.study.kind import KINDS
+from armid.errors import ArmidError
+from armid.study.kind import KINDS, Table
 from armid.study.outcome import FAILED, Outcome, Task
 from armid.study.plan import Planned
-from armid.study.process_identity import ProcessIdentity, is_gone, this_process
-from armid.study.store_file import FILE_NAME, closed, opened, told, transaction
+
+FILE_NAME = "study.sqlite"
+# "armd" in ASCII: a file of another program is recognised before anything is written to it.
+APPLICATION, FORMAT = 0x61726D64, 1
+WAIT_S = 60.0
+
+TABLES = """
+CREATE TABLE study (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE settings (run TEXT PRIMARY KEY, settings TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE plan (
+    place INTEGER PRIMARY KEY, run TEXT NOT NULL UNIQUE, "case" TEXT NOT NULL, identifier TEXT NOT NULL,
+    fitness TEXT NOT NULL, noise_deg_s REAL, window TEXT NOT NULL, seed INTEGER NOT NULL, budget INTEGER NOT NULL
+);
+CREATE TABLE runs (
+    run TEXT PRIMARY KEY, status TEXT NOT NULL, error TEXT NOT NULL, seconds REAL NOT NULL, started_at TEXT NOT NULL,
+    model TEXT NOT NULL, versions TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE texts (hash TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE claims (
+    run TEXT PRIMARY KEY, place TEXT NOT NULL, pid INTEGER NOT NULL, start TEXT NOT NULL
+) WITHOUT ROWID;
+"""
+
+
+def table_text(name: str, table: Table) -> str:
+    """Return the SQL that makes a table of a kind."""
+    key = f"PRIMARY KEY (run, {table.rows_by})" if table.rows_by else "PRIMARY KEY (run)"
+    return f"CREATE TABLE {name} (run TEXT NOT NULL, {', '.join(table.columns)}, {key})"
+
+
+def store_path(path: str | Path) -> Path:
+    """Return the file that a folder of results or the file itself stands for."""
+    return Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
+
+
+@contextmanager
+def told(path: Path) -> Iterator[None]:
+    """Turn what SQLite cannot do into one sentence."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise ArmidError(f"{path} cannot be used: {error}; what was finished before is kept") from error
+    except OSError as error:
+        raise ArmidError(f"{error.filename or path} cannot be used: {error.strerror or error}") from error
+
+
+def opened(path: Path) -> sqlite3.Connection:
+    """Return a connection that writes, to a new file or to one of ours.
+
+    A write-ahead log is kept: a process that is killed at any moment leaves every finished transaction and no half one.
+
+    Raises ArmidError for a file of another program or of a newer version.
+    """
+    with told(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
+        try:
+            check_format(connection, path, may_be_new=True)
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = NORMAL")
+            make_tables(connection)
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = False) -> None:
+    """Refuse a file that is no store of this version."""
+    try:
+        # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
+        is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
+        found = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
+    except sqlite3.DatabaseError as error:
+        if error.sqlite_errorname != "SQLITE_NOTADB":
+            raise
+        raise ArmidError(f"{path} is no store of a study: another file has its name") from error
+    if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
+        return
+    if found[0] != APPLICATION:
+        raise ArmidError(f"{path} is no store of a study: another program's data, or nothing, is in it")
+    raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
+
+
+def make_tables(connection: sqlite3.Connection) -> None:
+    """Make what is missing, whole or not at all."""
+    with transaction(connection):
+        there = {row[0] for row in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
+        if not there:
+            for statement in filter(str.strip, TABLES.split(";")):
+                connection.execute(statement)
+            connection.execute(f"PRAGMA application_id = {APPLICATION}")
+            connection.execute(f"PRAGMA user_version = {FORMAT}")
+        for kind in KINDS.values():
+            for name, table in kind.tables.items():
+                if name not in there:
+                    connection.execute(table_text(name, table))
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """Do all or nothing; other writers wait from the beginning on."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        # SQLite has rolled back by itself after some errors, such as a full disk
+        with suppress(sqlite3.Error):
+            connection.execute("ROLLBACK")
+        raise
+
+
+def closed(connection: sqlite3.Connection) -> None:
+    """Close a connection; the last one leaves a single file that can be read in any place, also a read-only one."""
+    with suppress(sqlite3.Error):
+        connection.execute("PRAGMA busy_timeout = 0")
+        connection.execute("PRAGMA journal_mode = DELETE")
+    with suppress(sqlite3.Error):
+        connection.close()
+
+
+# What the description of a study holds in every version of this format.
+WORDS = ("name", "cases")
+
+
+@contextmanager
+def whole(file: Path, what: str) -> Iterator[None]:
+    """Turn content that cannot be decoded into one sentence.
+
+    Raises ArmidError naming the file and what of it is damaged.
+    """
+    try:
+        yield
+    except (json.JSONDecodeError, UnicodeDecodeError, zlib.error) as error:
+        raise ArmidError(f"{file} is damaged: {what} cannot be read ({error})") from error
+
+
+def description_of(file: Path, text: str) -> dict[str, Any]:
+    """Return the description of a study.
+
+    Raises ArmidError when it is none.
+    """
+    with whole(file, "the description of the study"):
+        found = json.loads(text)
+    missing = [word for word in WORDS if not isinstance(found, dict) or word not in found]
+    if missing:
+        raise ArmidError(f"{file} is damaged: the description of the study lacks '{missing[0]}'")
+    return dict(found)
+
+
+class ProcessIdentity(NamedTuple):
+    """Name a process.
+
+    place: machine, its boot, and the space in which its numbers count (a container has its own). pid: its number.
+    start: when it started, in ticks since that boot, "" where the system does not tell: numbers are used again.
+    """
+
+    place: str
+    pid: int
+    start: str
+
+
+def this_process() -> ProcessIdentity:
+    """Return the identity of the running process."""
+    return ProcessIdentity(this_place(), os.getpid(), start_of(os.getpid()))
+
+
+def this_place() -> str:
+    """Return what the numbers of processes count in."""
+    boot, space = "", ""
+    with suppress(OSError), open("/proc/sys/kernel/random/boot_id", encoding="ascii") as file:
+        boot = file.read().strip()
+    with suppress(OSError):
+        space = os.readlink("/proc/self/ns/pid")
+    return "/".join((platform.node(), boot, space))
+
+
+def start_of(pid: int) -> str:
+    """Return when a process started, "" where it does not live or the system does not tell."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+            # the name of the program stands in brackets and may hold anything; the start is 20 fields behind it
+            fields = file.read().rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return "" if fields[0] in "ZX" else fields[19]
+
+
+def is_gone(process: ProcessIdentity) -> bool:
+    """Tell whether a process of this place has surely ended; one of another place never surely has."""
+    if process.place != this_place():
+        return False
+    if process.start:
+        return start_of(process.pid) != process.start
+    try:
+        os.kill(process.pid, 0)
+    except ProcessLookupError:
+        return True
+    except OSError:
+        return False
+    return False
+
 
 # Runs that this runner looks at, those of them that are not finished, and those that nobody is at.
 CHOSEN = """

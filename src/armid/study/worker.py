@@ -7,11 +7,11 @@ import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from armid.model import ArmidError
+from armid.errors import ArmidError
 from armid.study.kind import KINDS
-from armid.study.known import load_known
-from armid.study.perform import perform
-from armid.study.workshop import Workshop
+from armid.study.run import perform
+from armid.study.run_cache import Workshop
+from armid.study.spec import load_known
 
 READY, REFUSED, FINISHED = "ready", "refused", "finished"
 # How often a worker looks whether the process that it works for still lives [s].

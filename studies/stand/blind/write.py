@@ -43,9 +43,7 @@ def check_suite_place(folder: Path, force: bool) -> None:
         raise RefusalError(f"{folder} holds {strangers[0]}, which is no blind campaign, so --force will not replace it")
 
 
-def write_suite(
-    folder: Path, suite: Suite, cases: Mapping[str, Case], seed: int, processes: int
-) -> None:
+def write_suite(folder: Path, suite: Suite, cases: Mapping[str, Case], seed: int, processes: int) -> None:
     """Make every campaign of a suite, as `write_campaigns` does."""
     named = {name: (name, case) for name, case in cases.items()}
     write_campaigns(folder, named, partial(_make_blind, suite, seed), {"seed": seed}, processes)

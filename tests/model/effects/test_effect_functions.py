@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 
 from armid.model import EFFECTS
-from armid.model.effects import (
-    controller_delay,
-    flux_saturation,
-    gas_heat_loss,
-    gyro_lag,
-    line_loss,
-    load_friction,
-    presliding,
-    shell_rocking,
-    tachometer_lag,
-    worm_direction,
-    worm_speed,
-)
+from armid.model.effects import balance as gas_heat_loss
+from armid.model.effects import balance as line_loss
+from armid.model.effects import bodies as shell_rocking
+from armid.model.effects import control as controller_delay
+from armid.model.effects import control as tachometer_lag
+from armid.model.effects import drive as worm_direction
+from armid.model.effects import drive as worm_speed
+from armid.model.effects import friction as load_friction
+from armid.model.effects import friction as presliding
+from armid.model.effects import motor as flux_saturation
+from armid.model.effects import sensor as gyro_lag
 
 RNG = np.random.default_rng(4)
 OMEGA = np.array([-2.5, -1.0, -0.3, 0.3, 1.0, 2.5])

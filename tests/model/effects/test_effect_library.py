@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.model import EFFECTS, PLANTS, ArmidError, Effect, Model, Parameter, applicable, refusal_of
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS, Effect, Model, Parameter, applicable, refusal_of
 from armid.model.plants.driven_axis import linear_axis, rotary_axis
 
 ARM = PLANTS["shell_transfer_arm"]

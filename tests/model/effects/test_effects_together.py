@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armid.contract import simulate_plainly
-from armid.contract.candidates import away, corners, from_null, middle
+from armid.contract.reference import simulate_plainly
+from armid.contract.trials import away, corners, from_null, middle
+from armid.engine import Schedule, simulate
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, applicable
 from armid.model.plants.driven_axis import linear_axis, rotary_axis
-from armid.simulation import Schedule, simulate
 
 Array = NDArray[np.float64]
 ARM = PLANTS["shell_transfer_arm"]

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from armid.model.effect import State
-from armid.model.parameter import Parameter
+from armid.model.parameter import Parameter, Scales
 from armid.model.plant import Constant, Input, Plant
-from armid.model.scales import Scales
 
 
 def drive_effort(gain, u):

@@ -1,0 +1,172 @@
+"""Choose how finely time is cut, from the error measured on a spread of candidates."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.engine.kernel import LONGEST
+from armid.engine.simulate import Array, Schedule, Simulation, simulate
+from armid.errors import ArmidError
+from armid.model import Manoeuvre, Model
+
+STANDARD, FINE = "standard", "fine"
+# Errors of the recorded signal that are allowed, as shares of the plant's speed scale (arm: 2 rad/s).
+ALLOWED = {STANDARD: 5e-6, FINE: 1e-7}
+# What steps over several samples may change: for good (all of them together, shares of the speed scale; one step does a
+# hundredth of it, which no derivative sees), and between their ends (shares of the allowed error).
+LASTING, PASSING = 1.5e-8, 0.1
+SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+MARGIN = 0.5
+# Below this many times the engine's standard error the noise no longer hides that error.
+NOISE_HIDES = 10.0
+# How many candidates must still be before their switch for a long step to count as tried.
+N_WITNESSES = 8
+N_PROBES = 48
+# Values of a simulation of all candidates that are in memory at a time (64 MB); more are tried in parts of so many.
+MOST_VALUES, PART = 2**23, 8
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Hold a schedule and the error [unit of the signal] that was measured for it on the probes."""
+
+    schedule: Schedule
+    error: float
+    reached: bool
+
+
+def accuracy_against(noise: float, model: Model) -> str:
+    """Return "fine" where noise of an rms [unit of the signal] would not hide the standard error, else "standard"."""
+    return FINE if noise < NOISE_HIDES * ALLOWED[STANDARD] * model.plant.scales.speed else STANDARD
+
+
+def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
+    """Return candidates spread evenly over a box (Kronecker sequence), shape (n_probes, n_parameters).
+
+    x_i = frac(i a), a_j = g**-j with g the root of g**(d + 1) = g + 1. Source: Roberts 2018, generalised golden ratio.
+    """
+    return low + (high - low) * ((np.arange(1, n_probes + 1)[:, np.newaxis] * golden_steps(len(low))) % 1.0)
+
+
+def golden_steps(n: int) -> Array:
+    """Return the steps a_j of the Kronecker sequence of `probes` in n dimensions, shape (n,)."""
+    ratio = 2.0
+    for _ in range(60):
+        ratio = (1.0 + ratio) ** (1.0 / (n + 1))
+    return np.asarray(ratio ** -np.arange(1.0, n + 1.0))
+
+
+def difference(a: Simulation, b: Simulation) -> float:
+    """Return the largest difference of two simulations where both hold."""
+    good = ~(a.failed | b.failed)
+    return float(np.max(np.abs(a.output[good] - b.output[good]), initial=0.0))
+
+
+def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:
+    """Return the largest difference after the first switch, where long steps have ended."""
+    switched = np.min(list(a.switch_times.values()), axis=0)
+    good = ~(a.failed | b.failed) & np.isfinite(switched)
+    after = np.arange(a.output.shape[1]) * interval > switched[good, None]
+    return float(np.max(np.abs(a.output[good] - b.output[good])[after], initial=0.0))
+
+
+def calibrate(
+    model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str = STANDARD, spans: bool = True
+) -> Calibration:
+    """Choose the coarsest schedule whose error on the candidates stays within half of what is allowed.
+
+    The error of n steps between samples is estimated from the difference to 2n steps: fourth order, 16/15 of it. Steps
+    at which a candidate fails that holds with the finest ones are too coarse, whatever the others do.
+    candidates: shape (n_candidates, n_parameters), usually `probes` of the bounds. spans: look for steps over several
+    samples too, which pays when many populations follow.
+
+    Raises ArmidError for an unknown accuracy.
+    """
+    if accuracy not in ALLOWED:
+        raise ArmidError(f"accuracy '{accuracy}' is unknown: {' or '.join(ALLOWED)} is expected")
+    if len(candidates) > PART and len(candidates) * manoeuvre.n_samples > MOST_VALUES:
+        return in_parts(model, manoeuvre, candidates, accuracy)
+    allowed = ALLOWED[accuracy] * model.plant.scales.speed
+    runs: dict[int, Simulation] = {}
+
+    def run(n: int) -> Simulation:
+        return runs.setdefault(n, simulate(model, manoeuvre, candidates, Schedule(n)) if n not in runs else runs[n])
+
+    error = np.inf
+    for n in SUBSTEPS:
+        error = difference(run(n), run(2 * n)) * 16 / 15
+        if run(n).failed.any() and spared(run(n), run(SUBSTEPS[-1])):
+            error = np.inf
+        if error <= MARGIN * allowed:
+            break
+        if n != SUBSTEPS[-1]:
+            del runs[n]
+    schedule = Schedule(n, weights=switch_weights(candidates, run(n)))
+    if spans:
+        schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
+    return Calibration(schedule, error, bool(error <= allowed))
+
+
+def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str) -> Calibration:
+    """Return the finest of the calibrations of parts of the candidates: a long record would fill the memory with all.
+
+    Its error is no smaller than that of any part. Steps over several samples are not looked for.
+    """
+    parts = [candidates[first : first + PART] for first in range(0, len(candidates), PART)]
+    found = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
+    finest = max(found, key=lambda c: c.schedule.substeps)
+    schedule = replace(finest.schedule, weights=None)
+    return Calibration(schedule, max(c.error for c in found), all(c.reached for c in found))
+
+
+def spared(coarse: Simulation, fine: Simulation) -> bool:
+    """Tell whether a candidate that fails with coarse steps holds with fine ones, or whether none holds at all."""
+    return bool((coarse.failed & ~fine.failed).any() or fine.failed.all())
+
+
+def switch_weights(candidates: Array, run: Simulation) -> Array | None:
+    """Return weights of the parameters in the time of the first switch (least squares), None without a switch."""
+    if not run.switch_times or len(candidates) < 2 * candidates.shape[1] + 2:
+        return None
+    times = np.array(next(iter(run.switch_times.values())))
+    known = np.isfinite(times)
+    if known.sum() < candidates.shape[1] + 2 or np.ptp(times[known]) == 0.0:
+        return None
+    times[~known] = times[known].max()
+    spread = np.where(np.ptp(candidates, axis=0) > 0, np.ptp(candidates, axis=0), 1.0)
+    design = np.column_stack([np.ones(len(candidates)), candidates / spread])
+    return np.asarray(np.linalg.lstsq(design, times, rcond=None)[0][1:] / spread)
+
+
+def long_steps(
+    model: Model, manoeuvre: Manoeuvre, candidates: Array, schedule: Schedule, run: Simulation, allowed: float
+) -> NDArray[np.int64] | None:
+    """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may.
+
+    Where next to all candidates have switched, nothing can be tried: the steps stay as they are.
+    """
+    if not model.latches or model.plant.inputs or manoeuvre.n_samples < 2 * LONGEST:
+        return None
+    lasting = LASTING * model.plant.scales.speed
+    plan = np.ones(manoeuvre.n_samples - 1, dtype=np.int64)
+    start, last = 0, witnessed(run, manoeuvre)
+    for span in (2, 4, 8):
+        for first in range(start + 10 - start % 10, last - span, 10 if start < 200 else 40):
+            longer = plan.copy()
+            longer[first:] = span
+            tried = simulate(model, manoeuvre, candidates, replace(schedule, plan=longer))
+            kept = lasting_difference(tried, run, manoeuvre.interval) <= lasting
+            if kept and difference(tried, run) <= PASSING * allowed:
+                plan, start = longer, first
+                break
+        else:
+            break
+    return plan if plan.max() > 1 else None
+
+
+def witnessed(run: Simulation, manoeuvre: Manoeuvre) -> int:
+    """Return the last sample at which enough candidates are still before their first switch."""
+    switched = np.min(list(run.switch_times.values()), axis=0) - manoeuvre.start_time
+    samples = np.where(np.isfinite(switched), switched / manoeuvre.interval, manoeuvre.n_samples - 1)
+    return int(np.sort(samples)[-min(N_WITNESSES, len(samples))])

@@ -1,0 +1,238 @@
+"""The source text of one plain function, made self-contained for the generated module."""
+
+import ast
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from armid.engine.simd_math import LANE_FUNCTIONS
+from armid.errors import ArmidError
+from armid.model.equations import definition_of
+
+# A name that no function can have; it becomes `np` when the names of the function are replaced.
+NUMPY = "numpy itself"
+
+
+def call(function: str, *arguments: ast.expr) -> ast.Call:
+    """Return the expression `np.function(...)`."""
+    return ast.Call(ast.Attribute(ast.Name(NUMPY, ast.Load()), function, ast.Load()), list(arguments), [])
+
+
+class Vectorise(ast.NodeTransformer):
+    """Turn choices inside expressions into selections, and small whole powers into products."""
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        self.generic_visit(node)
+        return call("where", node.test, node.body, node.orelse)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        self.generic_visit(node)
+        name = "logical_and" if isinstance(node.op, ast.And) else "logical_or"
+        result = node.values[0]
+        for value in node.values[1:]:
+            result = call(name, result, value)
+        return result
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        self.generic_visit(node)
+        return call("logical_not", node.operand) if isinstance(node.op, ast.Not) else node
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        self.generic_visit(node)
+        lefts = [node.left, *node.comparators[:-1]]
+        result: ast.expr = ast.Compare(lefts[0], node.ops[:1], node.comparators[:1])
+        for left, operator, right in zip(lefts[1:], node.ops[1:], node.comparators[1:], strict=True):
+            result = call("logical_and", result, ast.Compare(left, [operator], [right]))
+        return result
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if not (isinstance(node.op, ast.Pow) and isinstance(node.right, ast.Constant)):
+            return node
+        square = call("square", node.left)
+        simple = {1: node.left, 2: square, 3: ast.BinOp(square, ast.Mult(), node.left), 4: call("square", square),
+                  0.5: call("sqrt", node.left), -1: ast.BinOp(ast.Constant(1.0), ast.Div(), node.left)}  # fmt: skip
+        value = node.right.value
+        return simple.get(value, node) if isinstance(value, (int, float)) else node
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+        """Turn x += y into x = x + y: lanes cannot be changed in place."""
+        if not isinstance(node.target, ast.Name):
+            return self.generic_visit(node)
+        value = ast.BinOp(ast.Name(node.target.id, ast.Load()), node.op, node.value)
+        return ast.Assign([node.target], self.visit(value))
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Nest min(a, b, c) and max(a, b, c): two at a time."""
+        self.generic_visit(node)
+        if not (isinstance(node.func, ast.Name) and node.func.id in ("min", "max") and len(node.args) > 2):
+            return node
+        result: ast.expr = node.args[0]
+        for value in node.args[1:]:
+            result = ast.Call(node.func, [result, value], [])
+        return result
+
+
+CONTROL_FLOW = (ast.If, ast.While, ast.For, ast.Try, ast.With, ast.Match)
+LANE_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.BitAnd, ast.BitOr)
+# What these return, or take, is one plain number: a function that uses them is computed lane by lane.
+SCALAR_BUILTINS = {"float", "int", "bool", "range", "len", "round"}
+ALLOWED_BUILTINS = {"abs", "min", "max", "pow", *SCALAR_BUILTINS}
+# Names of the generated module itself: an argument or a variable of that name gets another one.
+RESERVED = {"np", "math", "lane", "with_lane", "splat", "WIDTH", "result", "i"}
+
+
+def local_name(name: str) -> str:
+    """Return the name under which a function's argument or variable stands in the generated module."""
+    return f"{name}__own" if name in RESERVED else name
+
+
+@dataclass
+class SourceText:
+    """Collect the definitions of functions by their new name, helpers first.
+
+    by_lane: names of those that choose or loop; functions: the Python function of each name.
+    """
+
+    definitions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    by_lane: set[str] = field(default_factory=set)
+    functions: dict[str, Callable[..., Any]] = field(default_factory=dict)
+
+    def add(self, name: str, function: Callable[..., Any]) -> None:
+        """Add one function under a new name, with the helpers that it calls.
+
+        Raises ArmidError when its source cannot be read or it uses something that cannot be compiled.
+        """
+        plain = plain_function(function)
+        self.functions[name] = plain
+        definition = with_values(definition_of(plain), plain)
+        names = Names(name, plain, self)
+        definition = names.visit(Vectorise().visit(definition))
+        definition.name = name
+        if names.is_scalar or any(isinstance(node, CONTROL_FLOW) for node in ast.walk(definition)):
+            self.by_lane.add(name)
+        self.definitions[name] = ast.fix_missing_locations(definition)
+
+    def add_helper(self, caller: str, name: str, function: Callable[..., Any]) -> str:
+        """Add what a function calls and return its new name.
+
+        Raises ArmidError when the two call each other: numba cannot compile that.
+        """
+        plain, helper = plain_function(function), f"{caller}__{name}"
+        if any(plain is f for n, f in self.functions.items() if n not in self.definitions):
+            raise ArmidError(f"the equation {plain.__qualname__} calls itself: write it as a loop")
+        while self.functions.get(helper, plain) is not plain:
+            helper += "_"
+        if helper not in self.definitions:
+            self.add(helper, plain)
+        return helper
+
+
+def plain_function(function: Callable[..., Any]) -> Any:
+    """Return the Python function below a decorator or a compiled function."""
+    return inspect.unwrap(getattr(function, "py_func", function))
+
+
+def with_values(definition: ast.FunctionDef, function: FunctionType) -> ast.FunctionDef:
+    """Put values in the place of defaults, and make every argument one that can be named.
+
+    Raises ArmidError for a default that is no number.
+    """
+    arguments = definition.args
+    arguments.args = [*arguments.posonlyargs, *arguments.args]
+    arguments.posonlyargs = []
+    arguments.defaults = [default(value, function) for value in function.__defaults__ or ()]
+    return definition
+
+
+def default(value: Any, function: FunctionType) -> ast.expr:
+    """Return the expression of a default."""
+    if not isinstance(value, (bool, int, float, np.floating, np.integer)):
+        raise ArmidError(f"the equation {function.__qualname__} has the default {value!r}: a number is expected")
+    return number(value)
+
+
+def number(value: Any) -> ast.expr:
+    """Return the expression of a number; a negative one in parentheses of its own, as in (-2) ** x."""
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
+        plain: int | float = int(value)
+    else:
+        plain = float(value)
+    if math.isnan(plain):
+        return ast.Attribute(ast.Name("np", ast.Load()), "nan", ast.Load())
+    return ast.UnaryOp(ast.USub(), ast.Constant(-plain)) if plain < 0 else ast.Constant(plain)
+
+
+class Names(ast.NodeTransformer):
+    """Replace what a function takes from its file: numpy and math by themselves, numbers by value, helpers by copy."""
+
+    def __init__(self, name: str, function: FunctionType, sources: SourceText) -> None:
+        self.name, self.function, self.sources = name, function, sources
+        closure = inspect.getclosurevars(function)
+        self.outside = {**closure.globals, **closure.nonlocals}
+        self.local = set(function.__code__.co_varnames)
+        self.is_scalar = False
+
+    def visit_arg(self, node: ast.arg) -> ast.AST:
+        return ast.arg(local_name(node.arg))
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
+        value = node.value or ast.Constant(0.0)
+        return ast.Assign([self.visit(node.target)], self.visit(value))
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.is_scalar |= not isinstance(node.op, LANE_OPERATORS)
+        return self.generic_visit(node)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.value, ast.Name) and node.value.id in ("np", "math"):
+            self.meet(getattr(np if node.value.id == "np" else math, node.attr, None))
+        return node
+
+    def meet(self, called: Any) -> None:
+        """Note a function of numpy or math that lanes do not have."""
+        self.is_scalar |= callable(called) and called not in LANE_FUNCTIONS
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.func, ast.Name) and node.func.id in self.sources.definitions:
+            node.keywords = [ast.keyword(k.arg and local_name(k.arg), k.value) for k in node.keywords]
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if node.id == NUMPY:
+            return ast.Name("np", ast.Load())
+        if node.id in self.local:
+            return ast.Name(local_name(node.id), node.ctx)
+        if node.id in self.outside:
+            return self.replacement(node.id, self.outside[node.id])
+        if node.id in ALLOWED_BUILTINS:
+            self.is_scalar |= node.id in SCALAR_BUILTINS
+            return node
+        raise ArmidError(f"the equation {self.function.__qualname__} uses '{node.id}', which cannot be compiled: "
+                         "numpy, math, numbers and plain functions are expected")  # fmt: skip
+
+    def replacement(self, name: str, value: Any) -> ast.AST:
+        """Return what stands for an outside name in the generated module."""
+        if isinstance(value, ModuleType) and value in (np, math):
+            return ast.Name("np" if value is np else "math", ast.Load())
+        if isinstance(value, (bool, int, float, np.floating, np.integer)):
+            return number(value)
+        for module in (np, math):
+            called = getattr(value, "__name__", "")
+            if called and getattr(module, called, None) is value:
+                module_name = "np" if module is np else "math"
+                self.meet(value)
+                return ast.Attribute(ast.Name(module_name, ast.Load()), called, ast.Load())
+        if isinstance(plain_function(value), FunctionType):
+            helper = self.sources.add_helper(self.name, name, value)
+            self.is_scalar |= helper in self.sources.by_lane
+            return ast.Name(helper, ast.Load())
+        raise ArmidError(f"the equation {self.function.__qualname__} uses '{name}' ({type(value).__name__}), which "
+                         "cannot be compiled: numpy, math, numbers and plain functions are expected")  # fmt: skip

@@ -1,0 +1,1 @@
+"""Parameters from records, and how well the records pin them down."""

@@ -1,0 +1,315 @@
+"""What an examination found, as numbers for other programs."""
+
+import platform
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from armid.estimation.collinearity import Group, collinearity_index, normalised
+from armid.estimation.design import Offer
+from armid.estimation.examine import Examination
+from armid.estimation.information import Level
+from armid.estimation.profile import Profile
+from armid.problem.space import Space
+from armid.units import SHOWN, shown
+
+MOST_OFFERS, MOST_COLUMNS = 8, 5
+
+
+def parameter_table(found: Examination) -> Table:
+    """Return the table of parameters: value, deviation, intervals by curvature and by profile, where it is bounded."""
+    table = Table("parameter", "value", "unit", "deviation", "95 % by curvature", "95 % by profile", "bounded", "",
+                  title="What the records say")  # fmt: skip
+    for i, profile in enumerate(found.profiles):
+        value, unit = shown(float(found.x[i]), profile.unit)
+        factor = SHOWN.get(profile.unit, ("", 1.0))[1]
+        half = float(found.information.half_width[i]) * factor
+        told = interval_text(value - half, value + half) if np.isfinite(half) else "not determined"
+        deviation = deviation_text(found.space, i, float(found.information.deviation[i]), float(found.x[i]))
+        flag = "AT ITS BOUND" if found.at_bound[i] else "" if profile.agrees else "THEY DIFFER"
+        table.add_row(profile.name, f"{value:.6g}", unit, deviation, told, profile_text(profile, factor),
+                      bounded_text(profile), flag)  # fmt: skip
+    return table
+
+
+def interval_text(low: float, high: float) -> str:
+    """Return an interval with as many digits as its width deserves."""
+    width = abs(high - low)
+    digits = 6 if width == 0.0 else int(np.clip(2 - np.floor(np.log10(width)), 0, 9))
+    return f"{low:.{digits}f} to {high:.{digits}f}"
+
+
+def profile_text(profile: Profile, factor: float) -> str:
+    """Return the interval of a profile; where it is not bounded inside the box its end is the box."""
+    text = interval_text(profile.low * factor, profile.high * factor)
+    low, high = text.split(" to ")
+    return f"{low if profile.bounded[0] else f'box {low}'} to {high if profile.bounded[1] else f'box {high}'}"
+
+
+def bounded_text(profile: Profile) -> str:
+    """Return on which sides a profile is bounded inside the box."""
+    return {(True, True): "yes", (True, False): "below only", (False, True): "above only"}.get(profile.bounded, "NO")
+
+
+def deviation_text(space: Space, i: int, deviation: float, value: float) -> str:
+    """Return a standard deviation of a free parameter: in percent of a value that is no addition, else in its unit."""
+    unit = space.units[int(np.flatnonzero(space.free)[i])]
+    span = float((space.high - space.low)[space.free][i])
+    if not np.isfinite(deviation):
+        return "not determined"
+    if "." not in space.free_names[i] and abs(value) > 1e-3 * span:
+        return f"{100 * deviation / abs(value):.2g} %"
+    told, name = shown(deviation, unit)
+    return f"{told:.2g} {name}".removesuffix(" 1")
+
+
+def offer_table(found: Examination, most: int = MOST_OFFERS) -> Table:
+    """Return the table of the best offers: manoeuvre, deviation of each parameter after one such record."""
+    columns = told_columns(found)
+    some = "" if len(columns) == len(found.x) else f", {len(columns)} of {len(found.x)} parameters"
+    table = Table("one more record of", *(found.space.free_names[i] for i in columns), "gain",
+                  title=f"What one more manoeuvre would buy (deviations{some})")  # fmt: skip
+    table.add_row("none", *(cell(found, i, float(found.information.deviation[i])) for i in columns), "1")
+    best = found.offers[:most]
+    repeats = [o for o in found.offers[most:] if o.feasible.repeats][:1]
+    for offer in (*best, *repeats):
+        cells = [cell(found, i, float(offer.after[i])) for i in columns]
+        table.add_row(offer.feasible.name, *cells, f"{offer.gain:.3g}")
+    return table
+
+
+def told_columns(found: Examination) -> list[int]:
+    """Return the places of the parameters that the best offer helps most, in order, as many as a table can hold."""
+    n = len(found.x)
+    if n <= MOST_COLUMNS or not found.offers:
+        return list(range(min(n, MOST_COLUMNS)))
+    with np.errstate(invalid="ignore"):
+        helped = np.nan_to_num(found.offers[0].before / found.offers[0].after, nan=1.0, posinf=np.inf)
+    return sorted(int(i) for i in np.argsort(-helped, kind="stable")[:MOST_COLUMNS])
+
+
+def cell(found: Examination, i: int, deviation: float) -> str:
+    """Return one deviation of the offers."""
+    return deviation_text(found.space, i, deviation, float(found.x[i]))
+
+
+def offer_text(found: Examination, offer: Offer) -> str:
+    """Return an offer in one line: "raise, empty, 24 V from 20 to -40 deg: n from 0.84 % to 0.11 %"."""
+    i = offer.best
+    before, after = cell(found, i, float(offer.before[i])), cell(found, i, float(offer.after[i]))
+    return f"{offer.feasible.name}: {found.space.free_names[i]} from {before} to {after}"
+
+
+# The point that was given is away from the minimum when a step there is more standard deviations than this.
+AWAY = 1.0
+# The noise of a measured start is told of when it widens an interval by more than this factor.
+WIDENS = 1.2
+MOST_NAMED = 6
+
+
+def remarks(found: Examination) -> list[str]:
+    """Return what a reader must know, one sentence each."""
+    said = [group_remark(found, group) for group in found.groups]
+    said += [f"{p.name} is not seen at all in these records: any value in the box leaves them as they are."
+             for p in found.profiles if not found.information.fisher.diagonal()[index(found, p)] > 0.0]  # fmt: skip
+    said += [text for p in found.profiles if (text := profile_remark(found, p))]
+    return said + point_remarks(found) + start_remarks(found) + level_remarks(found) + offer_remarks(found)
+
+
+def index(found: Examination, profile: Profile) -> int:
+    """Return the place of a profile's parameter among the free ones."""
+    return found.space.free_names.index(profile.name)
+
+
+def listed(names: tuple[str, ...]) -> str:
+    """Return names as people list them."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def group_remark(found: Examination, group: Group) -> str:
+    """Return the sentence for parameters that move together."""
+    places = [found.space.free_names.index(n) for n in group.names]
+    leader = places[int(np.argmax(np.abs(group.direction)))]
+    followers = [
+        f"{move_text(found, i, float(d))} of {found.space.free_names[i]}"
+        for i, d in zip(places, group.direction, strict=True) if i != leader
+    ]  # fmt: skip
+    name = found.space.free_names[leader]
+    return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
+            f"for by the others to within {100 / group.index:.2g} %; {move_text(found, leader, 1.0)} of {name} goes "
+            f"next to unseen with {listed(tuple(followers))}.")  # fmt: skip
+
+
+def move_text(found: Examination, i: int, share: float) -> str:
+    """Return a change of a free parameter that belongs to a direction, its leader moved by 1 % of its range."""
+    span = float((found.space.high - found.space.low)[found.space.free][i])
+    change = 0.01 * share * span
+    return ("+" if change >= 0.0 else "-") + deviation_text(found.space, i, abs(change), float(found.x[i]))
+
+
+def profile_remark(found: Examination, profile: Profile) -> str:
+    """Return the sentence for a profile that is not bounded, or that tells another interval than the curvature."""
+    value, factor = profile.name, SHOWN.get(profile.unit, ("", 1.0))[1]
+    null = found.model.parameters[profile.name].null
+    low, high = profile.bounded
+    if not (low or high):
+        return f"{value} is bounded on neither side: the records leave open the whole box."
+    if low and high and profile.agrees:
+        return ""
+    if null is not None and not low and profile.low == null == profile.box[0]:
+        upper = shown(profile.high, profile.unit)
+        return f"{value} may be null: it is below {upper[0]:.3g} {upper[1]} at 95 %, and 0 is as good."
+    if low != high:
+        side = "above" if low else "below"
+        return f"{value} is not bounded {side}: the 95 % interval runs into the box."
+    told, by = (interval_text(a * factor, b * factor) for a, b in ((profile.low, profile.high), profile.curvature))
+    unit = "" if profile.unit == "1" else f" {shown(0.0, profile.unit)[1]}"
+    return (f"{value}: the profile says {told}{unit}, the curvature {by}: the records are not symmetric about the "
+            "minimum, or a bound holds what would make up for it; believe the profile.")  # fmt: skip
+
+
+def point_remarks(found: Examination) -> list[str]:
+    """Return what is to be said of a point that was given."""
+    if not found.given:
+        return []
+    with np.errstate(invalid="ignore", divide="ignore"):
+        away = np.abs(found.x - found.minimum) / found.information.deviation
+    away = np.nan_to_num(away, nan=0.0, posinf=0.0)
+    if away.max() <= AWAY:
+        return []
+    name = found.space.free_names[int(away.argmax())]
+    return [f"The point that was given is not the least-squares minimum: {name} is {away.max():.3g} standard "
+            "deviations from it; the profiles are drawn about the minimum, all else is at the point."]  # fmt: skip
+
+
+def start_remarks(found: Examination) -> list[str]:
+    """Return a sentence where the noise of measured starts widens the intervals."""
+    told = np.array([p.deviation for p in found.profiles])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        wider = np.nan_to_num(found.information.deviation / told, nan=1.0, posinf=1.0)
+    if found.given or wider.max() < WIDENS:
+        return []
+    name = found.space.free_names[int(wider.argmax())]
+    return [f"Records start from measured states, whose noise widens the deviation of {name} {wider.max():.3g} times; "
+            "the profiles do not show it."]  # fmt: skip
+
+
+def level_remarks(found: Examination) -> list[str]:
+    """Return what the intervals rest on: noise, residual, or an assumption; records that say the same together."""
+    texts: dict[str, list[str]] = {}
+    for replay, level in zip(found.replays, found.information.levels, strict=True):
+        texts.setdefault(level_text(level, found.campaign.unit, replay.record.noise.rms), []).append(replay.record.file)
+    said = [f"{listed(tuple(files[:MOST_NAMED]))}: {text}" for text, files in texts.items()]
+    return said[:MOST_NAMED] + ([f"So it is with {len(said) - MOST_NAMED} more."] if len(said) > MOST_NAMED else [])
+
+
+def level_text(level: Level, unit: str, noise: float) -> str:
+    """Return what one record is weighed by."""
+    value, name = shown(level.rms, unit)
+    if level.assumed:
+        return (f"no noise is known, so white noise of {value:.3g} {name} rms is ASSUMED: intervals scale with it, "
+                "groups do not depend on it.")  # fmt: skip
+    if level.from_residual:
+        times = level.rms / noise if noise else np.inf
+        return (f"the residual of {value:.2g} {name} is {times:.2g} times the noise: the model lacks something, and "
+                "the intervals, widened to the residual and its correlation in time, hold only as far as what is "
+                "lacking averages out.")  # fmt: skip
+    share = level.effective_fraction
+    coloured = "" if share > 0.9 else f", coloured: one sample in {1 / share:.2g} is new"
+    return f"noise {value:.2g} {name} rms{coloured}."
+
+
+def offer_remarks(found: Examination) -> list[str]:
+    """Return the best offer in one line."""
+    if not found.offers:
+        return ["No further manoeuvre was found that the machine could make."]
+    return [f"One more record, {offer_text(found, found.offers[0])}."]
+
+
+PACKAGES = ("armid", "numpy", "scipy", "numba")
+
+
+def result_of(found: Examination) -> dict[str, Any]:
+    """Return everything of an examination that JSON can hold, SI throughout; what is not known is null."""
+    names, correlation = found.space.free_names, found.information.correlation
+    return {
+        "campaign": found.campaign.name,
+        "plant": found.model.plant.name,
+        "effects": [e.name for e in found.model.effects],
+        "unit": found.campaign.unit,
+        "at": "given" if found.given else "estimate",
+        "parameters": {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)},
+        "fixed": {n: float(v) for n, v in zip(found.space.names, found.space.fixed, strict=True) if not np.isnan(v)},
+        "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
+        "collinearity_index": collinearity_index(found.information.fisher),
+        "groups": [
+            {"names": list(g.names), "index": g.index,
+             "direction": dict(zip(g.names, (float(d) for d in g.direction), strict=True))} for g in found.groups
+        ],
+        "directions": directions(found),
+        "records": {
+            r.record.file: {"level": level.rms, "effective_fraction": level.effective_fraction,
+                            "from_residual": level.from_residual, "assumed": level.assumed}
+            for r, level in zip(found.replays, found.information.levels, strict=True)
+        },
+        "ranked_by": found.ranked_by,
+        "offers": [offer_entry(found, offer) for offer in found.offers],
+        "remarks": remarks(found),
+        "versions": {"python": platform.python_version(), **{p: version(p) for p in PACKAGES}},
+    }  # fmt: skip
+
+
+def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
+    """Return what is known of one free parameter; `value` is where sensitivities were taken."""
+    value, half = float(found.x[i]), float(found.information.half_width[i])
+    return {
+        "value": value,
+        "unit": profile.unit,
+        "deviation": finite(found.information.deviation[i]),
+        "low": finite(value - half),
+        "high": finite(value + half),
+        "bound_low": profile.box[0],
+        "bound_high": profile.box[1],
+        "bound_active": bool(found.at_bound[i]),
+        "profile": {
+            "minimum": profile.estimate,
+            "low": profile.low,
+            "high": profile.high,
+            "bounded_low": profile.bounded[0],
+            "bounded_high": profile.bounded[1],
+            "agrees_with_curvature": profile.agrees,
+            "values": profile.values.tolist(),
+            "rise": profile.rise.tolist(),
+        },
+    }
+
+
+def directions(found: Examination) -> list[dict[str, Any]]:
+    """Return the eigenvectors of the information matrix scaled to a diagonal of 1, the weakest first."""
+    scaled, seen = normalised(found.information.fisher)
+    names = [n for n, s in zip(found.space.free_names, seen, strict=True) if s]
+    values, vectors = np.linalg.eigh(scaled) if names else (np.empty(0), np.empty((0, 0)))
+    return [
+        {"eigenvalue": float(value), "vector": dict(zip(names, vector.tolist(), strict=True))}
+        for value, vector in zip(values, vectors.T, strict=True)
+    ]
+
+
+def offer_entry(found: Examination, offer: Offer) -> dict[str, Any]:
+    """Return one offer: the manoeuvre as campaign.toml would say it, and the deviations before and after."""
+    return {
+        "manoeuvre": dict(offer.feasible.keys),
+        "words": offer.feasible.name,
+        "gain": offer.gain,
+        "deviation": {
+            name: {"before": finite(offer.before[i]), "after": finite(offer.after[i])}
+            for i, name in enumerate(found.space.free_names)
+        },
+    }
+
+
+def finite(value: float) -> float | None:
+    """Return a float that JSON can hold, None for NaN and infinity."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,236 @@
+"""How well records pin down parameters: sensitivities, Fisher information, intervals, correlations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.engine import Calibration, simulate
+from armid.estimation.least_squares import STEP
+from armid.problem.replay import Replay
+from armid.problem.space import Space
+from armid.record import Piece
+from armid.record.noise import correlation_sum
+from armid.record.record import NOISE_FREE
+
+Array = NDArray[np.float64]
+
+
+def start_scatter(replay: Replay, space: Space, x: Array, jacobian: Array) -> Array:
+    """Return the covariance of J^T (residual) that comes from noise in the measured starts, (n_free, n_free).
+
+    sum over pieces and start constants c of var(c) g g^T with g = J^T d signal / d c; zero for a machine that starts
+    from rest. jacobian: of the whole record, shape (n_samples, n_free).
+    """
+    scatter = np.zeros((len(x), len(x)))
+    row = 0
+    for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
+        rows = jacobian[row : row + piece.n_samples].T
+        for name, deviation in piece.start_deviation.items():
+            g = rows @ start_sensitivity(replay, piece, calibration, space, x, name) * deviation
+            scatter += np.outer(g, g)
+        row += piece.n_samples
+    return scatter
+
+
+def start_sensitivity(
+    replay: Replay, piece: Piece, calibration: Calibration, space: Space, x: Array, name: str
+) -> Array:
+    """Return d signal / d start constant in the window of a piece (central difference), shape (n_samples,)."""
+    # a speed held for a second is the size of a position
+    move = 1e-4 * replay.model.plant.scales.speed
+    signals = []
+    for sign in (1.0, -1.0):
+        constants = dict(piece.manoeuvre.constants)
+        constants[name] = constants.get(name, 0.0) + sign * move
+        manoeuvre = replace(piece.manoeuvre, constants=constants)
+        run = simulate(replay.model, manoeuvre, space.complete(x[np.newaxis]), calibration.schedule)
+        signals.append(run.output[0, piece.window])
+    return np.asarray((signals[0] - signals[1]) / (2.0 * move))
+
+
+NORMAL_95 = 1.959963984540054
+# Directions whose information is below this share of the strongest cannot be told from nothing.
+SINGULAR = 1e-13
+# A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
+# engine it is the engine's.
+MISFIT, ENGINE_ERRORS = 2.0, 3.0
+
+
+@dataclass(frozen=True)
+class Level:
+    """Say how far a record scatters about the model.
+
+    rms: [unit of the record]; effective_fraction: independent samples per sample; from_residual: the residual was far
+    above the noise, so that the residual itself, with its correlation in time, is what scatters; assumed: nothing was
+    measured, the reader was told so.
+    """
+
+    rms: float
+    effective_fraction: float
+    from_residual: bool = False
+    assumed: bool = False
+
+
+@dataclass(frozen=True)
+class Information:
+    """Hold what the records say about the free parameters at one candidate.
+
+    deviation: standard deviation of each, SI, infinite where the records do not determine it, shape (n_free,).
+    correlation: of the estimates, shape (n_free, n_free), NaN where not determined.
+    levels: of the records. step: how far a least-squares step inside the box would move each parameter, in standard
+    deviations, NaN where not determined: far above 1 where a search has not come to the minimum.
+    fisher: information matrix of the parameters in shares of their range, shape (n_free, n_free), weighed with 1 where
+    a record has no noise.
+    """
+
+    names: tuple[str, ...]
+    deviation: Array
+    correlation: Array
+    levels: tuple[Level, ...] = ()
+    step: Array = field(default_factory=lambda: np.empty(0))
+    fisher: Array = field(default_factory=lambda: np.empty((0, 0)))
+
+    @property
+    def half_width(self) -> Array:
+        """Half of the 95 % interval, SI."""
+        return NORMAL_95 * self.deviation
+
+
+def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
+    """Return d signal / d parameter x range in the windows of a record, shape (n_samples, n_free).
+
+    Central differences with steps of 1e-4 of the range, moved inside the box where they would leave it; all perturbed
+    candidates run as one population.
+    """
+    low, high = space.low[space.free], space.high[space.free]
+    step = STEP * (high - low)
+    centre = np.clip(x, low + step, high - step)
+    moves = np.diag(step)
+    signal = replay.signal(space.complete(np.concatenate([centre + moves, centre - moves])))
+    n = len(x)
+    return (signal[:n] - signal[n:]).T / (2.0 * STEP)
+
+
+def level_of(replay: Replay, space: Space, x: Array) -> Level:
+    """Return the measured noise of a record, or its residual where that is far above the noise.
+
+    A model that lacks something leaves a residual that is large and smooth; intervals from the noise alone would then
+    be too narrow by orders of magnitude.
+    """
+    noise = replay.record.noise
+    residual = residual_of(replay, space, x)
+    rms = float(np.sqrt(np.mean(residual**2)))
+    # How well the noise itself is known: its mean square scatters by 2/n_eff.
+    doubt = 1.0 + 3.0 * np.sqrt(2.0 / (noise.n_samples * noise.effective_fraction))
+    noise_like = rms**2 <= MISFIT * doubt * noise.rms**2
+    if not np.isfinite(rms) or noise_like or rms <= ENGINE_ERRORS * replay.engine_error:
+        return Level(noise.rms, noise.effective_fraction)
+    return Level(rms, 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+
+
+def residual_of(replay: Replay, space: Space, x: Array) -> Array:
+    """Return measured minus simulated signal in the windows of a record [its unit]."""
+    return np.asarray(replay.measured - replay.signal(space.complete(x[np.newaxis]))[0])
+
+
+def information_at(
+    replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...] | None = None
+) -> Information:
+    """Return intervals and correlations at a candidate, from the sensitivities and the measured noise.
+
+    Fisher information F = sum over records of f J^T J / level^2 with f the share of samples that are independent;
+    covariance = F^-1 (the Cramer-Rao bound of an unbiased estimate). The level is the noise, or the residual where that
+    is far above it. A record without noise and without residual gives an interval of width 0. Where records start from
+    a measured state, what its noise does to the estimate is added (see `start_scatter`).
+    x: free parameters, SI, shape (n_free,). levels: one for each record, None: as measured.
+    """
+    span = space.high[space.free] - space.low[space.free]
+    levels = tuple(level_of(r, space, x) for r in replays) if levels is None else levels
+    noise_free = any(level.rms == 0.0 for level in levels)
+    total, started, slope = np.zeros((len(x), len(x))), np.zeros((len(x), len(x))), np.zeros(len(x))
+    for replay, level in zip(replays, levels, strict=True):
+        jacobian = sensitivities(replay, space, x)
+        weight = 1.0 if noise_free else level.effective_fraction / level.rms**2
+        total += weight * jacobian.T @ jacobian
+        slope += weight * jacobian.T @ residual_of(replay, space, x)
+        if not noise_free:
+            started += weight**2 * start_scatter(replay, space, x, jacobian)
+    covariance = inverse(total)
+    determined = np.where(np.isfinite(covariance), covariance, 0.0)
+    step = step_inside(determined @ slope, x / span, space.low[space.free] / span, space.high[space.free] / span)
+    covariance = covariance + determined @ started @ determined
+    deviation = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = covariance / np.outer(deviation, deviation)
+    correlation[~np.isfinite(correlation)] = np.nan
+    known = np.isfinite(deviation)
+    with np.errstate(invalid="ignore"):
+        steps = np.zeros(len(x)) if noise_free else step / deviation
+    shown = np.where(known & noise_free, 0.0, deviation * span)
+    return Information(space.free_names, shown, correlation, levels, steps, total)
+
+
+def step_inside(step: Array, x: Array, low: Array, high: Array) -> Array:
+    """Return a step cut at the box; all in shares of the range."""
+    return np.asarray(np.clip(x + step, low, high) - x)
+
+
+def inverse(matrix: Array) -> Array:
+    """Return the inverse of an information matrix, infinite variance for what it does not determine."""
+    scale = np.sqrt(np.diag(matrix))
+    seen = np.isfinite(scale) & (scale > 0.0)
+    result = np.full(matrix.shape, np.nan)
+    np.fill_diagonal(result, np.inf)
+    if not seen.any():
+        return result
+    scaled = matrix[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])
+    values, vectors = np.linalg.eigh(scaled)
+    good = values > SINGULAR * values.max()
+    part = (vectors[:, good] / values[good]) @ vectors[:, good].T
+    lost = (vectors[:, ~good] ** 2).sum(axis=1) > 1e-6
+    part /= np.outer(scale[seen], scale[seen])
+    part[lost, :], part[:, lost] = np.nan, np.nan
+    part[lost, lost] = np.inf
+    result[np.ix_(seen, seen)] = part
+    return result
+
+
+def collinear(information: Information, above: float = 0.95) -> list[tuple[str, str, float]]:
+    """Return the pairs of parameters that cannot be told apart well, strongest first: names and correlation."""
+    names, correlation = information.names, information.correlation
+    pairs = [
+        (names[i], names[j], float(correlation[i, j]))
+        for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > above
+    ]  # fmt: skip
+    return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+
+# What is assumed for a record without noise, as a share of its rms speed.
+ASSUMED = 1e-3
+
+
+def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | None = None) -> tuple[Level, ...]:
+    """Return the level of each record at a candidate: its noise, or its residual where that is far above the noise.
+
+    Without noise there is nothing to weigh a change against: then white noise of 0.1 % of the record's rms speed is
+    assumed, and the level says so. noise: rms [unit of the record] to assume for every record in place of all that.
+    x: free parameters, SI, shape (n_free,).
+    """
+    if noise is not None:
+        return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
+    return tuple(shown_level(r, level_of(r, space, x)) for r in replays)
+
+
+def shown_level(replay: Replay, level: Level) -> Level:
+    """Return the level, an assumed one where there is neither noise nor residual to speak of."""
+    least = NOISE_FREE * float(np.max(np.abs(replay.measured)))
+    if not replay.record.is_noise_free or level.rms > least:
+        return level
+    return Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
+
+
+def level_weights(levels: Sequence[Level]) -> tuple[float, ...]:
+    """Return sqrt(effective fraction)/rms of each level, so that weighted squares sum to chi2 of effective samples."""
+    return tuple(float(np.sqrt(level.effective_fraction)) / level.rms for level in levels)

@@ -1,0 +1,118 @@
+"""Tell whether a larger model earns its parameters."""
+
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from armid.errors import ArmidError
+from armid.estimation.design import BOX
+from armid.loop.candidates import LOOSE, with_evidence
+from armid.loop.fit import Fit, fit_from
+from armid.loop.whitening import BLOCKS, WhiteRecords
+
+Array = NDArray[np.float64]
+Part = NDArray[np.int64]
+# Chance at which noise alone gets an effect added, all candidates together.
+FAMILYWISE = 1e-3
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Say why a model is preferred to a smaller one, or not.
+
+    gain: fall of the criterion. p: chance of the fall of chi2 from noise alone, corrected for the number of candidates
+    and of shapes. left_out: sums of squares on left-out parts, before and after.
+    """
+
+    gain: float
+    p: float
+    left_out: tuple[float, float]
+
+    @property
+    def earned(self) -> bool:
+        """Whether the larger model is significant, cheaper by the criterion, and no worse on what was left out."""
+        return self.p < FAMILYWISE and self.gain > 0.0 and self.left_out[1] <= self.left_out[0]
+
+
+def criterion(fit: Fit, independent: float) -> float:
+    """Return n_eff ln(chi2) + k ln(n_eff), the Bayesian criterion with effective samples; smaller is better.
+
+    independent: n_eff, the independent samples of the residual of the best model compared. Where that is noise, n_eff
+    is n and differences are those of chi2 + k ln n; where structure remains, few samples are independent and
+    chi2 counts in proportion to what remains: no term is added for ever to a residual that the library cannot explain.
+    """
+    return float(independent * np.log(fit.chi2) + fit.n_free * np.log(independent))
+
+
+def compare(smaller: Fit, larger: Fit, n_candidates: int, n_shapes: int) -> Verdict:
+    """Judge an addition; the left-out parts are fitted again only where the first two conditions hold."""
+    # What an effect yet to be found leaves is slow in the one model and may be fast in the other: the faster counts.
+    n_eff = max(smaller.independent, larger.independent)
+    ratio = n_eff * np.log(smaller.chi2 / larger.chi2)
+    gain = criterion(smaller, n_eff) - criterion(larger, n_eff)
+    # Shape parameters mean nothing at the null, so they count as a grid that was searched, not as degrees of freedom.
+    # The noise of slow signals is known from a rest of so many independent samples, hence F and not chi-square.
+    known = min((level.n_slow for level in larger.records.evidence.levels if level.known), default=n_eff)
+    p = min(1.0, n_candidates * n_shapes * float(f_distribution.sf(max(ratio, 0.0), 1, known)))
+    if p >= FAMILYWISE or gain <= 0.0:
+        return Verdict(float(gain), p, (np.nan, np.nan))
+    return Verdict(float(gain), p, left_out(smaller, larger))
+
+
+def left_out(smaller: Fit, larger: Fit) -> tuple[float, float]:
+    """Return the sums of squares of two models on each manoeuvre (or block of time), left out of the fits in turn.
+
+    Infinite where a fit without a part diverges on it.
+    """
+    parts = parts_to_judge(smaller, larger)
+    before, after = (float(sum(left_out_part(fit, part) for part in parts)) for fit in (smaller, larger))
+    return before, after
+
+
+def parts_to_judge(smaller: Fit, larger: Fit) -> list[Part]:
+    """Return what is left out in turn: whole manoeuvres, of two that do not determine each other blocks of time.
+
+    What one manoeuvre predicts of another says nothing of an effect where the parameters that it leaves undetermined
+    may change that prediction by more than the effect is to explain.
+    """
+    whole = larger.records.evidence.parts()
+    if len(whole) != 2:
+        return whole
+    judged = [np.array_split(part, BLOCKS) if is_undetermined(smaller, larger, part) else [part] for part in whole]
+    return [part for parts in judged for part in parts]
+
+
+def is_undetermined(smaller: Fit, larger: Fit, part: Part) -> bool:
+    """Tell whether the rest predicts a part with a larger variance than the mean square that it is to explain there."""
+    rest = np.delete(larger.jacobian, part, axis=0)
+    information = rest.T @ rest + BOX * np.eye(larger.n_free)
+    slopes = larger.jacobian[part]
+    spread = float(np.mean(np.einsum("ij,ij->i", slopes, np.linalg.solve(information, slopes.T).T)))
+    return spread > float(np.mean(smaller.residual[part] ** 2))
+
+
+def left_out_part(fit: Fit, part: Part) -> float:
+    """Return the sum of squares on one part of a fit to the others."""
+    records, z = shapes_held(fit)
+    try:
+        again = fit_from(with_evidence(records, records.evidence.without(part)), fit.active, [z])
+    except ArmidError:
+        return float("inf")
+    square = float(np.sum(again.residual[part] ** 2))
+    return square if np.isfinite(square) else float("inf")
+
+
+def shapes_held(fit: Fit) -> tuple[WhiteRecords, Array]:
+    """Return the problem and the free parameters of a fit with shapes that were set free held where they are.
+
+    What is asked of a part that is left out is the strength. A shape such as the period of a sampled control may rest
+    on one record alone, where the time of its switch jumps.
+    """
+    records, declared = fit.records, fit.records.replays[0].model.parameters
+    loose = [n for n in fit.values if n.partition(".")[0] + LOOSE in fit.active and declared[n].fixed is not None]
+    space = reduce(lambda known, n: known.with_fixed(n, fit.values[n]), loose, records.space)
+    kept = [n not in loose for n in fit.values]
+    return replace(records, space=space), fit.z[np.array(kept, dtype=np.bool_)]

@@ -1,0 +1,186 @@
+"""Control: what it senses, when it acts, how strongly."""
+
+import numpy as np
+
+from armid.model.effect import Effect, Guard, State
+from armid.model.effects.sensor import output_lag_lagging_rate, output_lag_settled
+from armid.model.effects.sensor import output_lag_output as feedback
+from armid.model.parameter import Parameter
+
+tachometer_lag = Effect(
+    name="tachometer_lag",
+    parameters=(Parameter("time_constant", "s", 0.0, 0.03, null=0.0, note="of the tachometer's filter"),),
+    adds={"feedback": feedback},
+    states=(State("lagging", "rad/s", output_lag_lagging_rate, output_lag_settled),),
+    note="the speed that is fed back lags",
+    source="Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 5",
+)
+
+
+# The tachometer tells a speed when there is none (Doebelin, Measurement Systems, chapter 4).
+#
+# An offset of the angle that the control measures does the same to the demand: K_p times the angle is K_d k times this.
+
+
+def tachometer_offset_feedback(offset):
+    """Speed that the control sees less the true one [rad/s], constant."""
+    return offset
+
+
+tachometer_offset = Effect(
+    name="tachometer_offset",
+    parameters=(Parameter("offset", "speed", -0.1, 0.1, null=0.0, note="1 deg/s is 0.0175 rad/s"),),
+    adds={"feedback": tachometer_offset_feedback},
+    note="constant error of the speed that is fed back",
+    source="Doebelin, Measurement Systems, chapter 4 (tachometer generators)",
+)
+
+
+# The tachometer's voltage ripples with the turn of the motor (Doebelin, Measurement Systems, chapter 4).
+#
+# The ripple of a commutator or of an eccentric coupling is a share of the voltage, so that it grows with the speed.
+
+
+def tachometer_ripple_feedback(omega, theta, i1, sine, cosine, order):
+    """Speed that the control sees less the true one [rad/s], omega (sine sin a + cosine cos a), a = order i1 theta."""
+    return omega * (sine * np.sin(order * i1 * theta) + cosine * np.cos(order * i1 * theta))
+
+
+tachometer_ripple = Effect(
+    name="tachometer_ripple",
+    parameters=(
+        Parameter("sine", "1", -0.15, 0.15, null=0.0, note="amplitude of the sine, as a share of the speed"),
+        Parameter("cosine", "1", -0.15, 0.15, null=0.0, note="amplitude of the cosine, as a share of the speed"),
+        Parameter("order", "1", 0.5, 4.5, nominal=1.0, note="waves in a turn of the motor"),
+    ),
+    adds={"feedback": tachometer_ripple_feedback},
+    note="the speed that is fed back ripples with the turn of the motor",
+    source="Doebelin, Measurement Systems, chapter 4 (tachometer generators)",
+)
+
+
+# The control acts late: the switch and every command come a dead time after what was measured.
+#
+# The switch is exactly late: after the plant's switch the full voltage stays on for the dead time. The angle and the
+# speed that the control sees pass through the second-order Pade approximation of a dead time T,
+#
+# exp(-T s) = (1 - T s/2 + T^2 s^2/12) / (1 + T s/2 + T^2 s^2/12) = 1 - T s / (1 + T s/2 + T^2 s^2/12),
+#
+# good to (w T)^5/720 at the frequency w. Below 2 ms the filter stays that of 2 ms while the factor T goes on falling:
+# the same delay, no stiff equation, a derivative at the null. A loop that is closed from the start is not late.
+#
+# A digital control samples every `period`, first at the start of the stroke, and holds its command between samples:
+# after the dead time its switch waits for the next sample, and the hold is late by half a period on average. Of the
+# hold alone the approximation is 1 / (1 + T s/2 + T^2 s^2/12), T the period, the one of (1 - exp(-T s)) / (T s);
+# where it is a part h of the lateness, T and the equations lie between the two, right to s^2. A period of 0 does not
+# sample. Source: Golub and Van Loan, Matrix Computations, section 9.3 (Pade); Astrom and Murray, Feedback Systems,
+# chapter 9; Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 4 (hold).
+
+SHORT = 1e-4
+
+
+def lateness(delay, period):
+    """Mean time by which the control is late [s]: the dead time and half a period."""
+    return delay + 0.5 * period
+
+
+def held_part(delay, period):
+    """Part h of the lateness that is the hold's."""
+    return 0.5 * period / np.maximum(lateness(delay, period), SHORT)
+
+
+def filter_time(delay, period):
+    """Time T of the filter [s]: the delay of a dead time, the period of a hold, between them right to T^2."""
+    h = held_part(delay, period)
+    return np.maximum(lateness(delay, period) * (6 + 2 * h**2) / (3 + np.sqrt(9 - 6 * h - 2 * h**3)), 2e-3)
+
+
+def controller_delay_feedback(delay, period, omega, smooth, slope):
+    """Speed that the control sees less the true one [rad/s], h (w - omega) - (lateness - h T/2) dw/dt."""
+    h = held_part(delay, period)
+    return h * (smooth - omega) - (lateness(delay, period) - 0.5 * h * filter_time(delay, period)) * slope
+
+
+def controller_delay_command(
+    closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, delay, period, smooth, slope
+):
+    """Voltage to add to the demand [V]: K_p times the late angle's lag; what makes it full until the late switch."""
+    full = 2 * (U + u_th) * direction - K_p * (theta_D - theta) + damping * (omega + feedback)
+    bend = held_part(delay, period) * filter_time(delay, period) ** 2 / 12
+    return np.where(closed - acting > 0.5, full, K_p * (lateness(delay, period) * smooth + bend * slope))
+
+
+def smooth_rate(slope):
+    """Rate of the smoothed speed w [rad/s2]."""
+    return slope
+
+
+def slope_rate(delay, period, omega, smooth, slope):
+    """Second derivative of the smoothed speed w [rad/s3], 12/T^2 (omega - w - T/2 dw/dt)."""
+    T = filter_time(delay, period)
+    return 12 / T**2 * (omega - smooth - 0.5 * T * slope)
+
+
+def waiting_rate(closed):
+    """Time that runs after the plant's switch."""
+    return closed
+
+
+def clock_rate():
+    """Return 1: time since the start of the stroke runs."""
+    return 1.0
+
+
+def settled(omega):
+    """Return the speed: the filter has settled."""
+    return omega
+
+
+def level():
+    """Return 0: nothing accelerates before the start."""
+    return 0.0
+
+
+def waited(theta_C, theta_D, delta_E, delay):
+    """Return 0, or the whole dead time where the loop is closed from the start."""
+    return np.where(np.abs(theta_D - theta_C) <= delta_E, delay, 0.0)
+
+
+def still_to_wait(closed, delay, period, waiting, clock):
+    """Return the time until the late switch [s]: the rest of the dead time, and then until the next sample."""
+    due = clock - waiting + delay
+    sample = -np.floor(-due / np.maximum(period, SHORT)) * period
+    return np.where(closed > 0.5, np.where(period > SHORT, sample, due) - clock, lateness(delay, period))
+
+
+controller_delay = Effect(
+    name="controller_delay",
+    parameters=(
+        Parameter("delay", "s", 0.0, 0.03, null=0.0, note="dead time of the control"),
+        Parameter("period", "s", 0.0, 0.03, null=0.0, fixed=0.0, note="between samples of a digital control"),
+    ),
+    adds={"feedback": controller_delay_feedback, "command": controller_delay_command},
+    states=(
+        State("smooth", "rad/s", smooth_rate, settled),
+        State("slope", "rad/s2", slope_rate, level),
+        State("waiting", "s", waiting_rate, waited),
+        State("clock", "s", clock_rate, level),
+    ),
+    guards=(Guard("acting", still_to_wait, latch=True),),
+    note="the control switches and commands late",
+    source="Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9",
+)
+
+
+def position_gain_command(K_p, theta_D, theta, error):
+    """Voltage on top of the demand [V], error K_p (theta_D - theta)."""
+    return error * K_p * (theta_D - theta)
+
+
+position_gain = Effect(
+    name="position_gain",
+    parameters=(Parameter("error", "1", -0.4, 0.4, null=0.0, note="relative error of K_p"),),
+    adds={"command": position_gain_command},
+    note="the position loop is stiffer or softer than declared",
+    source="Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems, chapter 4",
+)

@@ -1,0 +1,216 @@
+"""What a fitness is: a number per candidate to minimise, and how the records of a campaign join."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armid.errors import ArmidError, nearest
+from armid.problem.measures import (
+    Array,
+    as_series,
+    chi_square,
+    has_failed,
+    inverse_noise,
+    mean_square,
+    relative_mean_square,
+    unity,
+)
+from armid.problem.similarity import numerical_similarity, scored
+
+SERIES = ("measured", "simulated")
+OF_RECORD = ("interval", "noise")
+JOINS = ("duration", "samples", "sum")
+
+
+@dataclass(frozen=True)
+class Fitness:
+    """Declare how far a candidate is from a measurement; smaller is better.
+
+    name: as studies spell it.
+    function: takes `measured` (n_samples,), `simulated` (n_candidates, n_samples), and where it names them `interval`
+        (sample interval [s]) and `noise` (noise rms [signal's unit]) of the record; returns one value per candidate.
+    join: how records join: "duration" (mean weighted by duration), "samples" (by number of samples), "sum".
+    finish: applied to the joined values, such as a square root; None: nothing.
+    weigh: noise rms of a record [signal's unit] -> weight w of its residual, where the finished value is a rising
+        function of sum w^2 (x - x')^2 over all samples of all records; None: it has no such form.
+    unit: of the finished value; note: what it is, in words.
+    Raises ArmidError for a function that is none or asks for something unknown, and for an unknown join.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    join: str = "duration"
+    finish: Callable[[Array], Array] | None = None
+    unit: str = "1"
+    note: str = ""
+    weigh: Callable[[float], float] | None = None
+    asks: tuple[str, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.join not in JOINS:
+            raise ArmidError(f"fitness '{self.name}' joins records by '{self.join}', {nearest(self.join, JOINS)}")
+        object.__setattr__(self, "asks", argument_names(self.name, self.function))
+
+    def __call__(
+        self, measured: ArrayLike, simulated: ArrayLike, interval: float | None = None, noise: float | None = None
+    ) -> Array:
+        """Return the value of each candidate on one record, (n_candidates,), +inf where it has none; not finished yet.
+
+        measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
+        interval: [s]; noise: [signal's unit]; needed when the function asks for them.
+        Raises ArmidError when one is missing and when the function returns anything but one number per candidate.
+        """
+        x, rows = as_series(measured, simulated)
+        given = {"measured": x, "simulated": rows, "interval": interval, "noise": noise}
+        for name in self.asks:
+            if given[name] is None:
+                raise ArmidError(f"fitness '{self.name}' asks for the {name} of the record, which is not known")
+        values = one_per_candidate(self.name, self.function(**{name: given[name] for name in self.asks}), len(rows))
+        return finite_or_inf(values, has_failed(rows))
+
+    def weight_of(self, noise: float) -> float:
+        """Return the weight of a record's residual for a least-squares method.
+
+        noise: rms of the record [signal's unit]. Raises ArmidError when the fitness is no sum of squares.
+        """
+        if self.weigh is None:
+            raise ArmidError(f"fitness '{self.name}' is no sum of squares, least squares expects rmse or likelihood")
+        return self.weigh(noise)
+
+
+def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return what a function asks of a record; refuse with ArmidError what a record cannot give.
+
+    An argument with a default is the function's own option, unless its name looks like a misspelt one of a record.
+    """
+    if not callable(function):
+        raise ArmidError(f"fitness '{name}' is {function!r}, expected a function of (measured, simulated)")
+    try:
+        parameters = inspect.signature(function).parameters
+    except ValueError as error:
+        raise ArmidError(f"fitness '{name}' does not tell its arguments, expected (measured, simulated)") from error
+    known = SERIES + OF_RECORD
+    for argument, parameter in parameters.items():
+        optional = parameter.default is not parameter.empty
+        own = optional and argument not in known and not get_close_matches(argument, known)
+        bindable = argument in known and parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
+        if not (own or bindable):
+            raise ArmidError(f"fitness '{name}' asks for '{argument}', {nearest(argument, known)}")
+    for series in SERIES:
+        if series not in parameters:
+            raise ArmidError(f"fitness '{name}' has no argument '{series}', expected (measured, simulated)")
+    return tuple(argument for argument in parameters if argument in known)
+
+
+def one_per_candidate(name: str, values: object, n_candidates: int) -> Array:
+    """Return the values as float64; refuse with ArmidError anything but one number per candidate."""
+    try:
+        numbers = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArmidError(f"fitness '{name}' returned a {type(values).__name__}, expected numbers") from error
+    if numbers.shape != (n_candidates,):
+        raise ArmidError(f"fitness '{name}' returned shape {numbers.shape}, expected ({n_candidates},)")
+    return numbers
+
+
+def finite_or_inf(values: Array, failed: NDArray[np.bool_]) -> Array:
+    """Return values, (n,), with +inf for those that failed or are no finite number."""
+    good = np.isfinite(values) & ~failed
+    return values if good.all() else np.where(good, values, np.inf)
+
+
+def join_records(fitness: Fitness, values: ArrayLike, durations: ArrayLike, n_samples: ArrayLike) -> Array:
+    """Join the values of a campaign's records: one finished value per candidate, (n_candidates,), +inf if one failed.
+
+    values: what the fitness returned, (n_records, n_candidates); durations: of the records' windows [s], (n_records,);
+    n_samples: of the records, (n_records,).
+    Raises ArmidError for shapes that do not match and for weights that are not above 0.
+    """
+    return joined(fitness, np.asarray(values, dtype=np.float64), record_weights(fitness, durations, n_samples))
+
+
+def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike) -> Array:
+    """Return what each record weighs, (n_records,); arguments as of `join_records`.
+
+    Raises ArmidError for weights that are not above 0.
+    """
+    ones = np.ones(np.shape(n_samples))
+    weight = np.asarray({"duration": durations, "samples": n_samples, "sum": ones}[fitness.join], dtype=np.float64)
+    if not ((weight > 0.0) & (weight < np.inf)).all():
+        raise ArmidError(f"fitness '{fitness.name}' weighs records by {fitness.join}, expected numbers above 0")
+    return weight
+
+
+def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
+    """Return what `join_records` does for values, (n_records, n_candidates), of records that weigh so much."""
+    if table.ndim != 2 or weight.shape != table.shape[:1] or len(table) == 0:
+        raise ArmidError(f"{table.shape} values and {weight.shape} weights of records do not match")
+    failed = ~np.asarray(np.isfinite(table).all(axis=0))
+    known = np.where(failed, 0.0, table) if failed.any() else table
+    # no matrix product: its rounding of one candidate may depend on how many others there are
+    total = (weight[:, np.newaxis] * known).sum(axis=0)
+    mean = total if fitness.join == "sum" else total / weight.sum()
+    return finite_or_inf(mean if fitness.finish is None else fitness.finish(mean), failed)
+
+
+def as_fitness(name: str, obj: Fitness | Callable[..., Any]) -> Fitness:
+    """Return a Fitness as it is, or make one of a plain function (measured, simulated) -> value per candidate.
+
+    Records then join by duration. Raises ArmidError as `Fitness` does.
+    """
+    return obj if isinstance(obj, Fitness) else Fitness(name, obj, note="a function of the user")
+
+
+def one_less(
+    degree: int,
+    measured: ArrayLike,
+    simulated: ArrayLike,
+    interval: float,
+    epsilon: float = 0.03,
+    xi: float = 0.030,
+    slope_threshold: float = 0.2,
+) -> Array:
+    """Return 1 minus a similarity degree per candidate, +inf for one that is not finite.
+
+    degree: its place in what `similarity` returns; other arguments and errors as there.
+    """
+    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)
+    values: Array = 1.0 - scores[degree]
+    return values
+
+
+def numerical_dissimilarity(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return 1 - S1 of Eq 13 per candidate, +inf for one that is not finite; errors as `numerical_similarity`."""
+    return 1.0 - numerical_similarity(measured, simulated, failed=-np.inf)
+
+
+# 1 - S of Eq 10, and 1 - S2 of Eq 14, a step function
+dissimilarity, shape_dissimilarity = partial(one_less, 0), partial(one_less, 2)
+
+# Those whose value is 1 minus a degree that people know.
+SIMILARITIES = ("similarity", "numerical_similarity", "shape_similarity")
+
+_FITNESSES = (
+    Fitness("similarity", dissimilarity, "duration", note="1 - S, the paper's similarity degree (Eq 10)"),
+    Fitness("numerical_similarity", numerical_dissimilarity, "duration", note="1 - S1, its numerical part (Eq 13)"),
+    Fitness("shape_similarity", shape_dissimilarity, "duration", note="1 - S2, its shape part (Eq 14), in steps"),
+    Fitness("rmse", mean_square, "samples", np.sqrt, "signal", "root of the mean square over all samples", unity),
+    Fitness("nrmse", relative_mean_square, "samples", np.sqrt, "1", "rmse with each record divided by its own rms"),
+    Fitness(
+        "likelihood",
+        chi_square,
+        "sum",
+        None,
+        "1",
+        "sum of (x - x')^2 / noise^2: -2 log likelihood, white noise",
+        inverse_noise,
+    ),
+)
+
+FITNESS: dict[str, Fitness] = {fitness.name: fitness for fitness in _FITNESSES}

@@ -1,0 +1,228 @@
+"""The paper's similarity degree S of two series, its numerical part S1 and its shape part S2 (Eqs 10-14)."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from armid.errors import ArmidError
+from armid.problem.measures import Array, as_series
+
+# The compiled loop over a population that gives the similarity degree.
+#
+# All of it stands in this one file: numba's cache does not see that a function of another file has changed.
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def score(x, rows, interval, epsilon, xi, threshold, failed):  # type: ignore[no-untyped-def]
+    """Return S, S1, S2 of every row, (3, n_candidates), `failed` where one is not finite; sum |x|; intervals of x."""
+    scores = np.full((3, rows.shape[0]), failed)
+    room = x.size + 1
+    at, level, at2, level2 = np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64), np.empty(room)
+    n = _landmarks(x, interval, epsilon, xi, at, level)
+    whole = _common(x, x)
+    for c in range(rows.shape[0]):
+        s1 = _common(x, rows[c]) / whole
+        if np.isfinite(s1):
+            n2 = _landmarks(rows[c], interval, epsilon, xi, at2, level2)
+            s2 = _shape(at, level, n, at2, level2, n2, interval, threshold)
+            scores[0, c], scores[1, c], scores[2, c] = np.sqrt(s1 * s2), s1, s2
+    return scores, whole, n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def score_numerically(x, rows, failed):  # type: ignore[no-untyped-def]
+    """Return S1 of every row, (n_candidates,), `failed` for a row that is not finite; and sum |x|."""
+    scores = np.full(rows.shape[0], failed)
+    whole = _common(x, x)
+    for c in range(rows.shape[0]):
+        s1 = _common(x, rows[c]) / whole
+        if np.isfinite(s1):
+            scores[c] = s1
+    return scores, whole
+
+
+# Neither nnan nor ninf may be added: the sum of misses has to turn into NaN or infinity when y holds one.
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+def _common(x, y):  # type: ignore[no-untyped-def]
+    """Return sum max(0, |x| - |x - y|), the numerator of S1, or NaN when y holds a NaN or an infinity."""
+    common, misses = 0.0, 0.0
+    for i in range(x.size):
+        miss = abs(x[i] - y[i])
+        left = abs(x[i]) - miss
+        common += left if left > 0.0 else 0.0
+        misses += miss
+    return common + 0.0 * misses
+
+
+@njit(cache=True, nogil=True)
+def _extrema(x, at):  # type: ignore[no-untyped-def]
+    """Write both ends and the inner extrema (of a plateau its first sample) into at; return their number."""
+    at[0] = 0
+    n = 1
+    last = 0
+    rising = True
+    for i in range(1, x.size):
+        if x[i] != x[i - 1]:
+            if (x[i] > x[i - 1]) != rising:
+                rising = not rising
+                if last > 0:
+                    at[n] = last
+                    n += 1
+            last = i
+    at[n] = x.size - 1
+    return n + 1
+
+
+@njit(cache=True, nogil=True)
+def _landmarks(x, interval, epsilon, xi, at, level):  # type: ignore[no-untyped-def]
+    """Write the ends of the intervals and their normalised levels; return how many there are, 0 for a constant series.
+
+    Small close pairs leave smallest first. One pass with a stack does it: a pair no larger than its neighbours leaves
+    before them whatever happens elsewhere, and the pair that its leaving joins is never smaller than it was.
+    """
+    n = _extrema(x, at)
+    low = high = x[0]
+    for k in range(1, n):
+        low, high = min(low, x[at[k]]), max(high, x[at[k]])
+    if low == high:
+        return 0
+    level[0], m = (x[0] - low) / (high - low), 1
+    for k in range(1, n - 1):
+        at[m], level[m] = at[k], (x[at[k]] - low) / (high - low)
+        m += 1
+        while m > 3 and _is_small(at, level, m - 3, interval, epsilon, xi):
+            if _is_small(at, level, m - 2, interval, epsilon, xi) and _gain(level, m - 2) < _gain(level, m - 3):
+                break
+            at[m - 3], level[m - 3] = at[m - 1], level[m - 1]
+            m -= 2
+    while m > 2 and _is_small(at, level, m - 2, interval, epsilon, xi):
+        m -= 2
+    at[m], level[m] = x.size - 1, (x[-1] - low) / (high - low)
+    return m
+
+
+@njit(cache=True, nogil=True)
+def _gain(level, k):  # type: ignore[no-untyped-def]
+    return abs(level[k + 1] - level[k])
+
+
+@njit(cache=True, nogil=True)
+def _is_small(at, level, k, interval, epsilon, xi):  # type: ignore[no-untyped-def]
+    return _gain(level, k) < epsilon and (at[k + 1] - at[k]) * interval < xi
+
+
+@njit(cache=True, nogil=True)
+def _shape(at, level, n, at2, level2, n2, interval, threshold):  # type: ignore[no-untyped-def]
+    """Return S2 of Eq 14, in whole samples: exactly 1 for equal series, 0 for a constant candidate (n2 = 0)."""
+    if n2 == 0:
+        return 0.0
+    first, second, pairs = _pairs(at, n, at2, n2)
+    similar = 0
+    for p in range(pairs):
+        i, j = first[p], second[p]
+        length, length2 = at[i + 1] - at[i], at2[j + 1] - at2[j]
+        slope = (level[i + 1] - level[i]) / (length * interval)
+        slope2 = (level2[j + 1] - level2[j]) / (length2 * interval)
+        if abs(slope - slope2) < threshold:
+            similar += length + length2
+    return similar / (at[n] + at2[n2])
+
+
+@njit(cache=True, nogil=True)
+def _pairs(at, n, at2, n2):  # type: ignore[no-untyped-def]
+    """Pair intervals by order when their numbers agree, else one to one by overlap, largest (then earliest) first."""
+    if n == n2:
+        order = np.arange(n)
+        return order, order, n
+    first, second, overlap = np.empty(n + n2, np.int64), np.empty(n + n2, np.int64), np.empty(n + n2, np.int64)
+    i = j = count = 0
+    while i < n and j < n2:
+        size = min(at[i + 1], at2[j + 1]) - max(at[i], at2[j])
+        p = count
+        while p > 0 and overlap[p - 1] < size:
+            first[p], second[p], overlap[p] = first[p - 1], second[p - 1], overlap[p - 1]
+            p -= 1
+        first[p], second[p], overlap[p] = i, j, size
+        count += 1
+        ends, ends2 = at[i + 1] <= at2[j + 1], at[i + 1] >= at2[j + 1]
+        i, j = i + ends, j + ends2
+    free, free2 = np.ones(n, np.bool_), np.ones(n2, np.bool_)
+    pairs = 0
+    for p in range(count):
+        if free[first[p]] and free2[second[p]]:
+            free[first[p]] = free2[second[p]] = False
+            first[pairs], second[pairs] = first[p], second[p]
+            pairs += 1
+    return first, second, pairs
+
+
+def similarity(
+    measured: ArrayLike,
+    simulated: ArrayLike,
+    interval: float,
+    epsilon: float = 0.03,
+    xi: float = 0.030,
+    slope_threshold: float = 0.2,
+) -> tuple[Array, Array, Array]:
+    """Compare a population with the measurement: S = sqrt(S1 S2), each in [0, 1].
+
+    S1 = sum max(0, |x| - |x - x'|) / sum |x|; S2 = sum over similar intervals of (L_i + L'_i) / (L + L').
+    Intervals lie between landmarks of the series normalised to [0, 1]. Adjacent extrema less than epsilon and less than
+    xi apart are no landmarks. Intervals are paired by order, or by overlap when their numbers differ.
+
+    measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples), C-contiguous is fastest.
+    interval: sample interval [s]; epsilon: of the normalised series [1]; xi: [s]; slope_threshold: [1/s].
+    Returns S, S1, S2, each (n_candidates,); all three are 0 for a candidate that holds a NaN or an infinity.
+    Raises ArmidError for a measured series that is zero throughout or constant, and for thresholds out of range.
+    Source: paper Eqs 10-14, section III.B; negative s_i are clipped to 0, points with x = 0 have no weight.
+
+    >>> measured = np.sin(np.linspace(0.0, 6.0, 601))
+    >>> S, S1, S2 = similarity(measured, np.array([measured, 0.9 * measured]), interval=0.01)
+    >>> S1.round(6)
+    array([1. , 0.9])
+    """
+    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold)
+    return scores[0], scores[1], scores[2]
+
+
+def numerical_similarity(measured: ArrayLike, simulated: ArrayLike, failed: float = 0.0) -> Array:
+    """Return S1 = sum max(0, |x| - |x - x'|) / sum |x| alone, (n_candidates,).
+
+    measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
+    failed: what a candidate that holds a NaN or an infinity gets.
+    Raises ArmidError for a measured series that is zero throughout. Source: paper Eqs 11-13.
+    """
+    x, rows = as_series(measured, simulated)
+    scores, whole = score_numerically(x, rows, float(failed))
+    refuse_zero(whole)
+    return np.asarray(scores)
+
+
+def scored(
+    measured: ArrayLike,
+    simulated: ArrayLike,
+    interval: float,
+    epsilon: float = 0.03,
+    xi: float = 0.030,
+    slope_threshold: float = 0.2,
+    failed: float = 0.0,
+) -> Array:
+    """Return S, S1, S2 of `similarity` as rows, (3, n_candidates), with `failed` for candidates that are not finite."""
+    x, rows = as_series(measured, simulated)
+    if not (0.0 < interval < np.inf and 0.0 < slope_threshold < np.inf):
+        raise ArmidError(f"interval is {interval} and slope_threshold {slope_threshold}, expected numbers above 0")
+    if not (0.0 <= epsilon < np.inf and 0.0 <= xi < np.inf):
+        raise ArmidError(f"epsilon is {epsilon} and xi {xi}, expected numbers of at least 0")
+    scores, whole, n_intervals = score(
+        x, rows, float(interval), float(epsilon), float(xi), float(slope_threshold), float(failed)
+    )
+    refuse_zero(whole)
+    if n_intervals == 0:
+        raise ArmidError(f"the measured series is constant ({x[0]:g}) and has no shape to compare")
+    return np.asarray(scores)
+
+
+def refuse_zero(whole: float) -> None:
+    """Raise ArmidError for a measured series whose sum of |x| is zero: it has no size to compare with."""
+    if whole == 0.0:
+        raise ArmidError("the measured series is zero throughout, expected at least one value that is not")

@@ -1,0 +1,226 @@
+"""Even time grids out of the times of a file."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.errors import ArmidError
+from armid.record.record import Irregularity
+
+Array = NDArray[np.float64]
+FEWEST_SAMPLES = 20
+SHORTEST_INTERVAL = 1e-9
+LATEST_START = 2.0
+MOST_FILLING = 10
+EVEN = 1e-3
+LARGE_GAP = 3.0
+
+
+class IrregularSamplingWarning(UserWarning):
+    """Say how irregular the times of a record are that was resampled."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Tell how the samples of a file come onto an even grid.
+
+    start, interval: of the grid [s]. n_samples: on the grid. first: row of the first sample at or after the start.
+    earliest: first sample of the grid that was measured and is not before t = 0.
+    resampled: False when the rows from `first` on are the samples of the grid.
+    irregularity: None for even times.
+    """
+
+    start: float
+    interval: float
+    n_samples: int
+    first: int
+    earliest: int
+    resampled: bool
+    irregularity: Irregularity | None
+
+
+def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
+    """Find the even grid of a record.
+
+    times: increasing [s], shape (n_rows,). from_rest: the grid begins at t = 0 exactly (samples before are rest), else
+    at the first sample. The interval is the slope of the times where they are even but for rounding and jitter, else
+    the median interval. Warns with IrregularSamplingWarning when they are not.
+
+    Raises ArmidError for fewer than 20 samples after the start, a plant from rest whose record starts late, intervals
+    too short to be seconds, and times that are mostly gaps.
+    """
+    after = "after t = 0" if from_rest else "in the record"
+    first = first_row(times) if from_rest else 0
+    motion = times[first:]
+    check_number(motion.size, after, file)
+    interval, tolerance, even = fitted_grid(motion, file)
+    begin, start = float(motion[0]), 0.0 if from_rest else float(motion[0])
+    check_start(begin, start, interval, file)
+    resampled = not even or abs(begin - start) > tolerance
+    n_samples = grid_size(motion, start, interval, file) if resampled else motion.size
+    check_number(n_samples, after, file)
+    # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
+    earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN))
+    irregularity = None if even else irregularity_of(motion)
+    if irregularity is not None:
+        tell(irregularity, motion, interval, file)
+    return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
+
+
+def first_row(times: Array) -> int:
+    """Return the row of the first sample at or after t = 0, a thousandth of an interval before counting as 0."""
+    slack = EVEN * float(np.median(np.diff(times))) if times.size > 1 else 0.0
+    return int(np.searchsorted(times, -slack))
+
+
+def check_start(begin: float, start: float, interval: float, file: str) -> None:
+    """Refuse a plant from rest whose first sample comes long after t = 0."""
+    if begin - start > LATEST_START * interval:
+        raise ArmidError(f"{file}: the first sample is at {begin:.6g} s, but the arm starts at t = 0: a first sample "
+                         "at or before 0 is expected")  # fmt: skip
+
+
+def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
+    """Return interval [s], how far [s] even times may be off the line through them, and whether they are even."""
+    index = np.arange(times.size) - 0.5 * (times.size - 1)
+    middle = float(np.mean(times))
+    interval = float(index @ (times - middle)) / float(index @ index)
+    interval = rounded(interval, times - middle - interval * index)
+    if interval < SHORTEST_INTERVAL:
+        raise ArmidError(f"{file}: the samples are {interval:.3g} s apart, at least {SHORTEST_INTERVAL:g} s is "
+                         "expected")  # fmt: skip
+    tolerance = max(EVEN * interval, 0.75 * printed_resolution(times, interval))
+    off = float(np.max(np.abs(times - middle - interval * index)))
+    even = off <= tolerance
+    # where only jitter is there, each row has its own sample of the grid
+    return interval if even or off < 0.5 * interval else float(np.median(np.diff(times))), tolerance, even
+
+
+def printed_resolution(times: Array, interval: float) -> float:
+    """Return the decimal step [s] to which the times were rounded, 0 where it cannot explain an uneven grid."""
+    for decimals in range(10):
+        step = 10.0**-decimals
+        scaled = times / step
+        if step <= interval / 3 and np.all(np.abs(scaled - np.rint(scaled)) <= 1e-6 + 1e-15 * np.abs(scaled)):
+            return step
+    return 0.0
+
+
+def irregularity_of(times: Array) -> Irregularity | None:
+    """Return how far the intervals are from their median, None when only slow drift is there."""
+    intervals = np.diff(times)
+    median = float(np.median(intervals))
+    relative = intervals / median
+    if np.max(np.abs(relative - 1)) <= EVEN + 1.01 * printed_resolution(times, median) / median:
+        return None
+    widest = int(np.argmax(relative))
+    return Irregularity(float(np.mean(np.abs(relative - 1) > 0.01)), float(relative[widest]), float(times[widest]))
+
+
+def tell(irregularity: Irregularity, times: Array, interval: float, file: str) -> None:
+    """Warn how irregular the sampling is, and of a large gap."""
+    share, widest = irregularity.share, irregularity.largest_gap
+    text = (f"{file}: irregular sampling: {share:.2%} of {times.size - 1} intervals are off by more than 1 %, the "
+            f"largest is {widest:.3g} times the median, at t = {irregularity.at_s:.6g} s")  # fmt: skip
+    if widest > LARGE_GAP:
+        text += ", a large gap that is bridged by a straight line"
+    warnings.warn(f"{text}; resampled evenly at {interval:.6g} s", IrregularSamplingWarning, stacklevel=2)
+
+
+def grid_size(times: Array, start: float, interval: float, file: str) -> int:
+    """Return the number of grid samples, the last at most half an interval off; refuse a grid that is mostly gaps."""
+    length = float(times[-1]) - start
+    size = length / interval
+    if size > MOST_FILLING * times.size:
+        raise ArmidError(f"{file}: {times.size} samples at a median interval of {interval:.3g} s leave most of "
+                         f"{length:.6g} s unmeasured, a record without such gaps is expected")  # fmt: skip
+    return int(size + 0.5) + 1
+
+
+def check_number(n_samples: int, after: str, file: str) -> None:
+    """Refuse a record that is too short to say anything."""
+    if n_samples < FEWEST_SAMPLES:
+        raise ArmidError(f"{file}: {n_samples} samples {after}, at least {FEWEST_SAMPLES} are expected")
+
+
+def rounded(interval: float, offsets: Array) -> float:
+    """Return the roundest interval that the times allow: 0.001 rather than 0.00099999999999.
+
+    offsets: of the times from the fitted line [s], (n_rows,); they tell how exactly its slope is known.
+    """
+    doubt = float(np.max(np.abs(offsets))) * np.sqrt(12 / offsets.size) + 1e-9 * interval
+    candidates = (float(f"{interval:.{digits}g}") for digits in range(1, 16))
+    return next((c for c in candidates if abs(c - interval) * offsets.size <= doubt), interval)
+
+
+# A row this near to a grid sample, in intervals, stands for it.
+NEAR = 0.75
+NEIGHBOURS = 7
+
+
+def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear") -> Array:
+    """Return a column on the even grid, shape (n_samples,), from values and times, both (n_rows,).
+
+    Samples that are on the grid are kept. Else between samples: a straight line, whose error is interval^2/8 times the
+    curvature and which never overshoots at the kinks of a record; `hold` "zero": what the column, holding each value
+    until the next, is on average over the interval that a grid sample begins, so that no impulse comes late.
+    """
+    if not timing.resampled:
+        return np.ascontiguousarray(values[timing.first :])
+    grid = timing.start + timing.interval * np.arange(timing.n_samples, dtype=np.float64)
+    if hold == "zero":
+        return held(values, times, grid, timing.interval)
+    return np.asarray(np.interp(grid, times, values), dtype=np.float64)
+
+
+def moved_onto_grid(values: Array, times: Array, timing: Timing) -> Array:
+    """Return a noisy column on the even grid, shape (n_samples,), from values and times, both (n_rows,).
+
+    Each grid sample takes the nearest row, moved along the slope of a parabola through 7 neighbours: the noise
+    stays that of one sample and white, where a line between two rows would take a third off its variance and correlate
+    neighbours. Where no row is near, a straight line bridges the gap.
+    """
+    if not timing.resampled or times.size < NEIGHBOURS:
+        return onto_grid(values, times, timing)
+    grid = timing.start + timing.interval * np.arange(timing.n_samples, dtype=np.float64)
+    right = np.clip(np.searchsorted(times, grid), 1, times.size - 1)
+    nearest = np.where(grid - times[right - 1] < times[right] - grid, right - 1, right)
+    along = grid - times[nearest]
+    moved = values[nearest] + slopes(values, times, nearest) * along
+    gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.interval) > NEAR * timing.interval
+    return np.where(gap, np.interp(grid, times, values), moved)
+
+
+def slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
+    """Return the slope at each row of the least-squares parabola through 7 neighbours, those at the ends beside it.
+
+    v = a + b t + c t^2 with t from the neighbours' mean time; returns b + 2 c t of the row.
+    """
+    first, n = np.clip(rows - NEIGHBOURS // 2, 0, times.size - NEIGHBOURS), NEIGHBOURS
+    unit = float(np.median(np.diff(times)))
+    middle = sum((times[first + i] for i in range(n)), np.zeros(rows.size)) / n
+    places = [(times[first + i] - middle) / unit for i in range(n)]
+    second, third, fourth = (sum((t**k for t in places), np.zeros(rows.size)) for k in (2, 3, 4))
+    straight, curved = np.zeros(rows.size), np.zeros(rows.size)
+    for i, t in enumerate(places):
+        straight += t * values[first + i]
+        curved += (t**2 - second / n) * values[first + i]
+    bend = fourth - second**2 / n
+    share = second * bend - third**2
+    own = (times[rows] - middle) / unit
+    b, c = (bend * straight - third * curved) / share, (second * curved - third * straight) / share
+    return np.asarray((b + 2.0 * c * own) / unit)
+
+
+def held(values: Array, times: Array, grid: Array, interval: float) -> Array:
+    """Return the mean over each interval of an even grid of a column that holds its values, shape (n_samples,)."""
+    # a sample counts from a thousandth of an interval before its time on, so that rounding does not delay it
+    edges = np.append(grid, grid[-1] + interval) + EVEN * interval
+    rows = np.maximum(np.searchsorted(times, edges, side="right") - 1, 0)
+    first, last = rows[:-1], rows[1:]
+    impulse = np.append(0.0, np.cumsum(values[:-1] * np.diff(times)))
+    at_edges = impulse[rows] + values[rows] * (edges - times[rows])
+    changes = np.append(0, np.cumsum(np.diff(values) != 0))
+    return np.where(changes[first] == changes[last], values[first], np.diff(at_edges) / interval)

@@ -1,0 +1,175 @@
+"""Mean and spread of repeated identifications."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pandas import DataFrame
+
+from armid.study.analyses.drawing import COLOURS, MARKERS, panels
+from armid.study.analyses.table import Column, Table
+from armid.units import SHOWN
+
+
+class Spread(NamedTuple):
+    """Number, mean and population standard deviation of a sample."""
+
+    n: int
+    mean: float
+    deviation: float
+
+
+def spread(values: ArrayLike) -> Spread:
+    """Return n, mean and population standard deviation sqrt(mean (x - mean)^2), which is what the paper's Table II
+    prints as "mean square error"; NaN for an empty sample.
+
+    values: (n,).
+    """
+    sample = np.asarray(values, np.float64)
+    if not sample.size:
+        return Spread(0, np.nan, np.nan)
+    return Spread(sample.size, float(sample.mean()), float(sample.std(ddof=0)))
+
+
+PAPER = "the paper's pso"
+COLUMNS = (
+    Column("setting", "noise, window"), Column("variant", "identifier"), Column("parameter", "parameter"),
+    Column("unit", "unit"), Column("truth", "truth", ".4f"), Column("n", "runs", ".0f"), Column("mean", "mean", ".4f"),
+    Column("deviation", "standard deviation", ".2g"), Column("between", "between records", ".2g"),
+    Column("within", "within a record", ".2g"), Column("bound", "Cramer-Rao", ".2g"), Column("low", "low", ".4g"),
+    Column("high", "high", ".4g"), Column("n_at_bound", "at a bound", ".0f"),
+)  # fmt: skip
+IN_UNIT = ("truth", "mean", "deviation", "between", "within", "bound", "low", "high")
+WORDS = (
+    "mean and standard deviation: over all runs (records and repeats together); standard deviations are those of the "
+    "population, sqrt(mean (x - mean)^2), which is what the paper calls mean square error. between records: of the "
+    "means of the records, which the noise of the records makes; within a record: root mean square over the records "
+    "of the deviation among repeats on the same record, which the search makes. Cramer-Rao: median over the runs of "
+    "the bound at the solution for one record; where the misfit is far above the noise, the residual stands for the "
+    "noise and makes it wider. low, high: the box; at a bound: runs that ended on it, where the box and not the record "
+    "decides the value, and the other parameters scatter less than they would without it. The paper's lines are "
+    "computed from its five printed identifications of a real arm; ours are of records whose truth is known (a test "
+    "stand's, synthetic), so the two need not agree."
+)
+
+
+def table2(estimates: DataFrame, published: DataFrame) -> Table:
+    """Return one row per setting, variant and parameter, the paper's first.
+
+    estimates: one row a run and parameter, a case being a record; published: the paper's identification of each record,
+    one row a record and parameter, SI.
+    """
+    units = dict(zip(estimates["parameter"], estimates["unit"], strict=True))
+    box = estimates.drop_duplicates("parameter").set_index("parameter")[["low", "high"]]
+    paper = published[published["parameter"].isin(units)].groupby("parameter", sort=False)["published"]
+    rows = [paper_row(str(name), values.to_numpy(), box) for name, values in paper]
+    keys = ["setting", "variant", "parameter"]
+    rows += [dict(zip(keys, k, strict=True)) | one_row(g) for k, g in estimates.groupby(keys, sort=False)]
+    frame = DataFrame(rows)
+    factor = frame["parameter"].map(lambda p: SHOWN.get(units[p], ("", 1.0))[1])
+    shown = {key: frame[key] * factor for key in IN_UNIT}
+    frame = frame.assign(**shown, unit=frame["parameter"].map(lambda p: SHOWN.get(units[p], (units[p], 1.0))[0]))
+    return Table("table2", "Table II beside ours", WORDS, frame[[c.key for c in COLUMNS]], COLUMNS)
+
+
+def paper_row(name: str, values: np.ndarray, box: DataFrame) -> dict[str, object]:
+    """Return the paper's line of one parameter; a value on the bound of our box, which is the paper's, is counted."""
+    found = spread(values)
+    low, high = box.loc[name, ["low", "high"]].to_numpy(float)
+    at_bound = int(np.count_nonzero(np.isclose(values, low) | np.isclose(values, high)))
+    return {
+        "setting": "measured arm", "variant": PAPER, "parameter": name, "n": found.n, "mean": found.mean,
+        "deviation": found.deviation, "low": low, "high": high, "n_at_bound": at_bound,
+    }  # fmt: skip
+
+
+def one_row(group: DataFrame) -> dict[str, object]:
+    """Return the numbers of one setting, variant and parameter."""
+    found = spread(group["value"])
+    records = [spread(v) for _, v in group.groupby("case", sort=False)["value"]]
+    truths = group["truth"].dropna().unique()
+    return {
+        "truth": float(truths[0]) if truths.size == 1 else np.nan, "n": found.n, "mean": found.mean,
+        "deviation": found.deviation, "between": spread([r.mean for r in records]).deviation,
+        "within": float(np.sqrt(np.mean([r.deviation**2 for r in records]))), "bound": group["deviation"].median(),
+        "low": group["low"].iloc[0], "high": group["high"].iloc[0], "n_at_bound": int(group["at_bound"].sum()),
+    }  # fmt: skip
+
+
+def table2_records(estimates: DataFrame) -> Table:
+    """Return mean, deviation and bound of each record, SI, for the CSV file."""
+    keys = ["setting", "variant", "case", "parameter", "unit"]
+    rows = [
+        dict(zip(keys, k, strict=True)) | spread(g["value"])._asdict()
+        | {"bound": g["deviation"].median(), "n_at_bound": int(g["at_bound"].sum())}
+        for k, g in estimates.groupby(keys, sort=False)
+    ]  # fmt: skip
+    columns = (*(Column(k, k) for k in keys), *(Column(k, k, ".6g") for k in ("n", "mean", "deviation", "bound")))
+    return Table("table2_records", "Table II, record by record", WORDS, DataFrame(rows), columns, most=0)
+
+
+def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
+    """Draw one panel a parameter: the result of each run, a mark and colour a record, lines by identifier and setting.
+
+    estimates: one row a run and parameter; published: the paper's identifications, one row a record and parameter, SI.
+    The grey band is the truth +- the Cramer-Rao bound of one record, dashed lines are the bounds of the box.
+    """
+    names = list(dict.fromkeys(estimates["parameter"]))
+    groups = list(dict.fromkeys(zip(estimates["variant"], estimates["setting"], strict=True)))
+    labels = [f"{v}\n{s}" for v, s in groups]
+    figure, axes = panels(len(names), 2, 6.8, 1.6 + 0.5 * (len(groups) + 1))
+    for i, (axis, name) in enumerate(zip(axes, names, strict=True)):
+        own = estimates[estimates["parameter"] == name]
+        unit, factor = SHOWN.get(own["unit"].iloc[0], (own["unit"].iloc[0], 1.0))
+        draw_paper(axis, factor * published.loc[published["parameter"] == name, "published"].to_numpy(float))
+        for j, (variant, setting) in enumerate(groups):
+            draw_group(axis, own[(own["variant"] == variant) & (own["setting"] == setting)], j + 1, factor)
+        draw_box(axis, own, factor)
+        axis.set_yticks(range(len(groups) + 1), ["the paper", *labels] if i % 2 == 0 else [""] * (len(groups) + 1))
+        axis.set(ylim=(len(groups) + 0.6, -0.6), xlabel=f"{name} [{unit}]")
+        axis.tick_params(axis="y", labelsize=9)
+    name_records(figure, list(dict.fromkeys(estimates["case"])))
+    return figure
+
+
+def draw_paper(axis: Any, values: np.ndarray) -> None:
+    """Draw the paper's identifications as diamonds."""
+    axis.plot(values, np.zeros(values.size), "D", color="black", ms=5)
+
+
+def draw_group(axis: Any, group: DataFrame, height: int, factor: float) -> None:
+    """Draw the runs of one identifier and setting, the records above each other, truth and bound behind."""
+    records = list(dict.fromkeys(group["case"]))
+    for k, record in enumerate(records):
+        own = group[group["case"] == record]
+        y = height + 0.5 * ((k + 0.5) / len(records) - 0.5)
+        axis.plot(factor * own["value"], np.full(len(own), y), MARKERS[k % 7], ms=4, mfc="none",
+                  color=COLOURS[k % 7])  # fmt: skip
+    truth, bound = group["truth"].median() * factor, group["deviation"].median() * factor
+    if np.isfinite(truth) and np.isfinite(bound):
+        axis.fill_betweenx([height - 0.4, height + 0.4], truth - bound, truth + bound, color="0.86", lw=0, zorder=0)
+        axis.plot([truth, truth], [height - 0.4, height + 0.4], color="0.35", lw=1.0, zorder=1)
+
+
+def draw_box(axis: Any, own: DataFrame, factor: float) -> None:
+    """Draw the bounds of the search where they are near."""
+    low, high = axis.get_xlim()
+    for bound in (factor * own["low"].min(), factor * own["high"].max()):
+        if low - 0.2 * (high - low) <= bound <= high + 0.2 * (high - low):
+            axis.axvline(bound, color="black", ls=":", lw=1.0)
+
+
+def name_records(figure: Any, records: Sequence[str]) -> None:
+    """Write one legend below all panels."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=COLOURS[k % 7], marker=MARKERS[k % 7], mfc="none", ls="", label=record)
+        for k, record in enumerate(records)
+    ]
+    handles += [
+        Line2D([], [], color="0.35", lw=1.0, label="truth"), Line2D([], [], color="0.86", lw=6, label="Cramer-Rao"),
+        Line2D([], [], color="black", ls=":", lw=1.0, label="bound of the box"),
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)

@@ -1,0 +1,1 @@
+"""The blind suite: what closed loops said, held against the truth."""
