@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.engine.kernel import LONGEST
+from armid.engine.generate import LONGEST
 from armid.engine.simulate import Array, Schedule, Simulation, simulate
 from armid.errors import ArmidError
 from armid.model import Manoeuvre, Model

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armid.engine.compile import UNCOMPILABLE, Kernel, compile_model, refusal
+from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model
 from armid.errors import ArmidError
 from armid.model import Manoeuvre, Model
 
@@ -53,7 +53,7 @@ def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_gr
         for part in parts:
             part.result()
     except UNCOMPILABLE as error:
-        raise refusal(error) from error
+        raise compile_error(error) from error
 
 
 DIVERGED = 1e3

@@ -197,6 +197,19 @@ def current_sign(current):
     return current
 
 
+QUANTITIES = (
+    arm_inertia, total_inertia, gravity_moment, gravity_level, gravity_upright, gravity_torque, squeeze, piston_moment,
+    balance_torque, direction, damping, demand, voltage, field_flux, back_emf, motor_torque, drive_ratio, drive_effort,
+    load_effort, recorded_speed,
+)  # fmt: skip
+PORTS = {
+    "torque": "N m", "gravity": "rad", "inertia": "kg m2", "drive": "N m", "flux": "Wb", "winding": "V", "supply": "V",
+    "gas": "Pa", "feedback": "rad/s", "command": "V", "output": "rad/s",
+}  # fmt: skip
+ALIASES = {
+    "I": "current", "speed": "omega", "angle": "theta", "position": "theta", "gravity_effort": "gravity_torque",
+    "T_d": "motor_torque",
+}  # fmt: skip
 ESTIMATE = "estimate (REF), not published"
 
 shell_transfer_arm = Plant(
@@ -217,31 +230,7 @@ shell_transfer_arm = Plant(
         State("compression", "1", compression_rate, start_compression),
         State("pressure", "Pa", pressure_rate, start_pressure),
     ),
-    quantities={
-        f.__name__: f
-        for f in (
-            arm_inertia,
-            total_inertia,
-            gravity_moment,
-            gravity_level,
-            gravity_upright,
-            gravity_torque,
-            squeeze,
-            piston_moment,
-            balance_torque,
-            direction,
-            damping,
-            demand,
-            voltage,
-            field_flux,
-            back_emf,
-            motor_torque,
-            drive_ratio,
-            drive_effort,
-            load_effort,
-            recorded_speed,
-        )
-    },
+    quantities={f.__name__: f for f in QUANTITIES},
     constants=(
         Constant("I01", 2.0e-3, "kg m2", ESTIMATE),
         Constant("I23", 4.0e-3, "kg m2", ESTIMATE),
@@ -277,19 +266,7 @@ shell_transfer_arm = Plant(
         Constant("shell", 1.0, "1", "1 with the shell, 0 without"),
         Constant("U", 28.0, "V", "supply voltage of the manoeuvre"),
     ),
-    ports={
-        "torque": "N m",
-        "gravity": "rad",
-        "inertia": "kg m2",
-        "drive": "N m",
-        "flux": "Wb",
-        "winding": "V",
-        "supply": "V",
-        "gas": "Pa",
-        "feedback": "rad/s",
-        "command": "V",
-        "output": "rad/s",
-    },
+    ports=PORTS,
     guards=(
         Guard("closed", distance_to_switch, latch=True),
         Guard("dead_zone_low", dead_zone_low),
@@ -304,14 +281,7 @@ shell_transfer_arm = Plant(
         ManoeuvreKey("shell", "shell", boolean=True, required=True),
         ManoeuvreKey("supply_V", "U", 1.0, 1.0, 100.0, required=True),
     ),
-    aliases={
-        "I": "current",
-        "speed": "omega",
-        "angle": "theta",
-        "position": "theta",
-        "gravity_effort": "gravity_torque",
-        "T_d": "motor_torque",
-    },
+    aliases=ALIASES,
     output="recorded_speed",
     output_unit="rad/s",
     scales=Scales(effort=1000.0, speed=2.0, effort_unit="N m", length_unit="rad"),
