@@ -41,7 +41,6 @@ class LanesModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def is_number(numba_type: Any) -> bool:
-    """Tell whether a numba type is a plain scalar number."""
     return isinstance(numba_type, (types.Float, types.Integer, types.Boolean))
 
 
@@ -67,12 +66,10 @@ def to_lanes(context: Any, builder: Any, value: Any, numba_type: Any, width: int
 
 
 def lanes_of(*numba_types: Any) -> Lanes:
-    """Return the first type that is lanes."""
     return next(t for t in numba_types if isinstance(t, Lanes))
 
 
 def vector_of(width: int) -> Any:
-    """Return the LLVM type of lanes."""
     return ir.VectorType(DOUBLE, width)
 
 
@@ -83,7 +80,7 @@ def vector_pointer(context: Any, builder: Any, signature: Any, arguments: Any, w
     return builder.bitcast(builder.gep(data, [i], source_etype=DOUBLE), vector_of(width).as_pointer())
 
 
-def signed(result: Any, compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
+def elementwise(result: Any, compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
     """Return signature and code of an intrinsic whose arguments all become lanes of one width.
 
     result: numba type of what it returns; compute(builder, vectors...): its LLVM value; given: numba types.
@@ -159,8 +156,6 @@ def with_lane(typing_context, value, index, number):
 
 @intrinsic
 def n_lanes(typing_context, value):
-    """Return the number of lanes."""
-
     def generate(context, builder, signature, arguments):
         return context.get_constant(types.intp, value.width)
 
@@ -172,7 +167,7 @@ def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
 
     @intrinsic
     def act(typing_context, a, b):
-        return signed(lanes_of(a, b), compute, a, b)
+        return elementwise(lanes_of(a, b), compute, a, b)
 
     @overload(python_operator, inline="never")
     def operate(a, b):
@@ -201,7 +196,7 @@ for _name, _symbol in {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==",
 
 @intrinsic
 def negate(typing_context, a):
-    return signed(a, lambda builder, x: builder.fneg(x, flags=FLAGS), a)
+    return elementwise(a, lambda builder, x: builder.fneg(x, flags=FLAGS), a)
 
 
 @overload(operator.neg)
@@ -215,7 +210,6 @@ def lanes_pos(a):
 
 
 def vector_call(builder: Any, name: str, *vectors: Any) -> Any:
-    """Return the call of an LLVM function of vectors."""
     vector = vectors[0].type
     kind = ir.FunctionType(vector, [vector] * len(vectors))
     function = builder.module.declare_intrinsic(f"llvm.{name}.v{vector.count}f64", (), kind)
@@ -227,7 +221,7 @@ def unary(name: str) -> Any:
 
     @intrinsic
     def act(typing_context, a):
-        return signed(a, lambda builder, x: vector_call(builder, name, x), a)
+        return elementwise(a, lambda builder, x: vector_call(builder, name, x), a)
 
     return act
 
@@ -241,7 +235,7 @@ floor_of = unary("floor")
 @intrinsic
 def fused(typing_context, a, b, c):
     """Return a b + c with one rounding, never reordered."""
-    return signed(lanes_of(a, b, c), lambda builder, *vectors: vector_call(builder, "fma", *vectors), a, b, c)
+    return elementwise(lanes_of(a, b, c), lambda builder, *vectors: vector_call(builder, "fma", *vectors), a, b, c)
 
 
 @intrinsic
@@ -251,7 +245,7 @@ def select(typing_context, a, b, x, y):
     def compute(builder, p, q, r, s):
         return builder.select(builder.fcmp_ordered(">", p, q), r, s)
 
-    return signed(lanes_of(a, b, x, y), compute, a, b, x, y)
+    return elementwise(lanes_of(a, b, x, y), compute, a, b, x, y)
 
 
 @intrinsic
@@ -263,11 +257,10 @@ def any_above(typing_context, a, b):
         bits = builder.bitcast(builder.fcmp_ordered(">", x, limit), mask)
         return builder.icmp_unsigned("!=", bits, ir.Constant(mask, 0))
 
-    return signed(types.boolean, compute, a, b)
+    return elementwise(types.boolean, compute, a, b)
 
 
 def whole_of(width: int, value: int) -> Any:
-    """Return a whole number in every lane."""
     return ir.Constant(ir.VectorType(INT64, width), [value] * width)
 
 
@@ -279,7 +272,7 @@ def two_to_the(typing_context, k):
         exponent = builder.add(builder.fptosi(x, ir.VectorType(INT64, k.width)), whole_of(k.width, 1023))
         return builder.bitcast(builder.shl(exponent, whole_of(k.width, 52)), x.type)
 
-    return signed(k, compute, k)
+    return elementwise(k, compute, k)
 
 
 @intrinsic
@@ -291,7 +284,7 @@ def mantissa_of(typing_context, x):
         kept = builder.and_(bits, whole_of(x.width, 0x000FFFFFFFFFFFFF))
         return builder.bitcast(builder.or_(kept, whole_of(x.width, 0x3FF0000000000000)), value.type)
 
-    return signed(x, compute, x)
+    return elementwise(x, compute, x)
 
 
 @intrinsic
@@ -302,4 +295,4 @@ def exponent_of(typing_context, x):
         bits = builder.lshr(builder.bitcast(value, ir.VectorType(INT64, x.width)), whole_of(x.width, 52))
         return builder.sitofp(builder.sub(bits, whole_of(x.width, 1023)), value.type)
 
-    return signed(x, compute, x)
+    return elementwise(x, compute, x)

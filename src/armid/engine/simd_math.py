@@ -106,26 +106,8 @@ def sine_of_reduced(r):
 
 @compiled
 def alternate(k):
-    """Return +1 for even and -1 for odd whole k."""
+    """Return (-1)**k for whole k."""
     return 1.0 - 2.0 * (k - 2.0 * floor_of(k * 0.5))
-
-
-@compiled
-def sines_of_far(x, result):
-    """Return the result with the sine of every angle beyond FAR put in."""
-    for i in range(n_lanes(x)):
-        if abs(lane(x, i)) > FAR:
-            result = with_lane(result, i, math.sin(lane(x, i)))
-    return result
-
-
-@compiled
-def cosines_of_far(x, result):
-    """Return the result with the cosine of every angle beyond FAR put in."""
-    for i in range(n_lanes(x)):
-        if abs(lane(x, i)) > FAR:
-            result = with_lane(result, i, math.cos(lane(x, i)))
-    return result
 
 
 @compiled
@@ -135,7 +117,9 @@ def lanes_sin(x):
     r = fused(k, -PI_C, fused(k, -PI_B, fused(k, -PI_A, x)))
     result = alternate(k) * sine_of_reduced(r)
     if any_above(fabs(x), FAR):
-        result = sines_of_far(x, result)
+        for i in range(n_lanes(x)):
+            if abs(lane(x, i)) > FAR:
+                result = with_lane(result, i, math.sin(lane(x, i)))
     return result
 
 
@@ -147,7 +131,9 @@ def lanes_cos(x):
     r = fused(half, -PI_C, fused(half, -PI_B, fused(half, -PI_A, x)))
     result = -alternate(k) * sine_of_reduced(r)
     if any_above(fabs(x), FAR):
-        result = cosines_of_far(x, result)
+        for i in range(n_lanes(x)):
+            if abs(lane(x, i)) > FAR:
+                result = with_lane(result, i, math.cos(lane(x, i)))
     return result
 
 
@@ -190,8 +176,9 @@ def lanes_sign(x):
 
 
 @compiled
-def lanes_power(a, b):
+def lanes_power(base, exponent):
     """Return a**b: exp(b log a) where a > 0 and that is a number, the scalar function in the other lanes."""
+    a, b = select(1.0, 0.0, base, exponent), select(1.0, 0.0, exponent, base)
     result = lanes_exp(b * lanes_log(a))
     if any_above(select(a, SMALLEST, result != result, 1.0), 0.5):
         for i in range(n_lanes(result)):
@@ -265,11 +252,6 @@ def either(a, b):
 
 
 @numba.njit
-def neither(a):
-    return a == 0.0
-
-
-@numba.njit
 def with_sign(a, b):
     return select(-b, 0.0, -abs(a), abs(a))
 
@@ -304,20 +286,6 @@ def clip(x, low, high):
     return None
 
 
-def define_power(name: Any) -> None:
-    """Give numba the power of lanes."""
-    LANE_FUNCTIONS.add(name)
-
-    @overload(name)
-    def act(a, b):
-        if not mixes_lanes(a, b):
-            return None
-        return lambda a, b: lanes_power(select(1.0, 0.0, a, b), select(1.0, 0.0, b, a))
-
-
-for _name in (operator.pow, np.power, math.pow):
-    define_power(_name)
-
 define_unary((np.sqrt, math.sqrt), square_root)
 define_unary((np.abs, np.fabs, math.fabs, builtins.abs), fabs)
 define_unary((np.floor,), floor_of)
@@ -332,7 +300,8 @@ define_unary((np.sign,), lanes_sign)
 define_unary((np.square,), numba.njit(lambda x: x * x))
 define_unary((np.reciprocal,), numba.njit(lambda x: 1.0 / x))
 define_unary((np.negative,), numba.njit(lambda x: -x))
-define_unary((np.logical_not, operator.invert), neither)
+define_unary((np.logical_not, operator.invert), numba.njit(lambda x: x == 0.0))
+define_binary((operator.pow, np.power, math.pow), lanes_power)
 define_binary((builtins.min,), smaller)
 define_binary((builtins.max,), larger)
 define_extreme(np.minimum, smaller, passes_nan=True)

@@ -78,6 +78,7 @@ class Vectorise(ast.NodeTransformer):
         return result
 
 
+NUMBERS = (bool, int, float, np.floating, np.integer)
 CONTROL_FLOW = (ast.If, ast.While, ast.For, ast.Try, ast.With, ast.Match)
 LANE_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.BitAnd, ast.BitOr)
 # What these return, or take, is one plain number: a function that uses them is computed lane by lane.
@@ -143,18 +144,15 @@ def with_values(definition: ast.FunctionDef, function: FunctionType) -> ast.Func
 
     Raises ArmidError for a default that is no number.
     """
+    values = function.__defaults__ or ()
+    for value in values:
+        if not isinstance(value, NUMBERS):
+            raise ArmidError(f"the equation {function.__qualname__} has the default {value!r}: a number is expected")
     arguments = definition.args
     arguments.args = [*arguments.posonlyargs, *arguments.args]
     arguments.posonlyargs = []
-    arguments.defaults = [default(value, function) for value in function.__defaults__ or ()]
+    arguments.defaults = [number(value) for value in values]
     return definition
-
-
-def default(value: Any, function: FunctionType) -> ast.expr:
-    """Return the expression of a default."""
-    if not isinstance(value, (bool, int, float, np.floating, np.integer)):
-        raise ArmidError(f"the equation {function.__qualname__} has the default {value!r}: a number is expected")
-    return number(value)
 
 
 def number(value: Any) -> ast.expr:
@@ -192,11 +190,11 @@ class Names(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         self.generic_visit(node)
         if isinstance(node.value, ast.Name) and node.value.id in ("np", "math"):
-            self.meet(getattr(np if node.value.id == "np" else math, node.attr, None))
+            self.note_call(getattr(np if node.value.id == "np" else math, node.attr, None))
         return node
 
-    def meet(self, called: Any) -> None:
-        """Note a function of numpy or math that lanes do not have."""
+    def note_call(self, called: Any) -> None:
+        """Note whether a function of numpy or math is one that lanes do not have."""
         self.is_scalar |= callable(called) and called not in LANE_FUNCTIONS
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -222,14 +220,13 @@ class Names(ast.NodeTransformer):
         """Return what stands for an outside name in the generated module."""
         if isinstance(value, ModuleType) and value in (np, math):
             return ast.Name("np" if value is np else "math", ast.Load())
-        if isinstance(value, (bool, int, float, np.floating, np.integer)):
+        if isinstance(value, NUMBERS):
             return number(value)
-        for module in (np, math):
-            called = getattr(value, "__name__", "")
+        called = getattr(value, "__name__", "")
+        for module, name_of_module in ((np, "np"), (math, "math")):
             if called and getattr(module, called, None) is value:
-                module_name = "np" if module is np else "math"
-                self.meet(value)
-                return ast.Attribute(ast.Name(module_name, ast.Load()), called, ast.Load())
+                self.note_call(value)
+                return ast.Attribute(ast.Name(name_of_module, ast.Load()), called, ast.Load())
         if isinstance(plain_function(value), FunctionType):
             helper = self.sources.add_helper(self.name, name, value)
             self.is_scalar |= helper in self.sources.by_lane
