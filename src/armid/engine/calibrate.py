@@ -42,7 +42,7 @@ def accuracy_against(noise: float, model: Model) -> str:
 
 
 def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
-    """Return candidates spread evenly over a box (Kronecker sequence), shape (n_probes, n_parameters).
+    """Return candidates spread evenly between bounds (Kronecker sequence), shape (n_probes, n_parameters).
 
     x_i = frac(i a), a_j = g**-j with g the root of g**(d + 1) = g + 1. Source: Roberts 2018, generalised golden ratio.
     """
@@ -77,11 +77,23 @@ def calibrate(
     """Choose the coarsest schedule whose error on the candidates stays within half of what is allowed.
 
     The error of n steps between samples is estimated from the difference to 2n steps: fourth order, 16/15 of it. Steps
-    at which a candidate fails that holds with the finest ones are too coarse, whatever the others do.
-    candidates: shape (n_candidates, n_parameters), usually `probes` of the bounds. spans: look for steps over several
-    samples too, which pays when many populations follow.
+    at which a candidate fails that does not fail with the finest ones are too coarse, whatever the others do.
 
-    Raises ArmidError for an unknown accuracy.
+    Parameters
+    ----------
+    model, manoeuvre
+        What moves, and what it is made to do.
+    candidates : (n_candidates, n_parameters), SI
+        Usually `probes` of the bounds.
+    accuracy : "standard" or "fine"
+        5e-6 or 1e-7 of the plant's speed scale.
+    spans
+        Look for steps over several samples too, which pays when many populations follow.
+
+    Raises
+    ------
+    ArmidError
+        For an unknown accuracy.
     """
     if accuracy not in ALLOWED:
         raise ArmidError(f"accuracy '{accuracy}' is unknown: {' or '.join(ALLOWED)} is expected")

@@ -69,11 +69,23 @@ def simulate(
 ) -> Simulation:  # fmt: skip
     """Simulate every candidate of a population through one manoeuvre.
 
-    population: shape (n_candidates, n_parameters), SI, columns in the order of `model.parameters`.
-    schedule: how finely time is cut; threads: candidates are shared among so many threads, the result is the same bit
-    for bit; states: keep the states too (then no step spans several samples).
+    Parameters
+    ----------
+    model, manoeuvre
+        What moves, and what it is made to do.
+    population : (n_candidates, n_parameters), SI
+        Columns in the order of `model.parameters`; one candidate may come as a vector.
+    schedule
+        How finely time is cut.
+    threads
+        Candidates are shared among so many threads; the result is the same bit for bit.
+    states
+        Keep the states too (then no step spans several samples).
 
-    Raises ArmidError for a wrong shape, an unknown constant, a missing input, and an equation that cannot be compiled.
+    Raises
+    ------
+    ArmidError
+        For a wrong shape, an unknown constant, a missing input, and an equation that cannot be compiled.
     """
     as_population(model, population)
     return prepare(model, manoeuvre, schedule, states).run(population, threads)
