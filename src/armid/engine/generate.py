@@ -65,9 +65,10 @@ class KernelParts:
         # Imported here: a module that is in the cache is not generated again.
         from jinja2 import Environment, StrictUndefined
 
-        environment = Environment(variable_start_string="{", variable_end_string="}", trim_blocks=True,
-                                  lstrip_blocks=True, keep_trailing_newline=True,
-                                  undefined=StrictUndefined)  # fmt: skip
+        environment = Environment(
+            variable_start_string="{", variable_end_string="}", trim_blocks=True, lstrip_blocks=True,
+            keep_trailing_newline=True, undefined=StrictUndefined,
+        )  # fmt: skip
         environment.filters |= {"each": each, "listed": listed, "nested": nested}
         guards = [*self.latch_guards, *self.kinks]
         times = [f"time_of_{k}" for k in self.latches]
@@ -86,6 +87,19 @@ class KernelParts:
         )  # fmt: skip
 
 
+def kernel_parts(model: Model, width: int) -> KernelParts:
+    """Return what the module of a model is made of, `width` candidates side by side.
+
+    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
+    """
+    return Emitter(model).parts(width)
+
+
+def generate_module(model: Model, width: int) -> str:
+    """Return the self-contained text of the module that simulates a model, `width` candidates side by side."""
+    return kernel_parts(model, width).text()
+
+
 def listed(names: list[str], prefix: str = "") -> str:
     """Return `prefix_a, prefix_b, ` with a comma behind each name."""
     return "".join(f"{prefix}{n}, " for n in names)
@@ -99,8 +113,8 @@ def each(text: str, names: list[str], separator: str = "\n") -> str:
 
 def nested(names: list[str], function: str, prefix: str) -> str:
     """Return the maximum or minimum of prefixed names, two at a time."""
-    text = "".join(f"{function}(" * (len(names) - 1)) + f"{prefix}{names[0]}" if names else ""
-    return text + "".join(f", {prefix}{n})" for n in names[1:])
+    first = f"{prefix}{names[0]}" if names else ""
+    return f"{function}(" * (len(names) - 1) + first + "".join(f", {prefix}{n})" for n in names[1:])
 
 
 def variable(key: str) -> str:
@@ -228,16 +242,3 @@ def wrapped_by_lane(name: str, definition: ast.FunctionDef) -> str:
         f"    result = splat(0.0)\n    for i in range(WIDTH):\n"
         f"        result = with_lane(result, i, {name}__scalar({lanes}))\n    return result\n"
     )
-
-
-def kernel_parts(model: Model, width: int) -> KernelParts:
-    """Return what the module of a model is made of, `width` candidates side by side.
-
-    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
-    """
-    return Emitter(model).parts(width)
-
-
-def generate_module(model: Model, width: int) -> str:
-    """Return the self-contained text of the module that simulates a model, `width` candidates side by side."""
-    return kernel_parts(model, width).text()
