@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.engine.kernel import LONGEST
+from armid.engine.generate import LONGEST
 from armid.engine.simulate import Array, Schedule, Simulation, simulate
 from armid.errors import ArmidError
 from armid.model import Manoeuvre, Model
@@ -20,8 +20,8 @@ SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 MARGIN = 0.5
 # Below this many times the engine's standard error the noise no longer hides that error.
 NOISE_HIDES = 10.0
-# How many candidates must still be before their switch for a long step to count as tried.
-N_WITNESSES = 8
+# How many candidates must not have switched yet for a long step to count as tried.
+N_UNSWITCHED = 8
 N_PROBES = 48
 # Values of a simulation of all candidates that are in memory at a time (64 MB); more are tried in parts of so many.
 MOST_VALUES, PART = 2**23, 8
@@ -42,7 +42,7 @@ def accuracy_against(noise: float, model: Model) -> str:
 
 
 def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
-    """Return candidates spread evenly over a box (Kronecker sequence), shape (n_probes, n_parameters).
+    """Return candidates spread evenly between bounds (Kronecker sequence), shape (n_probes, n_parameters).
 
     x_i = frac(i a), a_j = g**-j with g the root of g**(d + 1) = g + 1. Source: Roberts 2018, generalised golden ratio.
     """
@@ -64,7 +64,7 @@ def difference(a: Simulation, b: Simulation) -> float:
 
 
 def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:
-    """Return the largest difference after the first switch, where long steps have ended."""
+    """Return the largest difference of two simulations after the first switch, where long steps have ended."""
     switched = np.min(list(a.switch_times.values()), axis=0)
     good = ~(a.failed | b.failed) & np.isfinite(switched)
     after = np.arange(a.output.shape[1]) * interval > switched[good, None]
@@ -77,11 +77,23 @@ def calibrate(
     """Choose the coarsest schedule whose error on the candidates stays within half of what is allowed.
 
     The error of n steps between samples is estimated from the difference to 2n steps: fourth order, 16/15 of it. Steps
-    at which a candidate fails that holds with the finest ones are too coarse, whatever the others do.
-    candidates: shape (n_candidates, n_parameters), usually `probes` of the bounds. spans: look for steps over several
-    samples too, which pays when many populations follow.
+    at which a candidate fails that does not fail with the finest ones are too coarse, whatever the others do.
 
-    Raises ArmidError for an unknown accuracy.
+    Parameters
+    ----------
+    model, manoeuvre
+        What moves, and what it is made to do.
+    candidates : (n_candidates, n_parameters), SI
+        Usually `probes` of the bounds.
+    accuracy : "standard" or "fine"
+        5e-6 or 1e-7 of the plant's speed scale.
+    spans
+        Look for steps over several samples too, which pays when many populations follow.
+
+    Raises
+    ------
+    ArmidError
+        For an unknown accuracy.
     """
     if accuracy not in ALLOWED:
         raise ArmidError(f"accuracy '{accuracy}' is unknown: {' or '.join(ALLOWED)} is expected")
@@ -96,8 +108,9 @@ def calibrate(
     error = np.inf
     for n in SUBSTEPS:
         error = difference(run(n), run(2 * n)) * 16 / 15
-        if run(n).failed.any() and spared(run(n), run(SUBSTEPS[-1])):
-            error = np.inf
+        if run(n).failed.any():
+            failed, finest = run(n).failed, run(SUBSTEPS[-1]).failed
+            error = np.inf if (failed & ~finest).any() or finest.all() else error
         if error <= MARGIN * allowed:
             break
         if n != SUBSTEPS[-1]:
@@ -111,18 +124,12 @@ def calibrate(
 def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str) -> Calibration:
     """Return the finest of the calibrations of parts of the candidates: a long record would fill the memory with all.
 
-    Its error is no smaller than that of any part. Steps over several samples are not looked for.
+    Its error is the largest of all parts. Steps over several samples are not looked for.
     """
     parts = [candidates[first : first + PART] for first in range(0, len(candidates), PART)]
     found = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
-    finest = max(found, key=lambda c: c.schedule.substeps)
-    schedule = replace(finest.schedule, weights=None)
-    return Calibration(schedule, max(c.error for c in found), all(c.reached for c in found))
-
-
-def spared(coarse: Simulation, fine: Simulation) -> bool:
-    """Tell whether a candidate that fails with coarse steps holds with fine ones, or whether none holds at all."""
-    return bool((coarse.failed & ~fine.failed).any() or fine.failed.all())
+    schedule = max((c.schedule for c in found), key=lambda s: s.substeps)
+    return Calibration(replace(schedule, weights=None), max(c.error for c in found), all(c.reached for c in found))
 
 
 def switch_weights(candidates: Array, run: Simulation) -> Array | None:
@@ -150,7 +157,10 @@ def long_steps(
         return None
     lasting = LASTING * model.plant.scales.speed
     plan = np.ones(manoeuvre.n_samples - 1, dtype=np.int64)
-    start, last = 0, witnessed(run, manoeuvre)
+    # The last sample at which enough candidates are still before their first switch.
+    switched = (np.min(list(run.switch_times.values()), axis=0) - manoeuvre.start_time) / manoeuvre.interval
+    samples = np.where(np.isfinite(switched), switched, manoeuvre.n_samples - 1)
+    start, last = 0, int(np.sort(samples)[-min(N_UNSWITCHED, len(samples))])
     for span in (2, 4, 8):
         for first in range(start + 10 - start % 10, last - span, 10 if start < 200 else 40):
             longer = plan.copy()
@@ -163,10 +173,3 @@ def long_steps(
         else:
             break
     return plan if plan.max() > 1 else None
-
-
-def witnessed(run: Simulation, manoeuvre: Manoeuvre) -> int:
-    """Return the last sample at which enough candidates are still before their first switch."""
-    switched = np.min(list(run.switch_times.values()), axis=0) - manoeuvre.start_time
-    samples = np.where(np.isfinite(switched), switched / manoeuvre.interval, manoeuvre.n_samples - 1)
-    return int(np.sort(samples)[-min(N_WITNESSES, len(samples))])

@@ -3,26 +3,118 @@
 Classical fourth-order Runge-Kutta on lanes of candidates, a fixed number of steps between samples. Where a guard
 changes its sign inside a step, the step is cut there: a quadratic through the guard at both ends and in the middle
 (cubic Hermite of the states) gives the instant. Only lanes with a change take the cut, so a candidate's result does
-not depend on its neighbours.
+not depend on its neighbours. The loop stands in templates/kernel.py.jinja.
+
+Effects that a whole group of candidates leaves at their null are not evaluated. A model that holds the whole library,
+one or two effects of it in use, then takes three times as long as the plant alone instead of fifteen times (measured on
+the arm with 38 effects). The choice is one branch for all lanes and all samples of a group. In a lane at the null an
+effect adds exactly 0 and its states rest, whatever the neighbours do.
 """
 
 import ast
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
 
-from armid.engine.kernel import Parts, module_text
 from armid.engine.transpile import SourceText, local_name
 from armid.model import Model
 
-# Effects that a whole group of candidates leaves at their null are passed over: their equations are not evaluated.
-#
-# A model that holds the whole library, one or two effects of it in use, then takes three times as long as the plant
-# alone instead of fifteen times (measured on the arm with 38 effects). The choice is one branch for all lanes and all
-# samples of a group. In a lane at the null an effect adds exactly 0 and its states rest, whatever the neighbours do.
-
+# Samples that are gathered before they are copied to the rows of the candidates; times that one step may be cut; sample
+# intervals that one step may span.
+BLOCK = 256
+MAX_CUTS = 8
+LONGEST = 8
 # Below so many effects a model is what a user asked for, every effect in use; the choice would only cost.
 FEWEST = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "rate": 0.0, "guard": 1.0}
+TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
+# Prefixes of lists of names in the template.
+OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
+OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur")
+OF_CARRIED = ("n", "o", "r")
+OF_GUARDS = ("ga", "gb", "gm", "gd", "ge", "c")
+
+
+@dataclass(frozen=True)
+class KernelParts:
+    """Hold what the template is filled with: local names of one model, and its equations.
+
+    equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
+    width: candidates side by side. parameters, constants: what a simulation is given, in order. fixed: quantities that
+    do not move, computed once. states, inputs, latches: what moves, each in its order. latch_guards: the guard of each
+    latch; kinks: the other guards; jumping_guards: whether a kink may jump at a sample, as only inputs do.
+    wide: whether there are so many effects that what is rarely needed is compiled but once.
+    """
+
+    equations: str
+    width: int
+    parameters: list[str]
+    constants: list[str]
+    fixed: list[str]
+    states: list[str]
+    inputs: list[str]
+    latches: list[str]
+    latch_guards: list[str]
+    kinks: list[str]
+    jumping_guards: bool
+    wide: bool
+
+    def text(self) -> str:
+        """Return the text of the module."""
+        # Imported here: a module that is in the cache is not generated again.
+        from jinja2 import Environment, StrictUndefined
+
+        environment = Environment(
+            variable_start_string="{", variable_end_string="}", trim_blocks=True, lstrip_blocks=True,
+            keep_trailing_newline=True, undefined=StrictUndefined,
+        )  # fmt: skip
+        environment.filters |= {"each": each, "listed": listed, "nested": nested}
+        guards = [*self.latch_guards, *self.kinks]
+        times = [f"time_of_{k}" for k in self.latches]
+        carried = [*self.latches, *times, *self.states, *(f"ga_{g}" for g in guards)]
+        prefixed = ((self.states, OF_STATES), (self.inputs, OF_INPUTS), (guards, OF_GUARDS), (carried, OF_CARRIED))
+        lists = {prefix: listed(names, f"{prefix}_") for names, prefixes in prefixed for prefix in prefixes}
+        lists |= {
+            "x": listed(self.states), "x_n": listed(self.states, "n_"), "fixed": listed(self.fixed),
+            "latches": listed(self.latches), "latches_n": listed(self.latches, "n_"), "times": listed(times),
+            "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.constants),
+        }  # fmt: skip
+        names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
+        return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+            names | lists, guards=guards, carried=carried, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST,
+            switches=list(zip(self.latches, self.latch_guards, strict=True)),
+        )  # fmt: skip
+
+
+def kernel_parts(model: Model, width: int) -> KernelParts:
+    """Return what the module of a model is made of, `width` candidates side by side.
+
+    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
+    """
+    return Emitter(model).parts(width)
+
+
+def generate_module(model: Model, width: int) -> str:
+    """Return the self-contained text of the module that simulates a model, `width` candidates side by side."""
+    return kernel_parts(model, width).text()
+
+
+def listed(names: list[str], prefix: str = "") -> str:
+    """Return `prefix_a, prefix_b, ` with a comma behind each name."""
+    return "".join(f"{prefix}{n}, " for n in names)
+
+
+def each(text: str, names: list[str], separator: str = "\n") -> str:
+    """Return the text for each name, `@` standing for it and `#` for its number; no lines are a `pass`."""
+    made = separator.join(text.replace("@", n).replace("#", str(i)) for i, n in enumerate(names))
+    return made or ("pass" if separator == "\n" else "")
+
+
+def nested(names: list[str], function: str, prefix: str) -> str:
+    """Return the maximum or minimum of prefixed names, two at a time."""
+    first = f"{prefix}{names[0]}" if names else ""
+    return f"{function}(" * (len(names) - 1) + first + "".join(f", {prefix}{n})" for n in names[1:])
 
 
 def variable(key: str) -> str:
@@ -31,94 +123,84 @@ def variable(key: str) -> str:
 
 
 def strengths_of(model: Model) -> dict[str, dict[str, float]]:
-    """Return effect -> {key of a strength: its null} of the effects that can be passed over, none in a small model."""
+    """Return effect -> {key of a strength: its null} of the effects that may be inactive, none in a small model."""
     if len(model.effects) < FEWEST:
         return {}
     found = {e.name: {f"{e.name}__{p.name}": p.null for p in e.parameters if p.null is not None} for e in model.effects}
     return {name: strengths for name, strengths in found.items() if strengths}
 
 
-def using(effect: str) -> str:
-    """Return the local name of what is 1 in lanes that use an effect, else 0."""
-    return f"using_{effect}"
-
-
-def used(effect: str) -> str:
-    """Return the local name of what tells whether any lane uses an effect."""
-    return f"used_{effect}"
-
-
 def use_lines(effect: str, nulls: Mapping[str, float]) -> list[str]:
     """Return the lines that tell which lanes use an effect: those with a strength that is not its null, or is NaN."""
     away = " + ".join(f"np.abs({variable(key)} - {null!r})" for key, null in nulls.items())
     return [
-        f"{using(effect)} = 1.0 - select(1e-300, {away}, 1.0, 0.0)",
-        f"{used(effect)} = any_above({using(effect)}, 0.5)",
+        f"using_{effect} = 1.0 - select(1e-300, {away}, 1.0, 0.0)",
+        f"used_{effect} = any_above(using_{effect}, 0.5)",
     ]
 
 
-INDENT = "    "
-
-
-def parenthesised(items: list[str]) -> str:
-    """Return a tuple expression."""
-    return f"({', '.join(items)}{',' if len(items) == 1 else ''})"
-
-
 class Emitter:
-    """Write the parts of one model's module; `parts` holds local names, private lists hold keys of the graph."""
+    """Write the equations of one model's module."""
 
     def __init__(self, model: Model) -> None:
         self.model, self.graph = model, model.graph
         self.sources = SourceText()
         self.called: set[str] = set()
-        states, latches = ([k.replace(".", "__") for k in keys] for keys in (model.states, model.latches))
-        self._rates, self._initials = [f"rate__{k}" for k in states], [f"initial__{k}" for k in states]
-        self._latch_guards = [f"guard__{k}" for k in latches]
-        self._kinks = [n.key for n in self.graph.of_kind("guard") if n.key not in self._latch_guards]
-        self._guards = [*self._latch_guards, *self._kinks]
-        self._output = model.plant.output
-        self._fixed = self._fixed_keys([*self._rates, *self._guards, self._output])
-        self._strengths = strengths_of(model)
-        self.parts = self._parts()
+        self.strengths = strengths_of(model)
 
-    def _parts(self) -> Parts:
-        """Return the local names."""
-        inputs = [i.name for i in self.model.plant.inputs]
+    def parts(self, width: int) -> KernelParts:
+        """Return what the template is filled with."""
+        model = self.model
+        rates = [f"rate__{k.replace('.', '__')}" for k in model.states]
+        latch_guards = [f"guard__{k.replace('.', '__')}" for k in model.latches]
+        kinks = [n.key for n in self.graph.of_kind("guard") if n.key not in latch_guards]
+        guards, inputs = [*latch_guards, *kinks], [i.name for i in model.plant.inputs]
+        fixed = self.fixed_keys([*rates, *guards, model.plant.output])
+        used = [f"{word}_{effect}" for effect in self.strengths for word in ("using", "used")]
         lists: dict[str, Iterable[str]] = {
-            "parameters": self.model.parameters, "constants": self.model.constants, "fixed": self._fixed,
-            "states": self.model.states, "inputs": inputs, "latches": self.model.latches,
-            "latch_guards": self._latch_guards, "guards": self._kinks,
+            "parameters": model.parameters, "constants": model.constants, "fixed": fixed, "states": model.states,
+            "inputs": inputs, "latches": model.latches, "latch_guards": latch_guards, "kinks": kinks,
         }  # fmt: skip
         names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
-        names["fixed"] += [name for e in self._strengths for name in (using(e), used(e))]
-        # Only an input may jump at a sample: a guard that depends on it is then evaluated anew.
-        return Parts(**names, guards_use_inputs=self._uses(self._guards, inputs), wide=bool(self._strengths))
+        names["fixed"] += used
+        given = [*names["parameters"], *names["constants"]]
+        moving = [variable("time"), *names["latches"], *names["states"], *names["inputs"], *names["fixed"]]
+        switches = [line for effect, nulls in self.strengths.items() for line in use_lines(effect, nulls)]
+        values = [f"1.0 * {variable(k)}" for k in fixed] + used
+        texts = [
+            self.function("fixed_values", given, self.assignments(fixed, True) + switches, values),
+            self.evaluation("start_values", given, [n.replace("rate__", "initial__", 1) for n in rates], True),
+            self.evaluation("rates", moving, rates),
+            self.evaluation("guards", moving, guards),
+            self.evaluation("recorded", moving, [model.plant.output]),
+        ]
+        equations = self.function_texts() + "\n\n".join(texts)
+        jumping = bool(kinks) and self.uses(guards, inputs)
+        return KernelParts(equations, width, **names, jumping_guards=jumping, wide=bool(self.strengths))
 
-    def _uses(self, keys: list[str], wanted: list[str]) -> bool:
-        return any(k in wanted or self._uses(list(self.graph.nodes[k].needs), wanted) for k in keys)
+    def uses(self, keys: list[str], wanted: list[str]) -> bool:
+        return any(k in wanted or self.uses(list(self.graph.nodes[k].needs), wanted) for k in keys)
 
-    def _fixed_keys(self, moving: list[str]) -> list[str]:
-        """Keys that do not move, which the moving equations use, or which stand where something may move."""
+    def fixed_keys(self, moving: list[str]) -> list[str]:
+        """Return keys that do not move, which the moving equations use, or which stand where something may move."""
         needed = {k for n in self.graph.order(moving) if not self.graph.is_static(n.key) for k in n.needs} | {*moving}
-        return [k for k in self.graph.nodes if k in needed and self.graph.is_static(k) and self._valued(k)]
+        return [k for k in self.graph.nodes if k in needed and self.graph.is_static(k) and not self.empty_port(k)]
 
-    def _valued(self, key: str) -> bool:
-        """Tell whether a node is more than an empty port."""
-        return not (self.graph.nodes[key].kind == "port" and not self.graph.nodes[key].terms)
+    def empty_port(self, key: str) -> bool:
+        return self.graph.nodes[key].kind == "port" and not self.graph.nodes[key].terms
 
     def assignments(self, wanted: list[str], static: bool) -> list[str]:
         """Return one line for each node that leads to the wanted ones."""
         return [self.line(n.key, static) for n in self.graph.order(wanted)
-                if self.graph.is_static(n.key) == static or n.kind == "initial" or not self._valued(n.key)]  # fmt: skip
+                if self.graph.is_static(n.key) == static or n.kind == "initial" or self.empty_port(n.key)]  # fmt: skip
 
     def line(self, key: str, static: bool) -> str:
-        """Return the line that gives a node its value; what moves in an effect that no lane uses is passed over."""
+        """Return the line that gives a node its value; what moves in an effect that no lane uses is left out."""
         node, value = self.graph.nodes[key], self.expression(key)
-        if static or node.owner not in self._strengths or node.kind not in IDLE:
+        if static or node.owner not in self.strengths or node.kind not in IDLE:
             return f"{variable(key)} = {value}"
-        taken = f"select({using(node.owner)}, 0.5, {value}, {IDLE[node.kind]})"
-        return f"{variable(key)} = {taken} if {used(node.owner)} else splat({IDLE[node.kind]})"
+        taken = f"select(using_{node.owner}, 0.5, {value}, {IDLE[node.kind]})"
+        return f"{variable(key)} = {taken} if used_{node.owner} else splat({IDLE[node.kind]})"
 
     def expression(self, key: str) -> str:
         """Return the right-hand side of a node."""
@@ -132,41 +214,25 @@ class Emitter:
             self.sources.add(name, node.function)
         return f"{name}({', '.join(f'{local_name(argument)}={variable(bound)}' for argument, bound in node.arguments)})"
 
-    def function(self, name: str, arguments: list[str], lines: list[str], result: list[str]) -> str:
-        """Return a compiled function that evaluates lines and returns a tuple."""
-        body = "\n".join(INDENT + line for line in [*lines, f"return {parenthesised(result)}"])
-        return f"@compiled\ndef {name}({', '.join(arguments)}):\n{body}\n"
+    def evaluation(self, name: str, arguments: list[str], wanted: list[str], static: bool = False) -> str:
+        """Return a compiled function that evaluates nodes."""
+        return self.function(name, arguments, self.assignments(wanted, static), [variable(k) for k in wanted])
 
-    def equations(self) -> str:
-        """Return every function that evaluates the composed equations."""
-        parts = self.parts
-        moving = [variable("time"), *parts.latches, *parts.states, *parts.inputs, *parts.fixed]
-        given = [*parts.parameters, *parts.constants]
-        starts, rates, guards = ([variable(k) for k in keys] for keys in (self._initials, self._rates, self._guards))
-        fixed = [f"1.0 * {variable(k)}" for k in self._fixed]
-        fixed += [name for e in self._strengths for name in (using(e), used(e))]
-        switches = [line for e, strengths in self._strengths.items() for line in use_lines(e, strengths)]
-        texts = [
-            self.function("fixed_values", given, self.assignments(self._fixed, True) + switches, fixed),
-            self.function("start_values", given, self.assignments(self._initials, True), starts),
-            self.function("rates", moving, self.assignments(self._rates, False), rates),
-            self.function("guards", moving, self.assignments(self._guards, False), guards),
-            self.function("recorded", moving, self.assignments([self._output], False), [variable(self._output)]),
-        ]
-        return self.function_texts() + "\n\n".join(texts)
+    def function(self, name: str, arguments: list[str], lines: list[str], results: list[str]) -> str:
+        """Return a compiled function that evaluates lines and returns a tuple."""
+        result = f"({', '.join(results)}{',' if len(results) == 1 else ''})"
+        body = "\n".join(f"    {line}" for line in [*lines, f"return {result}"])
+        return f"@compiled\ndef {name}({', '.join(arguments)}):\n{body}\n"
 
     def function_texts(self) -> str:
         """Return the plain functions of plant and effects, those with control flow wrapped lane by lane."""
-        texts = []
-        for name, definition in self.sources.definitions.items():
-            if name in self.sources.by_lane & self.called:
-                texts.append(by_lane(name, definition))
-            else:
-                texts.append(f"@compiled\n{ast.unparse(definition)}\n")
+        by_lane = self.sources.by_lane & self.called
+        texts = [wrapped_by_lane(name, definition) if name in by_lane else f"@compiled\n{ast.unparse(definition)}\n"
+                 for name, definition in self.sources.definitions.items()]  # fmt: skip
         return "\n\n".join(texts) + "\n\n\n"
 
 
-def by_lane(name: str, definition: ast.FunctionDef) -> str:
+def wrapped_by_lane(name: str, definition: ast.FunctionDef) -> str:
     """Return a function with control flow, called once for each lane."""
     arguments = ast.unparse(definition.args)
     lanes = ", ".join(f"lane({a.arg}, i)" for a in definition.args.args)
@@ -176,10 +242,3 @@ def by_lane(name: str, definition: ast.FunctionDef) -> str:
         f"    result = splat(0.0)\n    for i in range(WIDTH):\n"
         f"        result = with_lane(result, i, {name}__scalar({lanes}))\n    return result\n"
     )
-
-
-def generate_module(model: Model, width: int) -> str:
-    """Return the self-contained text of the module that simulates a model, `width` candidates side by side."""
-    emitter = Emitter(model)
-    equations = emitter.equations()
-    return module_text(emitter.parts, equations, width)

@@ -4,6 +4,7 @@ Every operation acts lane by lane, so a candidate's result does not depend on it
 """
 
 import operator
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -36,11 +37,10 @@ class LanesModel(models.PrimitiveModel):  # type: ignore[misc]
     """Store the lanes as one LLVM vector."""
 
     def __init__(self, dmm: Any, fe_type: Lanes) -> None:
-        super().__init__(dmm, fe_type, ir.VectorType(DOUBLE, fe_type.width))
+        super().__init__(dmm, fe_type, vector_of(fe_type.width))
 
 
 def is_number(numba_type: Any) -> bool:
-    """Tell whether a numba type is a plain scalar number."""
     return isinstance(numba_type, (types.Float, types.Integer, types.Boolean))
 
 
@@ -53,7 +53,7 @@ def mixes_lanes(*numba_types: Any) -> bool:
 
 def broadcast(builder: Any, value: Any, width: int) -> Any:
     """Copy one double to every lane."""
-    empty = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
+    empty = ir.Constant(vector_of(width), ir.Undefined)
     first = builder.insert_element(empty, value, ir.Constant(INT32, 0))
     return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(INT32, width), [0] * width))
 
@@ -66,19 +66,32 @@ def to_lanes(context: Any, builder: Any, value: Any, numba_type: Any, width: int
 
 
 def lanes_of(*numba_types: Any) -> Lanes:
-    """Return the first type that is lanes."""
     return next(t for t in numba_types if isinstance(t, Lanes))
 
 
-def all_to_lanes(context: Any, builder: Any, values: Any, numba_types: Any, width: int) -> list[Any]:
-    """Return the LLVM vectors of values that are numbers or lanes."""
-    return [to_lanes(context, builder, v, t, width) for v, t in zip(values, numba_types, strict=True)]
+def vector_of(width: int) -> Any:
+    return ir.VectorType(DOUBLE, width)
 
 
-def item_pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
-    """Return the pointer to one item of a contiguous float64 array."""
-    data = context.make_array(array_type)(context, builder, array).data
-    return builder.gep(data, [index], source_etype=DOUBLE)
+def vector_pointer(context: Any, builder: Any, signature: Any, arguments: Any, width: int) -> Any:
+    """Return the pointer to lanes in a contiguous float64 array; the arguments begin with the array and an index."""
+    i = context.cast(builder, arguments[1], signature.args[1], types.intp)
+    data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+    return builder.bitcast(builder.gep(data, [i], source_etype=DOUBLE), vector_of(width).as_pointer())
+
+
+def elementwise(result: Any, compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
+    """Return signature and code of an intrinsic whose arguments all become lanes of one width.
+
+    result: numba type of what it returns; compute(builder, vectors...): its LLVM value; given: numba types.
+    """
+    width = lanes_of(*given).width
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values = zip(arguments, signature.args, strict=True)
+        return compute(builder, *(to_lanes(context, builder, v, t, width) for v, t in values))
+
+    return result(*given), generate
 
 
 def make_access(width: int) -> tuple[Any, Any]:
@@ -88,10 +101,8 @@ def make_access(width: int) -> tuple[Any, Any]:
     @intrinsic
     def load(typing_context, array, index):
         def generate(context, builder, signature, arguments):
-            i = context.cast(builder, arguments[1], signature.args[1], types.intp)
-            pointer = item_pointer(context, builder, signature.args[0], arguments[0], i)
-            vector = ir.VectorType(DOUBLE, width)
-            return builder.load(builder.bitcast(pointer, vector.as_pointer()), align=8, typ=vector)
+            pointer = vector_pointer(context, builder, signature, arguments, width)
+            return builder.load(pointer, align=8, typ=vector_of(width))
 
         return lanes(array, index), generate
 
@@ -110,10 +121,7 @@ def store(typing_context, array, index, value):
     """Write lanes to a contiguous float64 array from an index on."""
 
     def generate(context, builder, signature, arguments):
-        i = context.cast(builder, arguments[1], signature.args[1], types.intp)
-        pointer = item_pointer(context, builder, signature.args[0], arguments[0], i)
-        vector = ir.VectorType(DOUBLE, value.width)
-        builder.store(arguments[2], builder.bitcast(pointer, vector.as_pointer()), align=8)
+        builder.store(arguments[2], vector_pointer(context, builder, signature, arguments, value.width), align=8)
         return context.get_dummy_value()
 
     return types.void(array, index, value), generate
@@ -148,78 +156,47 @@ def with_lane(typing_context, value, index, number):
 
 @intrinsic
 def n_lanes(typing_context, value):
-    """Return the number of lanes."""
-
     def generate(context, builder, signature, arguments):
         return context.get_constant(types.intp, value.width)
 
     return types.intp(value), generate
 
 
-def define_arithmetic(python_operator: Any, instruction: str) -> None:
+def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
     """Give numba the operator for lanes with lanes and lanes with numbers."""
 
     @intrinsic
     def act(typing_context, a, b):
-        lanes = lanes_of(a, b)
-
-        def generate(context, builder, signature, arguments):
-            x, y = all_to_lanes(context, builder, arguments, signature.args, lanes.width)
-            return getattr(builder, instruction)(x, y, flags=FLAGS)
-
-        return lanes(a, b), generate
+        return elementwise(lanes_of(a, b), compute, a, b)
 
     @overload(python_operator, inline="never")
     def operate(a, b):
         return (lambda a, b: act(a, b)) if mixes_lanes(a, b) else None
 
 
-for _operator, _instruction in (
-    (operator.add, "fadd"),
-    (operator.sub, "fsub"),
-    (operator.mul, "fmul"),
-    (operator.truediv, "fdiv"),
-):
-    define_arithmetic(_operator, _instruction)
+def comparison(symbol: str) -> Callable[..., Any]:
+    """Return a comparison that is 1.0 where it holds and 0.0 elsewhere."""
+
+    def compute(builder: Any, x: Any, y: Any) -> Any:
+        true, false = (broadcast(builder, ir.Constant(DOUBLE, c), x.type.count) for c in (1.0, 0.0))
+        compare = builder.fcmp_unordered if symbol == "!=" else builder.fcmp_ordered
+        return builder.select(compare(symbol, x, y), true, false)
+
+    return compute
 
 
-def define_comparison(python_operator: Any, symbol: str) -> None:
-    """Give numba a comparison that returns 1.0 where it holds and 0.0 elsewhere."""
-
-    @intrinsic
-    def act(typing_context, a, b):
-        lanes = lanes_of(a, b)
-
-        def generate(context, builder, signature, arguments):
-            x, y = all_to_lanes(context, builder, arguments, signature.args, lanes.width)
-            true, false = (broadcast(builder, ir.Constant(DOUBLE, c), lanes.width) for c in (1.0, 0.0))
-            compare = builder.fcmp_unordered if symbol == "!=" else builder.fcmp_ordered
-            return builder.select(compare(symbol, x, y), true, false)
-
-        return lanes(a, b), generate
-
-    @overload(python_operator)
-    def operate(a, b):
-        return (lambda a, b: act(a, b)) if mixes_lanes(a, b) else None
-
-
-for _operator, _symbol in (
-    (operator.lt, "<"),
-    (operator.le, "<="),
-    (operator.gt, ">"),
-    (operator.ge, ">="),
-    (operator.eq, "=="),
-    (operator.ne, "!="),
-):
-    define_comparison(_operator, _symbol)
+for _name in ("add", "sub", "mul", "truediv"):
+    _instruction = {"truediv": "fdiv"}.get(_name, f"f{_name}")
+    define_operator(
+        getattr(operator, _name), lambda builder, x, y, i=_instruction: getattr(builder, i)(x, y, flags=FLAGS)
+    )
+for _name, _symbol in {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}.items():
+    define_operator(getattr(operator, _name), comparison(_symbol))
 
 
 @intrinsic
 def negate(typing_context, a):
-    def generate(context, builder, signature, arguments):
-        return builder.fneg(arguments[0], flags=FLAGS)
-
-    return a(a), generate
+    return elementwise(a, lambda builder, x: builder.fneg(x, flags=FLAGS), a)
 
 
 @overload(operator.neg)
@@ -232,100 +209,90 @@ def lanes_pos(a):
     return (lambda a: a) if isinstance(a, Lanes) else None
 
 
-def unary(llvm_name: str) -> Any:
+def vector_call(builder: Any, name: str, *vectors: Any) -> Any:
+    vector = vectors[0].type
+    kind = ir.FunctionType(vector, [vector] * len(vectors))
+    function = builder.module.declare_intrinsic(f"llvm.{name}.v{vector.count}f64", (), kind)
+    return builder.call(function, vectors)
+
+
+def unary(name: str) -> Any:
     """Return an intrinsic that maps lanes through an LLVM vector function."""
 
     @intrinsic
     def act(typing_context, a):
-        def generate(context, builder, signature, arguments):
-            vector = ir.VectorType(DOUBLE, a.width)
-            kind = ir.FunctionType(vector, [vector])
-            return builder.call(builder.module.declare_intrinsic(f"{llvm_name}.v{a.width}f64", (), kind), arguments)
-
-        return a(a), generate
+        return elementwise(a, lambda builder, x: vector_call(builder, name, x), a)
 
     return act
 
 
-fabs = unary("llvm.fabs")
-square_root = unary("llvm.sqrt")
-nearest = unary("llvm.rint")
-floor_of = unary("llvm.floor")
+fabs = unary("fabs")
+square_root = unary("sqrt")
+nearest = unary("rint")
+floor_of = unary("floor")
 
 
 @intrinsic
 def fused(typing_context, a, b, c):
     """Return a b + c with one rounding, never reordered."""
-    lanes = lanes_of(a, b, c)
-
-    def generate(context, builder, signature, arguments):
-        values = all_to_lanes(context, builder, arguments, signature.args, lanes.width)
-        vector = ir.VectorType(DOUBLE, lanes.width)
-        name = f"llvm.fma.v{lanes.width}f64"
-        return builder.call(builder.module.declare_intrinsic(name, (), ir.FunctionType(vector, [vector] * 3)), values)
-
-    return lanes(a, b, c), generate
+    return elementwise(lanes_of(a, b, c), lambda builder, *vectors: vector_call(builder, "fma", *vectors), a, b, c)
 
 
 @intrinsic
 def select(typing_context, a, b, x, y):
     """Return x where a > b, else y (y also where a or b is NaN)."""
-    lanes = lanes_of(a, b, x, y)
 
-    def generate(context, builder, signature, arguments):
-        p, q, r, s = all_to_lanes(context, builder, arguments, signature.args, lanes.width)
+    def compute(builder, p, q, r, s):
         return builder.select(builder.fcmp_ordered(">", p, q), r, s)
 
-    return lanes(a, b, x, y), generate
+    return elementwise(lanes_of(a, b, x, y), compute, a, b, x, y)
 
 
 @intrinsic
 def any_above(typing_context, a, b):
     """Tell whether a > b in any lane."""
 
-    def generate(context, builder, signature, arguments):
-        limit = to_lanes(context, builder, arguments[1], signature.args[1], a.width)
-        mask = builder.fcmp_ordered(">", arguments[0], limit)
-        bits = builder.bitcast(mask, ir.IntType(a.width))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(a.width), 0))
+    def compute(builder, x, limit):
+        mask = ir.IntType(a.width)
+        bits = builder.bitcast(builder.fcmp_ordered(">", x, limit), mask)
+        return builder.icmp_unsigned("!=", bits, ir.Constant(mask, 0))
 
-    return types.boolean(a, b), generate
+    return elementwise(types.boolean, compute, a, b)
+
+
+def whole_of(width: int, value: int) -> Any:
+    return ir.Constant(ir.VectorType(INT64, width), [value] * width)
 
 
 @intrinsic
 def two_to_the(typing_context, k):
     """Return 2**k for lanes of whole numbers, -1022 <= k <= 1023."""
 
-    def generate(context, builder, signature, arguments):
-        whole = ir.VectorType(INT64, k.width)
-        exponent = builder.add(builder.fptosi(arguments[0], whole), ir.Constant(whole, [1023] * k.width))
-        bits = builder.shl(exponent, ir.Constant(whole, [52] * k.width))
-        return builder.bitcast(bits, ir.VectorType(DOUBLE, k.width))
+    def compute(builder, x):
+        exponent = builder.add(builder.fptosi(x, ir.VectorType(INT64, k.width)), whole_of(k.width, 1023))
+        return builder.bitcast(builder.shl(exponent, whole_of(k.width, 52)), x.type)
 
-    return k(k), generate
+    return elementwise(k, compute, k)
 
 
 @intrinsic
 def mantissa_of(typing_context, x):
     """Return the mantissa m in [1, 2) of positive normal lanes, x = m 2**e."""
 
-    def generate(context, builder, signature, arguments):
-        whole = ir.VectorType(INT64, x.width)
-        bits = builder.bitcast(arguments[0], whole)
-        kept = builder.and_(bits, ir.Constant(whole, [0x000FFFFFFFFFFFFF] * x.width))
-        one = builder.or_(kept, ir.Constant(whole, [0x3FF0000000000000] * x.width))
-        return builder.bitcast(one, ir.VectorType(DOUBLE, x.width))
+    def compute(builder, value):
+        bits = builder.bitcast(value, ir.VectorType(INT64, x.width))
+        kept = builder.and_(bits, whole_of(x.width, 0x000FFFFFFFFFFFFF))
+        return builder.bitcast(builder.or_(kept, whole_of(x.width, 0x3FF0000000000000)), value.type)
 
-    return x(x), generate
+    return elementwise(x, compute, x)
 
 
 @intrinsic
 def exponent_of(typing_context, x):
     """Return the binary exponent e of positive normal lanes, x = m 2**e with m in [1, 2)."""
 
-    def generate(context, builder, signature, arguments):
-        whole = ir.VectorType(INT64, x.width)
-        bits = builder.lshr(builder.bitcast(arguments[0], whole), ir.Constant(whole, [52] * x.width))
-        return builder.sitofp(builder.sub(bits, ir.Constant(whole, [1023] * x.width)), ir.VectorType(DOUBLE, x.width))
+    def compute(builder, value):
+        bits = builder.lshr(builder.bitcast(value, ir.VectorType(INT64, x.width)), whole_of(x.width, 52))
+        return builder.sitofp(builder.sub(bits, whole_of(x.width, 1023)), value.type)
 
-    return x(x), generate
+    return elementwise(x, compute, x)

@@ -49,17 +49,10 @@ def lanes_exp(x):
     bounded = select(x, 709.79, 709.79, select(-x, 708.0, -708.0, x))
     k = nearest(bounded * 1.4426950408889634)
     r = fused(k, -LN2_LOW, fused(k, -LN2_HIGH, bounded))
-    p = r * 1.6059043836821613e-10 + 2.08767569878681e-09
-    p = p * r + 2.505210838544172e-08
-    p = p * r + 2.755731922398589e-07
-    p = p * r + 2.7557319223985893e-06
-    p = p * r + 2.48015873015873e-05
-    p = p * r + 0.0001984126984126984
-    p = p * r + 0.001388888888888889
-    p = p * r + 0.008333333333333333
-    p = p * r + 0.041666666666666664
-    p = p * r + 0.16666666666666666
-    p = p * r + 0.5
+    p = (r * 1.6059043836821613e-10 + 2.08767569878681e-09) * r + 2.505210838544172e-08
+    p = ((p * r + 2.755731922398589e-07) * r + 2.7557319223985893e-06) * r + 2.48015873015873e-05
+    p = ((p * r + 0.0001984126984126984) * r + 0.001388888888888889) * r + 0.008333333333333333
+    p = ((p * r + 0.041666666666666664) * r + 0.16666666666666666) * r + 0.5
     p = (p * r + 1.0) * r + 1.0
     result = p * two_to_the(k - 1.0) * 2.0
     return select(x, 709.782712893384, np.inf, select(-x, 708.0, 0.0, result))
@@ -74,15 +67,9 @@ def lanes_log(x):
     e = e + large
     f = (m - 1.0) / (m + 1.0)
     s = f * f
-    p = s * 0.09523809523809523 + 0.10526315789473684
-    p = p * s + 0.11764705882352941
-    p = p * s + 0.13333333333333333
-    p = p * s + 0.15384615384615385
-    p = p * s + 0.18181818181818182
-    p = p * s + 0.2222222222222222
-    p = p * s + 0.2857142857142857
-    p = p * s + 0.4
-    p = p * s + 0.6666666666666666
+    p = ((s * 0.09523809523809523 + 0.10526315789473684) * s + 0.11764705882352941) * s + 0.13333333333333333
+    p = ((p * s + 0.15384615384615385) * s + 0.18181818181818182) * s + 0.2222222222222222
+    p = ((p * s + 0.2857142857142857) * s + 0.4) * s + 0.6666666666666666
     result = fused(e, LN2_HIGH, fused(f, 2.0, fused(f * s, p, e * LN2_LOW)))
     below = select(-x, 0.0, np.nan, select(x, -1.0, -np.inf, x))
     return select(x, LARGEST, x, select(x, SMALLEST, result, below))
@@ -92,40 +79,17 @@ def lanes_log(x):
 def sine_of_reduced(r):
     """Return sin r for abs(r) <= pi/2 (Taylor)."""
     s = r * r
-    p = s * 1.9572941063391263e-20 - 8.22063524662433e-18
-    p = p * s + 2.8114572543455206e-15
-    p = p * s - 7.647163731819816e-13
-    p = p * s + 1.6059043836821613e-10
-    p = p * s - 2.505210838544172e-08
-    p = p * s + 2.7557319223985893e-06
-    p = p * s - 0.0001984126984126984
-    p = p * s + 0.008333333333333333
+    p = (s * 1.9572941063391263e-20 - 8.22063524662433e-18) * s + 2.8114572543455206e-15
+    p = ((p * s - 7.647163731819816e-13) * s + 1.6059043836821613e-10) * s - 2.505210838544172e-08
+    p = ((p * s + 2.7557319223985893e-06) * s - 0.0001984126984126984) * s + 0.008333333333333333
     p = p * s - 0.16666666666666666
     return p * s * r + r
 
 
 @compiled
 def alternate(k):
-    """Return +1 for even and -1 for odd whole k."""
+    """Return (-1)**k for whole k."""
     return 1.0 - 2.0 * (k - 2.0 * floor_of(k * 0.5))
-
-
-@compiled
-def sines_of_far(x, result):
-    """Return the result with the sine of every angle beyond FAR put in."""
-    for i in range(n_lanes(x)):
-        if abs(lane(x, i)) > FAR:
-            result = with_lane(result, i, math.sin(lane(x, i)))
-    return result
-
-
-@compiled
-def cosines_of_far(x, result):
-    """Return the result with the cosine of every angle beyond FAR put in."""
-    for i in range(n_lanes(x)):
-        if abs(lane(x, i)) > FAR:
-            result = with_lane(result, i, math.cos(lane(x, i)))
-    return result
 
 
 @compiled
@@ -135,7 +99,9 @@ def lanes_sin(x):
     r = fused(k, -PI_C, fused(k, -PI_B, fused(k, -PI_A, x)))
     result = alternate(k) * sine_of_reduced(r)
     if any_above(fabs(x), FAR):
-        result = sines_of_far(x, result)
+        for i in range(n_lanes(x)):
+            if abs(lane(x, i)) > FAR:
+                result = with_lane(result, i, math.sin(lane(x, i)))
     return result
 
 
@@ -147,7 +113,9 @@ def lanes_cos(x):
     r = fused(half, -PI_C, fused(half, -PI_B, fused(half, -PI_A, x)))
     result = -alternate(k) * sine_of_reduced(r)
     if any_above(fabs(x), FAR):
-        result = cosines_of_far(x, result)
+        for i in range(n_lanes(x)):
+            if abs(lane(x, i)) > FAR:
+                result = with_lane(result, i, math.cos(lane(x, i)))
     return result
 
 
@@ -159,15 +127,10 @@ def lanes_arctan(x):
     reduced = select(t, 2.414213562373095, -1.0 / t, select(t, 0.66, (t - 1.0) / (t + 1.0), t))
     offset = select(t, 2.414213562373095, 1.5707963267948966, select(t, 0.66, 0.7853981633974483, 0.0))
     s = reduced * reduced
-    p = s * -8.750608600031904122785e-1 - 1.615753718733365076637e1
-    p = p * s - 7.500855792314704667340e1
-    p = p * s - 1.228866684490136173410e2
-    p = p * s - 6.485021904942025371773e1
-    q = s + 2.485846490142306297962e1
-    q = q * s + 1.650270098316988542046e2
-    q = q * s + 4.328810604912902668951e2
-    q = q * s + 4.853903996359136964868e2
-    q = q * s + 1.945506571482613964425e2
+    p = (s * -8.750608600031904122785e-1 - 1.615753718733365076637e1) * s - 7.500855792314704667340e1
+    p = (p * s - 1.228866684490136173410e2) * s - 6.485021904942025371773e1
+    q = ((s + 2.485846490142306297962e1) * s + 1.650270098316988542046e2) * s + 4.328810604912902668951e2
+    q = (q * s + 4.853903996359136964868e2) * s + 1.945506571482613964425e2
     y = fused(reduced, s * p / q, reduced) + offset
     return select(-x, 0.0, -y, y)
 
@@ -190,8 +153,9 @@ def lanes_sign(x):
 
 
 @compiled
-def lanes_power(a, b):
+def lanes_power(base, exponent):
     """Return a**b: exp(b log a) where a > 0 and that is a number, the scalar function in the other lanes."""
+    a, b = select(1.0, 0.0, base, exponent), select(1.0, 0.0, exponent, base)
     result = lanes_exp(b * lanes_log(a))
     if any_above(select(a, SMALLEST, result != result, 1.0), 0.5):
         for i in range(n_lanes(result)):
@@ -265,11 +229,6 @@ def either(a, b):
 
 
 @numba.njit
-def neither(a):
-    return a == 0.0
-
-
-@numba.njit
 def with_sign(a, b):
     return select(-b, 0.0, -abs(a), abs(a))
 
@@ -304,20 +263,6 @@ def clip(x, low, high):
     return None
 
 
-def define_power(name: Any) -> None:
-    """Give numba the power of lanes."""
-    LANE_FUNCTIONS.add(name)
-
-    @overload(name)
-    def act(a, b):
-        if not mixes_lanes(a, b):
-            return None
-        return lambda a, b: lanes_power(select(1.0, 0.0, a, b), select(1.0, 0.0, b, a))
-
-
-for _name in (operator.pow, np.power, math.pow):
-    define_power(_name)
-
 define_unary((np.sqrt, math.sqrt), square_root)
 define_unary((np.abs, np.fabs, math.fabs, builtins.abs), fabs)
 define_unary((np.floor,), floor_of)
@@ -332,7 +277,8 @@ define_unary((np.sign,), lanes_sign)
 define_unary((np.square,), numba.njit(lambda x: x * x))
 define_unary((np.reciprocal,), numba.njit(lambda x: 1.0 / x))
 define_unary((np.negative,), numba.njit(lambda x: -x))
-define_unary((np.logical_not, operator.invert), neither)
+define_unary((np.logical_not, operator.invert), numba.njit(lambda x: x == 0.0))
+define_binary((operator.pow, np.power, math.pow), lanes_power)
 define_binary((builtins.min,), smaller)
 define_binary((builtins.max,), larger)
 define_extreme(np.minimum, smaller, passes_nan=True)

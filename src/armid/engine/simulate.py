@@ -9,53 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armid.engine.compile import UNCOMPILABLE, Kernel, compile_model, refusal
+from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model
 from armid.errors import ArmidError
 from armid.model import Manoeuvre, Model
 
 Array = NDArray[np.float64]
 # Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
 SHARES = 4
-
-
-def arranged(candidates: Array, width: int, weights: Array | None) -> tuple[Array, NDArray[np.int64]]:
-    """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
-    n = len(candidates)
-    if n <= width:
-        weights = None  # within one group the order saves nothing
-    order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
-    places = np.full(n + -n % width, -1)
-    places[:n] = order
-    rows = np.empty((candidates.shape[1], len(places)))
-    rows[:, :n] = candidates.T if weights is None else candidates[order].T
-    rows[:, n:] = rows[:, n - 1 : n]
-    return rows, places
-
-
-@cache
-def pool_of(threads: int) -> ThreadPoolExecutor:
-    """Return the pool of so many threads; it stays, as starting threads takes as long as many simulations."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="armid")
-
-
-def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_groups: int, threads: int) -> None:
-    """Fill the results group by group; threads take neighbouring groups.
-
-    Raises ArmidError when an equation cannot be compiled, which shows at the first call.
-    """
-    try:
-        if threads < 2 or n_groups < 2:
-            kernel(*given, 0, n_groups, *results)
-            return
-        edges = np.linspace(0, n_groups, min(SHARES * threads, n_groups) + 1).astype(int)
-        pool = pool_of(threads)
-        parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in pairwise(edges)]
-        for part in parts:
-            part.result()
-    except UNCOMPILABLE as error:
-        raise refusal(error) from error
-
-
+# A candidate whose signal exceeds so many times the plant's speed scale has diverged.
 DIVERGED = 1e3
 
 
@@ -102,41 +63,54 @@ class Simulation:
     states: dict[str, Array]
 
 
-def as_population(model: Model, population: ArrayLike) -> Array:
-    """Return the population as float64, shape (n_candidates, n_parameters).
+def simulate(
+    model: Model, manoeuvre: Manoeuvre, population: ArrayLike, schedule: Schedule = Schedule(), threads: int = 1,
+    states: bool = False,
+) -> Simulation:  # fmt: skip
+    """Simulate every candidate of a population through one manoeuvre.
 
-    Raises ArmidError for another number of parameters than the model has.
+    Parameters
+    ----------
+    model, manoeuvre
+        What moves, and what it is made to do.
+    population : (n_candidates, n_parameters), SI
+        Columns in the order of `model.parameters`; one candidate may come as a vector.
+    schedule
+        How finely time is cut.
+    threads
+        Candidates are shared among so many threads; the result is the same bit for bit.
+    states
+        Keep the states too (then no step spans several samples).
+
+    Raises
+    ------
+    ArmidError
+        For a wrong shape, an unknown constant, a missing input, and an equation that cannot be compiled.
     """
-    candidates = np.atleast_2d(np.asarray(population, dtype=np.float64))
-    if candidates.ndim != 2 or candidates.shape[1] != len(model.parameters):
-        raise ArmidError(f"a population of shape {candidates.shape} was given: (n_candidates, "
-                         f"{len(model.parameters)}) is expected for {', '.join(model.parameters)}")  # fmt: skip
-    return candidates
+    as_population(model, population)
+    return prepare(model, manoeuvre, schedule, states).run(population, threads)
 
 
-def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
-    """Return the inputs of the plant in order, shape (n_inputs, n_samples)."""
-    missing = [i.name for i in model.plant.inputs if i.name not in manoeuvre.inputs]
-    if missing:
-        raise ArmidError(f"the manoeuvre lacks the input '{missing[0]}' of plant '{model.plant.name}'")
-    values = [np.asarray(manoeuvre.inputs[i.name], dtype=np.float64) for i in model.plant.inputs]
-    for name, value in zip((i.name for i in model.plant.inputs), values, strict=True):
-        if value.shape != (manoeuvre.n_samples,):
-            raise ArmidError(f"input '{name}' has shape {value.shape}: ({manoeuvre.n_samples},) is expected")
-    return np.ascontiguousarray(values) if values else np.zeros((1, 1))
-
-
-def held_inputs(model: Model, manoeuvre: Manoeuvre) -> NDArray[np.bool_]:
-    """Return which inputs keep the value of their last sample, (n_inputs,): as the plant says, else the record."""
+def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(), states: bool = False) -> "Prepared":
+    """Return what simulates populations through one manoeuvre as often as asked; arguments and errors as `simulate`."""
+    kernel, width = compile_model(model)
+    spans = (replace(schedule, plan=None) if states else schedule).spans(manoeuvre.n_samples)
+    # The plant says whether an input keeps the value of its last sample, else the record does.
     holds = [i.hold or manoeuvre.hold for i in model.plant.inputs] or [""]
-    return np.array([hold == "zero" for hold in holds])
+    settings = (
+        np.array(model.constant_values(manoeuvre.constants) or [0.0]), input_values(model, manoeuvre),
+        float(manoeuvre.interval), manoeuvre.n_samples, schedule.substeps, schedule.refinement,
+        float(schedule.fresh_samples), spans, np.array([hold == "zero" for hold in holds]),
+        float(manoeuvre.start_time), DIVERGED * model.plant.scales.speed,
+    )  # fmt: skip
+    return Prepared(model, kernel, width, schedule.weights, manoeuvre.n_samples, settings, states)
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """Simulate populations through one manoeuvre, everything but the candidates made ready once.
 
-    told: what the kernel is told between the candidates and where they go.
+    settings: arguments of the kernel between the candidates and where their results go.
     """
 
     model: Model
@@ -144,7 +118,7 @@ class Prepared:
     width: int
     weights: Array | None
     n_samples: int
-    told: tuple[Any, ...]
+    settings: tuple[Any, ...]
     states: bool
 
     def run(self, population: ArrayLike, threads: int = 1) -> Simulation:
@@ -156,7 +130,7 @@ class Prepared:
         output = np.empty((n, self.n_samples))
         switches = np.full((len(model.latches), rows.shape[1]), np.nan)
         trace = np.empty((len(model.states), n, self.n_samples) if self.states else (0, 0, 0))
-        given = (rows.ravel(), rows.shape[1], *self.told, places)
+        given = (rows.ravel(), rows.shape[1], *self.settings, places)
         run(self.kernel, given, (output, switches.ravel(), trace), rows.shape[1] // self.width, threads)
         kept = dict(zip(model.states, trace, strict=True)) if self.states else {}
         inverse = np.argsort(places[:n], kind="stable")
@@ -164,30 +138,60 @@ class Prepared:
         return Simulation(output, np.isnan(output[:, -1]), times, kept)
 
 
-def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(), states: bool = False) -> Prepared:
-    """Return what simulates populations through one manoeuvre as often as asked; arguments and errors as `simulate`."""
-    kernel, width = compile_model(model)
-    spans = (replace(schedule, plan=None) if states else schedule).spans(manoeuvre.n_samples)
-    told = (
-        np.array(model.constant_values(manoeuvre.constants) or [0.0]), input_values(model, manoeuvre),
-        float(manoeuvre.interval), manoeuvre.n_samples, schedule.substeps, schedule.refinement,
-        float(schedule.fresh_samples), spans, held_inputs(model, manoeuvre), float(manoeuvre.start_time),
-        DIVERGED * model.plant.scales.speed,
-    )  # fmt: skip
-    return Prepared(model, kernel, width, schedule.weights, manoeuvre.n_samples, told, states)
+def as_population(model: Model, population: ArrayLike) -> Array:
+    """Return the population as float64, (n_candidates, n_parameters); refuse another shape with ArmidError."""
+    candidates = np.atleast_2d(np.asarray(population, dtype=np.float64))
+    if candidates.ndim != 2 or candidates.shape[1] != len(model.parameters):
+        raise ArmidError(f"a population of shape {candidates.shape} was given: (n_candidates, "
+                         f"{len(model.parameters)}) is expected for {', '.join(model.parameters)}")  # fmt: skip
+    return candidates
 
 
-def simulate(
-    model: Model, manoeuvre: Manoeuvre, population: ArrayLike, schedule: Schedule = Schedule(), threads: int = 1,
-    states: bool = False,
-) -> Simulation:  # fmt: skip
-    """Simulate every candidate of a population through one manoeuvre.
+def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
+    """Return the inputs of the plant in order, shape (n_inputs, n_samples)."""
+    names = [i.name for i in model.plant.inputs]
+    for name in names:
+        if name not in manoeuvre.inputs:
+            raise ArmidError(f"the manoeuvre lacks the input '{name}' of plant '{model.plant.name}'")
+        if np.shape(manoeuvre.inputs[name]) != (manoeuvre.n_samples,):
+            raise ArmidError(f"input '{name}' has shape {np.shape(manoeuvre.inputs[name])}: ({manoeuvre.n_samples},) "
+                             "is expected")  # fmt: skip
+    return np.array([manoeuvre.inputs[name] for name in names], dtype=np.float64) if names else np.zeros((1, 1))
 
-    population: shape (n_candidates, n_parameters), SI, columns in the order of `model.parameters`.
-    schedule: how finely time is cut; threads: candidates are shared among so many threads, the result is the same bit
-    for bit; states: keep the states too (then no step spans several samples).
 
-    Raises ArmidError for a wrong shape, an unknown constant, a missing input, and an equation that cannot be compiled.
+def arranged(candidates: Array, width: int, weights: Array | None) -> tuple[Array, NDArray[np.int64]]:
+    """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
+    n = len(candidates)
+    if n <= width:
+        weights = None  # within one group the order saves nothing
+    order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
+    places = np.full(n + -n % width, -1)
+    places[:n] = order
+    rows = np.empty((candidates.shape[1], len(places)))
+    rows[:, :n] = candidates.T if weights is None else candidates[order].T
+    rows[:, n:] = rows[:, n - 1 : n]
+    return rows, places
+
+
+@cache
+def pool_of(threads: int) -> ThreadPoolExecutor:
+    """Return the pool of so many threads; it stays, as starting threads takes as long as many simulations."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="armid")
+
+
+def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_groups: int, threads: int) -> None:
+    """Fill the results group by group; threads take neighbouring groups.
+
+    Raises ArmidError when an equation cannot be compiled, which shows at the first call.
     """
-    as_population(model, population)
-    return prepare(model, manoeuvre, schedule, states).run(population, threads)
+    try:
+        if threads < 2 or n_groups < 2:
+            kernel(*given, 0, n_groups, *results)
+            return
+        edges = np.linspace(0, n_groups, min(SHARES * threads, n_groups) + 1).astype(int)
+        pool = pool_of(threads)
+        parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in pairwise(edges)]
+        for part in parts:
+            part.result()
+    except UNCOMPILABLE as error:
+        raise compile_error(error) from error

@@ -16,68 +16,7 @@ from armid.model.equations import definition_of
 
 # A name that no function can have; it becomes `np` when the names of the function are replaced.
 NUMPY = "numpy itself"
-
-
-def call(function: str, *arguments: ast.expr) -> ast.Call:
-    """Return the expression `np.function(...)`."""
-    return ast.Call(ast.Attribute(ast.Name(NUMPY, ast.Load()), function, ast.Load()), list(arguments), [])
-
-
-class Vectorise(ast.NodeTransformer):
-    """Turn choices inside expressions into selections, and small whole powers into products."""
-
-    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        self.generic_visit(node)
-        return call("where", node.test, node.body, node.orelse)
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
-        self.generic_visit(node)
-        name = "logical_and" if isinstance(node.op, ast.And) else "logical_or"
-        result = node.values[0]
-        for value in node.values[1:]:
-            result = call(name, result, value)
-        return result
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
-        self.generic_visit(node)
-        return call("logical_not", node.operand) if isinstance(node.op, ast.Not) else node
-
-    def visit_Compare(self, node: ast.Compare) -> ast.AST:
-        self.generic_visit(node)
-        lefts = [node.left, *node.comparators[:-1]]
-        result: ast.expr = ast.Compare(lefts[0], node.ops[:1], node.comparators[:1])
-        for left, operator, right in zip(lefts[1:], node.ops[1:], node.comparators[1:], strict=True):
-            result = call("logical_and", result, ast.Compare(left, [operator], [right]))
-        return result
-
-    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        self.generic_visit(node)
-        if not (isinstance(node.op, ast.Pow) and isinstance(node.right, ast.Constant)):
-            return node
-        square = call("square", node.left)
-        simple = {1: node.left, 2: square, 3: ast.BinOp(square, ast.Mult(), node.left), 4: call("square", square),
-                  0.5: call("sqrt", node.left), -1: ast.BinOp(ast.Constant(1.0), ast.Div(), node.left)}  # fmt: skip
-        value = node.right.value
-        return simple.get(value, node) if isinstance(value, (int, float)) else node
-
-    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
-        """Turn x += y into x = x + y: lanes cannot be changed in place."""
-        if not isinstance(node.target, ast.Name):
-            return self.generic_visit(node)
-        value = ast.BinOp(ast.Name(node.target.id, ast.Load()), node.op, node.value)
-        return ast.Assign([node.target], self.visit(value))
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        """Nest min(a, b, c) and max(a, b, c): two at a time."""
-        self.generic_visit(node)
-        if not (isinstance(node.func, ast.Name) and node.func.id in ("min", "max") and len(node.args) > 2):
-            return node
-        result: ast.expr = node.args[0]
-        for value in node.args[1:]:
-            result = ast.Call(node.func, [result, value], [])
-        return result
-
-
+NUMBERS = (bool, int, float, np.floating, np.integer)
 CONTROL_FLOW = (ast.If, ast.While, ast.For, ast.Try, ast.With, ast.Match)
 LANE_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.BitAnd, ast.BitOr)
 # What these return, or take, is one plain number: a function that uses them is computed lane by lane.
@@ -143,18 +82,15 @@ def with_values(definition: ast.FunctionDef, function: FunctionType) -> ast.Func
 
     Raises ArmidError for a default that is no number.
     """
+    values = function.__defaults__ or ()
+    for value in values:
+        if not isinstance(value, NUMBERS):
+            raise ArmidError(f"the equation {function.__qualname__} has the default {value!r}: a number is expected")
     arguments = definition.args
     arguments.args = [*arguments.posonlyargs, *arguments.args]
     arguments.posonlyargs = []
-    arguments.defaults = [default(value, function) for value in function.__defaults__ or ()]
+    arguments.defaults = [number(value) for value in values]
     return definition
-
-
-def default(value: Any, function: FunctionType) -> ast.expr:
-    """Return the expression of a default."""
-    if not isinstance(value, (bool, int, float, np.floating, np.integer)):
-        raise ArmidError(f"the equation {function.__qualname__} has the default {value!r}: a number is expected")
-    return number(value)
 
 
 def number(value: Any) -> ast.expr:
@@ -166,6 +102,66 @@ def number(value: Any) -> ast.expr:
     if math.isnan(plain):
         return ast.Attribute(ast.Name("np", ast.Load()), "nan", ast.Load())
     return ast.UnaryOp(ast.USub(), ast.Constant(-plain)) if plain < 0 else ast.Constant(plain)
+
+
+def call(function: str, *arguments: ast.expr) -> ast.Call:
+    """Return the expression `np.function(...)`."""
+    return ast.Call(ast.Attribute(ast.Name(NUMPY, ast.Load()), function, ast.Load()), list(arguments), [])
+
+
+class Vectorise(ast.NodeTransformer):
+    """Turn choices inside expressions into selections, and small whole powers into products."""
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        self.generic_visit(node)
+        return call("where", node.test, node.body, node.orelse)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        self.generic_visit(node)
+        name = "logical_and" if isinstance(node.op, ast.And) else "logical_or"
+        result = node.values[0]
+        for value in node.values[1:]:
+            result = call(name, result, value)
+        return result
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        self.generic_visit(node)
+        return call("logical_not", node.operand) if isinstance(node.op, ast.Not) else node
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        self.generic_visit(node)
+        lefts = [node.left, *node.comparators[:-1]]
+        result: ast.expr = ast.Compare(lefts[0], node.ops[:1], node.comparators[:1])
+        for left, operator, right in zip(lefts[1:], node.ops[1:], node.comparators[1:], strict=True):
+            result = call("logical_and", result, ast.Compare(left, [operator], [right]))
+        return result
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if not (isinstance(node.op, ast.Pow) and isinstance(node.right, ast.Constant)):
+            return node
+        square = call("square", node.left)
+        simple = {1: node.left, 2: square, 3: ast.BinOp(square, ast.Mult(), node.left), 4: call("square", square),
+                  0.5: call("sqrt", node.left), -1: ast.BinOp(ast.Constant(1.0), ast.Div(), node.left)}  # fmt: skip
+        value = node.right.value
+        return simple.get(value, node) if isinstance(value, (int, float)) else node
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+        """Turn x += y into x = x + y: lanes cannot be changed in place."""
+        if not isinstance(node.target, ast.Name):
+            return self.generic_visit(node)
+        value = ast.BinOp(ast.Name(node.target.id, ast.Load()), node.op, node.value)
+        return ast.Assign([node.target], self.visit(value))
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Nest min(a, b, c) and max(a, b, c): two at a time."""
+        self.generic_visit(node)
+        if not (isinstance(node.func, ast.Name) and node.func.id in ("min", "max") and len(node.args) > 2):
+            return node
+        result: ast.expr = node.args[0]
+        for value in node.args[1:]:
+            result = ast.Call(node.func, [result, value], [])
+        return result
 
 
 class Names(ast.NodeTransformer):
@@ -192,11 +188,11 @@ class Names(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         self.generic_visit(node)
         if isinstance(node.value, ast.Name) and node.value.id in ("np", "math"):
-            self.meet(getattr(np if node.value.id == "np" else math, node.attr, None))
+            self.note_call(getattr(np if node.value.id == "np" else math, node.attr, None))
         return node
 
-    def meet(self, called: Any) -> None:
-        """Note a function of numpy or math that lanes do not have."""
+    def note_call(self, called: Any) -> None:
+        """Note whether a function of numpy or math is one that lanes do not have."""
         self.is_scalar |= callable(called) and called not in LANE_FUNCTIONS
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -222,14 +218,13 @@ class Names(ast.NodeTransformer):
         """Return what stands for an outside name in the generated module."""
         if isinstance(value, ModuleType) and value in (np, math):
             return ast.Name("np" if value is np else "math", ast.Load())
-        if isinstance(value, (bool, int, float, np.floating, np.integer)):
+        if isinstance(value, NUMBERS):
             return number(value)
-        for module in (np, math):
-            called = getattr(value, "__name__", "")
+        called = getattr(value, "__name__", "")
+        for module, name_of_module in ((np, "np"), (math, "math")):
             if called and getattr(module, called, None) is value:
-                module_name = "np" if module is np else "math"
-                self.meet(value)
-                return ast.Attribute(ast.Name(module_name, ast.Load()), called, ast.Load())
+                self.note_call(value)
+                return ast.Attribute(ast.Name(name_of_module, ast.Load()), called, ast.Load())
         if isinstance(plain_function(value), FunctionType):
             helper = self.sources.add_helper(self.name, name, value)
             self.is_scalar |= helper in self.sources.by_lane

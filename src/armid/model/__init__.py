@@ -1,4 +1,8 @@
-"""What the machine is: equations, no numba, no files."""
+"""What the machine is: equations, no numba, no files.
+
+parameter, effect, plant: what is declared. graph: equations bound by argument name. model: a plant with effects.
+equations: what `print(model)` shows. catalogue, effects, plants: what there is.
+"""
 
 from armid.model.catalogue import EFFECTS, PLANTS
 from armid.model.effect import Effect, Guard, State

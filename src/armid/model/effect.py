@@ -78,14 +78,10 @@ class Effect:
             raise ArmidError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED)} are taken")
         if not self.adds:
             raise ArmidError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
-        names = [p.name for p in self.parameters] + [s.name for s in self.states]
-        names += [g.name for g in self.guards]
+        names = [*(p.name for p in self.parameters), *(s.name for s in self.states), *(g.name for g in self.guards)]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ArmidError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")
-        self._check_forms()
-
-    def _check_forms(self) -> None:
         words = [e.form for e in self.every_form]
         if any(e.name != self.name for e in self.forms):
             raise ArmidError(f"effect '{self.name}' has a form of another name: forms are found under one name")

@@ -97,9 +97,5 @@ def applicable(effects: Mapping[str, Effect], plant: Plant) -> dict[str, Effect]
 
     effects: name -> effect. An effect of which only another form fits comes in that form.
     """
-    found = {}
-    for name, effect in effects.items():
-        fitting = next((e for e in effect.every_form if not refusal_of(e, plant)), None)
-        if fitting is not None:
-            found[name] = fitting
-    return found
+    fitting = {name: [e for e in effect.every_form if not refusal_of(e, plant)] for name, effect in effects.items()}
+    return {name: forms[0] for name, forms in fitting.items() if forms}

@@ -1,6 +1,7 @@
-"""The natural sizes of a machine, so that one effect serves a 0.2 N m pendulum and a 600 N m arm."""
+"""Unknowns, and the natural sizes of a machine, so that one effect serves a 0.2 N m pendulum and a 600 N m arm."""
 
 import keyword
+import math
 import re
 from dataclasses import dataclass, replace
 from typing import Any
@@ -66,12 +67,10 @@ class Scales:
 
     @property
     def speed_unit(self) -> str:
-        """Unit of speed."""
         return f"{self.length_unit}/s"
 
     @property
     def inertia_unit(self) -> str:
-        """Unit of effort over acceleration."""
         return "kg" if self.length_unit == "m" else "kg m2"
 
 
@@ -108,9 +107,7 @@ def resolve(parameter: Parameter, scales: Scales) -> Parameter:
     if powers is None:
         return parameter
     sizes = {"effort": scales.effort, "speed": scales.speed, "inertia": scales.effort / scales.speed}
-    size = 1.0
-    for word, power in powers.items():
-        size *= sizes.get(word, 1.0) ** power
+    size = math.prod(sizes.get(word, 1.0) ** power for word, power in powers.items())
     values = {name: getattr(parameter, name) for name in ("low", "high", "null", "fixed", "nominal")}
     scaled: dict[str, Any] = {name: None if value is None else value * size for name, value in values.items()}
     return replace(parameter, unit=physical_unit(powers, scales), **scaled)

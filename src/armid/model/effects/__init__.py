@@ -1,1 +1,21 @@
-"""The library of effects, one file a family."""
+"""The library of effects, one file a family, and what several families share.
+
+friction, bodies (with gravity), drive (with gear), motor (with supply), balance, control, sensor.
+"""
+
+from armid.model.parameter import Parameter
+
+SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
+SIZE_WIDTH = Parameter(
+    "width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the size of speed is smoothed"
+)
+
+
+def zero():
+    """Return 0: nothing has happened before the start."""
+    return 0.0
+
+
+def start_speed(omega):
+    """Return the speed: what follows it has settled before the start."""
+    return omega

@@ -3,60 +3,53 @@
 import numpy as np
 
 from armid.model.effect import Effect, Guard, State
-from armid.model.effects.sensor import output_lag_lagging_rate, output_lag_settled
-from armid.model.effects.sensor import output_lag_output as feedback
+from armid.model.effects import start_speed, zero
+from armid.model.effects.sensor import lag_error, lagging_rate
 from armid.model.parameter import Parameter
 
 tachometer_lag = Effect(
-    name="tachometer_lag",
+    name="tachometer_lag", adds={"feedback": lag_error}, states=(State("lagging", "rad/s", lagging_rate, start_speed),),
     parameters=(Parameter("time_constant", "s", 0.0, 0.03, null=0.0, note="of the tachometer's filter"),),
-    adds={"feedback": feedback},
-    states=(State("lagging", "rad/s", output_lag_lagging_rate, output_lag_settled),),
     note="the speed that is fed back lags",
     source="Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 5",
-)
+)  # fmt: skip
 
 
-# The tachometer tells a speed when there is none (Doebelin, Measurement Systems, chapter 4).
-#
-# An offset of the angle that the control measures does the same to the demand: K_p times the angle is K_d k times this.
+def feedback_offset(offset):
+    """Speed that the control sees less the true one [rad/s], constant.
 
-
-def tachometer_offset_feedback(offset):
-    """Speed that the control sees less the true one [rad/s], constant."""
+    An offset of the angle that the control measures does the same to the demand: K_p times the angle is K_d k times
+    this.
+    """
     return offset
 
 
 tachometer_offset = Effect(
-    name="tachometer_offset",
+    name="tachometer_offset", adds={"feedback": feedback_offset},
     parameters=(Parameter("offset", "speed", -0.1, 0.1, null=0.0, note="1 deg/s is 0.0175 rad/s"),),
-    adds={"feedback": tachometer_offset_feedback},
     note="constant error of the speed that is fed back",
     source="Doebelin, Measurement Systems, chapter 4 (tachometer generators)",
-)
+)  # fmt: skip
 
 
-# The tachometer's voltage ripples with the turn of the motor (Doebelin, Measurement Systems, chapter 4).
-#
-# The ripple of a commutator or of an eccentric coupling is a share of the voltage, so that it grows with the speed.
+def feedback_ripple(omega, theta, i1, sine, cosine, order):
+    """Speed that the control sees less the true one [rad/s], omega (sine sin a + cosine cos a), a = order i1 theta.
 
-
-def tachometer_ripple_feedback(omega, theta, i1, sine, cosine, order):
-    """Speed that the control sees less the true one [rad/s], omega (sine sin a + cosine cos a), a = order i1 theta."""
+    The ripple of a commutator or of an eccentric coupling is a share of the voltage, so that it grows with the speed.
+    """
     return omega * (sine * np.sin(order * i1 * theta) + cosine * np.cos(order * i1 * theta))
 
 
 tachometer_ripple = Effect(
-    name="tachometer_ripple",
+    name="tachometer_ripple", adds={"feedback": feedback_ripple},
     parameters=(
         Parameter("sine", "1", -0.15, 0.15, null=0.0, note="amplitude of the sine, as a share of the speed"),
         Parameter("cosine", "1", -0.15, 0.15, null=0.0, note="amplitude of the cosine, as a share of the speed"),
         Parameter("order", "1", 0.5, 4.5, nominal=1.0, note="waves in a turn of the motor"),
     ),
-    adds={"feedback": tachometer_ripple_feedback},
     note="the speed that is fed back ripples with the turn of the motor",
     source="Doebelin, Measurement Systems, chapter 4 (tachometer generators)",
-)
+)  # fmt: skip
 
 
 # The control acts late: the switch and every command come a dead time after what was measured.
@@ -73,9 +66,7 @@ tachometer_ripple = Effect(
 # after the dead time its switch waits for the next sample, and the hold is late by half a period on average. Of the
 # hold alone the approximation is 1 / (1 + T s/2 + T^2 s^2/12), T the period, the one of (1 - exp(-T s)) / (T s);
 # where it is a part h of the lateness, T and the equations lie between the two, right to s^2. A period of 0 does not
-# sample. Source: Golub and Van Loan, Matrix Computations, section 9.3 (Pade); Astrom and Murray, Feedback Systems,
-# chapter 9; Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 4 (hold).
-
+# sample. Source of the hold: Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 4.
 SHORT = 1e-4
 
 
@@ -95,13 +86,13 @@ def filter_time(delay, period):
     return np.maximum(lateness(delay, period) * (6 + 2 * h**2) / (3 + np.sqrt(9 - 6 * h - 2 * h**3)), 2e-3)
 
 
-def controller_delay_feedback(delay, period, omega, smooth, slope):
+def late_feedback(delay, period, omega, smooth, slope):
     """Speed that the control sees less the true one [rad/s], h (w - omega) - (lateness - h T/2) dw/dt."""
     h = held_part(delay, period)
     return h * (smooth - omega) - (lateness(delay, period) - 0.5 * h * filter_time(delay, period)) * slope
 
 
-def controller_delay_command(
+def late_command(
     closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, delay, period, smooth, slope
 ):
     """Voltage to add to the demand [V]: K_p times the late angle's lag; what makes it full until the late switch."""
@@ -131,16 +122,6 @@ def clock_rate():
     return 1.0
 
 
-def settled(omega):
-    """Return the speed: the filter has settled."""
-    return omega
-
-
-def level():
-    """Return 0: nothing accelerates before the start."""
-    return 0.0
-
-
 def waited(theta_C, theta_D, delta_E, delay):
     """Return 0, or the whole dead time where the loop is closed from the start."""
     return np.where(np.abs(theta_D - theta_C) <= delta_E, delay, 0.0)
@@ -154,22 +135,21 @@ def still_to_wait(closed, delay, period, waiting, clock):
 
 
 controller_delay = Effect(
-    name="controller_delay",
+    name="controller_delay", adds={"feedback": late_feedback, "command": late_command},
+    states=(
+        State("smooth", "rad/s", smooth_rate, start_speed),
+        State("slope", "rad/s2", slope_rate, zero),
+        State("waiting", "s", waiting_rate, waited),
+        State("clock", "s", clock_rate, zero),
+    ),
+    guards=(Guard("acting", still_to_wait, latch=True),),
     parameters=(
         Parameter("delay", "s", 0.0, 0.03, null=0.0, note="dead time of the control"),
         Parameter("period", "s", 0.0, 0.03, null=0.0, fixed=0.0, note="between samples of a digital control"),
     ),
-    adds={"feedback": controller_delay_feedback, "command": controller_delay_command},
-    states=(
-        State("smooth", "rad/s", smooth_rate, settled),
-        State("slope", "rad/s2", slope_rate, level),
-        State("waiting", "s", waiting_rate, waited),
-        State("clock", "s", clock_rate, level),
-    ),
-    guards=(Guard("acting", still_to_wait, latch=True),),
     note="the control switches and commands late",
     source="Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9",
-)
+)  # fmt: skip
 
 
 def position_gain_command(K_p, theta_D, theta, error):
@@ -178,9 +158,10 @@ def position_gain_command(K_p, theta_D, theta, error):
 
 
 position_gain = Effect(
-    name="position_gain",
+    name="position_gain", adds={"command": position_gain_command},
     parameters=(Parameter("error", "1", -0.4, 0.4, null=0.0, note="relative error of K_p"),),
-    adds={"command": position_gain_command},
     note="the position loop is stiffer or softer than declared",
     source="Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems, chapter 4",
-)
+)  # fmt: skip
+
+EFFECTS = (tachometer_lag, tachometer_offset, tachometer_ripple, controller_delay, position_gain)

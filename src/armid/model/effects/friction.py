@@ -3,6 +3,7 @@
 import numpy as np
 
 from armid.model.effect import Effect, State
+from armid.model.effects import SIGN_WIDTH, SIZE_WIDTH
 from armid.model.parameter import Parameter
 
 
@@ -12,40 +13,31 @@ def coulomb_torque(omega, level, width):
 
 
 coulomb = Effect(
-    name="coulomb",
-    parameters=(
-        Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction at any speed"),
-        Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed"),
-    ),
-    adds={"torque": coulomb_torque},
-    note="friction of constant size against the motion",
-    source="doi:10.1016/0005-1098(94)90209-7",
-)
-
-
-# The excess of friction at low speed (Stribeck 1902; Armstrong-Helouvry, Dupont, Canudas de Wit 1994).
-#
-# The excess alone: it composes with `coulomb`, which is the friction that stays. Published exponents of the speed reach
-# from 1/2 (Bo and Pavelescu 1982) over 1 (Tustin 1947) to 2 (Armstrong-Helouvry).
+    name="coulomb", adds={"torque": coulomb_torque},
+    parameters=(Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction at any speed"), SIGN_WIDTH),
+    note="friction of constant size against the motion", source="doi:10.1016/0005-1098(94)90209-7",
+)  # fmt: skip
 
 
 def stribeck_torque(omega, level, fade, exponent, width):
-    """Effort of the excess, -level exp(-abs(omega/fade)^exponent) sign(omega), the sign smoothed over width."""
+    """Effort of the excess, -level exp(-abs(omega/fade)^exponent) sign(omega), the sign smoothed over width.
+
+    The excess alone (Stribeck 1902): it composes with `coulomb`, which is the friction that stays. Published exponents
+    reach from 1/2 (Bo and Pavelescu 1982) over 1 (Tustin 1947) to 2 (Armstrong-Helouvry).
+    """
     return -level * np.exp(-(((omega / fade) ** 2) ** (0.5 * exponent))) * omega / np.sqrt(omega**2 + width**2)
 
 
 stribeck = Effect(
-    name="stribeck",
+    name="stribeck", adds={"torque": stribeck_torque},
     parameters=(
         Parameter("level", "effort", 0.0, 0.5, null=0.0, note="excess of friction at rest over friction in motion"),
         Parameter("fade", "speed", 0.02, 0.5, nominal=0.08, note="speed at which the excess has faded to 1/e"),
         Parameter("exponent", "1", 0.5, 2.0, fixed=2.0, note="power of the speed in the exponential"),
-        Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed"),
+        SIGN_WIDTH,
     ),
-    adds={"torque": stribeck_torque},
-    note="friction that is higher at low speed",
-    source="doi:10.1016/0005-1098(94)90209-7",
-)
+    note="friction that is higher at low speed", source="doi:10.1016/0005-1098(94)90209-7",
+)  # fmt: skip
 
 
 def viscous_torque(omega, slope):
@@ -54,84 +46,66 @@ def viscous_torque(omega, slope):
 
 
 viscous = Effect(
-    name="viscous",
+    name="viscous", adds={"torque": viscous_torque},
     parameters=(Parameter("slope", "effort/speed", 0.0, 0.5, null=0.0, note="friction per speed"),),
-    adds={"torque": viscous_torque},
-    note="friction in proportion to speed",
-    source="doi:10.1016/0005-1098(94)90209-7",
-)
-
-
-# Viscous friction that differs between the directions of motion; `torque_offset` is its Coulomb half.
-#
-# Source: Janot, Gautier, Brunot 2019, Workshop on Nonlinear System Identification Benchmarks (asymmetric friction).
+    note="friction in proportion to speed", source="doi:10.1016/0005-1098(94)90209-7",
+)  # fmt: skip
 
 
 def asymmetric_viscous_torque(omega, slope, width):
-    """Effort of the difference, -slope abs(omega): slopes are b + slope forwards, b - slope backwards; abs smoothed."""
+    """Effort of the difference, -slope abs(omega): slopes are b + slope forwards, b - slope backwards; abs smoothed.
+
+    `torque_offset` is the Coulomb half of such a difference.
+    """
     return -slope * omega**2 / np.sqrt(omega**2 + width**2)
 
 
 asymmetric_viscous = Effect(
-    name="asymmetric_viscous",
+    name="asymmetric_viscous", adds={"torque": asymmetric_viscous_torque},
     parameters=(
         Parameter("slope", "effort/speed", -0.3, 0.3, null=0.0, note="half the difference of the two slopes"),
-        Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the size of speed is smoothed"),
+        SIZE_WIDTH,
     ),
-    adds={"torque": asymmetric_viscous_torque},
     note="viscous friction that differs between the directions",
     source="Janot, Gautier, Brunot 2019, Nonlinear System Identification Benchmarks",
-)
+)  # fmt: skip
 
 
-def quadratic_drag_torque(omega, c):
+def drag_torque(omega, c):
     """Effort of drag, -c omega abs(omega)."""
     return -c * omega * np.abs(omega)
 
 
 quadratic_drag = Effect(
-    name="quadratic_drag",
+    name="quadratic_drag", adds={"torque": drag_torque},
     parameters=(Parameter("c", "effort/speed^2", 0.0, 0.5, null=0.0, note="drag per square of speed"),),
-    adds={"torque": quadratic_drag_torque},
-    note="drag in proportion to the square of speed",
-    source="White, Fluid Mechanics, chapter 7 (drag of bodies)",
-)
-
-
-# Friction in proportion to the load that a gear carries.
-#
-# The load is the mean of what the drive puts in and what it works against, abs(drive - load)/2; a plant without
-# `load_effort` carries what the drive puts in, by half. Source: Duclusaud, Passault, Padois, Ly 2024, Extended friction
-# models for the physics simulation of servo actuators, arXiv:2410.08650 (their coefficient is half of `share`).
+    note="drag in proportion to the square of speed", source="White, Fluid Mechanics, chapter 7 (drag of bodies)",
+)  # fmt: skip
 
 
 def load_friction_torque(omega, drive_effort, share, width, least, load_effort=0.0):
-    """Effort of the friction, -share abs(load) sign(omega), load = (drive - load)/2; abs and sign smoothed."""
+    """Effort of the friction, -share abs(load) sign(omega), load = (drive - load)/2; abs and sign smoothed.
+
+    A gear carries the mean of what the drive puts in and what it works against; a plant without `load_effort` carries
+    what the drive puts in, by half. The coefficient of the source is half of `share`.
+    """
     load = 0.5 * (drive_effort - load_effort)
     return -share * load**2 / np.sqrt(load**2 + least**2) * omega / np.sqrt(omega**2 + width**2)
 
 
 load_friction = Effect(
-    name="load_friction",
+    name="load_friction", adds={"torque": load_friction_torque},
     parameters=(
         Parameter("share", "1", 0.0, 1.0, null=0.0, note="friction per load"),
-        Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed"),
+        SIGN_WIDTH,
         Parameter("least", "effort", 0.0005, 0.05, fixed=0.005, note="load over which its size is smoothed"),
     ),
-    adds={"torque": load_friction_torque},
-    note="friction in proportion to the load of the gear",
-    source="arXiv:2410.08650",
-)
-
-
-# Friction builds up over a short way after each reversal (Dahl 1968; Olsson et al. 1998, section 3).
-#
-# z is the share of the full friction: dz/dt = (omega - abs(omega) z) / way, so that z goes to sign(omega) over the way.
-# It is Coulomb friction with hysteresis instead of a jump.
+    note="friction in proportion to the load of the gear", source="arXiv:2410.08650",
+)  # fmt: skip
 
 
 def presliding_torque(level, share):
-    """Effort of the friction, -level share."""
+    """Effort of the friction, -level share: Coulomb friction with hysteresis instead of a jump (Dahl 1968)."""
     return -level * share
 
 
@@ -140,105 +114,83 @@ def share_rate(omega, share, way, width):
     return (omega - omega**2 / np.sqrt(omega**2 + width**2) * share) / way
 
 
-def strained(omega, width):
+def full_share(omega, width):
     """Return sign(omega), smoothed: what moves at the start has done so for longer than the way; at rest 0."""
     return omega / np.sqrt(omega**2 + width**2)
 
 
 presliding = Effect(
-    name="presliding",
+    name="presliding", adds={"torque": presliding_torque}, states=(State("share", "1", share_rate, full_share),),
     parameters=(
         Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction after the way"),
         Parameter("way", "speed*s", 0.001, 0.1, nominal=0.01, note="over which friction builds up to 63 %"),
-        Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the size of speed is smoothed"),
+        SIZE_WIDTH,
     ),
-    adds={"torque": presliding_torque},
-    states=(State("share", "1", share_rate, strained),),
-    note="friction that builds up after each reversal",
-    source="doi:10.1016/S0947-3580(98)70113-X",
-)
+    note="friction that builds up after each reversal", source="doi:10.1016/S0947-3580(98)70113-X",
+)  # fmt: skip
 
 
-# Friction of the seals of the balance machine's piston: a force at its lever.
-#
-# Source: Merritt, Hydraulic Control Systems (Wiley 1967), friction of pistons.
-
-
-def seal_friction_torque(omega, l, force, width):
+def seal_torque(omega, l, force, width):
     """Torque of the seals [N m], -force l sign(omega), the sign smoothed over width; l is the piston's lever [m]."""
     return -force * l * omega / np.sqrt(omega**2 + width**2)
 
 
 seal_friction = Effect(
-    name="seal_friction",
-    parameters=(
-        Parameter("force", "N", 0.0, 2000.0, null=0.0, note="friction of the seals on the piston"),
-        Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed"),
-    ),
-    adds={"torque": seal_friction_torque},
-    note="friction of the piston's seals, through its lever",
-    source="Merritt, Hydraulic Control Systems, Wiley 1967",
-)
-
-
-# Constant effort: an unbalanced weight, an offset of the drive, unequal Coulomb friction in the two directions.
-#
-# Source: Janot, Gautier, Brunot 2019, Workshop on Nonlinear System Identification Benchmarks (the term `offset`).
+    name="seal_friction", adds={"torque": seal_torque},
+    parameters=(Parameter("force", "N", 0.0, 2000.0, null=0.0, note="friction of the seals on the piston"), SIGN_WIDTH),
+    note="friction of the piston's seals, through its lever", source="Merritt, Hydraulic Control Systems, Wiley 1967",
+)  # fmt: skip
 
 
 def offset_torque(level):
-    """Effort that does not depend on the motion, +level."""
+    """Effort that does not depend on the motion, +level.
+
+    An unbalanced weight, an offset of the drive, unequal Coulomb friction in the two directions.
+    """
     return level
 
 
 torque_offset = Effect(
-    name="torque_offset",
+    name="torque_offset", adds={"torque": offset_torque},
     parameters=(Parameter("level", "effort", -0.2, 0.2, null=0.0, note="constant effort"),),
-    adds={"torque": offset_torque},
     note="constant effort on the shaft",
     source="Janot, Gautier, Brunot 2019, Nonlinear System Identification Benchmarks",
-)
+)  # fmt: skip
 
 
-# Torque that repeats with position: cogging, pole pairs, teeth, an eccentric wheel, the pitch of a screw.
-#
-# Source: Holtz and Springob 1996, Identification and compensation of torque ripple in high-precision permanent magnet
-# motor drives, IEEE Trans. Industrial Electronics 43(2).
+def ripple_torque(theta, sine, cosine, waves):
+    """Effort of one harmonic, sine sin(waves theta) + cosine cos(waves theta).
 
-
-def torque_ripple_torque(theta, sine, cosine, waves):
-    """Effort of one harmonic, sine sin(waves theta) + cosine cos(waves theta)."""
+    Cogging, pole pairs, teeth, an eccentric wheel, the pitch of a screw. A wave as long as the motion is no ripple, and
+    could stand for anything that depends on position: hence `waves` from 20.
+    """
     return sine * np.sin(waves * theta) + cosine * np.cos(waves * theta)
 
 
-# A wave as long as the motion is no ripple, and could stand for anything that depends on position: hence from 20.
 torque_ripple = Effect(
-    name="torque_ripple",
+    name="torque_ripple", adds={"torque": ripple_torque},
     parameters=(
         Parameter("sine", "effort", -0.2, 0.2, null=0.0, note="amplitude of the sine"),
         Parameter("cosine", "effort", -0.2, 0.2, null=0.0, note="amplitude of the cosine"),
         Parameter("waves", "1/speed/s", 20.0, 500.0, nominal=50.0, note="2 pi per period of position"),
     ),
-    adds={"torque": torque_ripple_torque},
     note="torque that repeats with position",
     source="Holtz and Springob 1996, IEEE Trans. Industrial Electronics 43(2)",
-)
+)  # fmt: skip
 
 
-# Cables and hoses pull back in proportion to position; with `torque_offset` the spring rests elsewhere than at 0.
-#
-# Source: Siciliano and Khatib, Springer Handbook of Robotics, doi:10.1007/978-3-319-32552-1, chapter 6.
-
-
-def position_spring_torque(theta, stiffness):
-    """Effort of the spring, -stiffness theta."""
+def spring_torque(theta, stiffness):
+    """Effort of the spring, -stiffness theta; with `torque_offset` it rests elsewhere than at 0."""
     return -stiffness * theta
 
 
 position_spring = Effect(
-    name="position_spring",
+    name="position_spring", adds={"torque": spring_torque},
     parameters=(Parameter("stiffness", "effort/speed/s", -0.5, 0.5, null=0.0, note="negative: it drives outwards"),),
-    adds={"torque": position_spring_torque},
-    note="effort in proportion to position, as of cables",
-    source="doi:10.1007/978-3-319-32552-1",
-)
+    note="effort in proportion to position, as of cables", source="doi:10.1007/978-3-319-32552-1",
+)  # fmt: skip
+
+EFFECTS = (
+    coulomb, stribeck, viscous, asymmetric_viscous, quadratic_drag, load_friction, presliding, seal_friction,
+    torque_offset, torque_ripple, position_spring,
+)  # fmt: skip

@@ -32,16 +32,16 @@ def position_rate(v):
     return v
 
 
+def first_position(start_position):
+    return start_position
+
+
 def linear_speed_rate(drive_effort, drive, gravity_effort, torque, mass):
     return (drive_effort + drive + gravity_effort + torque) / mass
 
 
 def rotary_speed_rate(drive_effort, drive, gravity_effort, torque, inertia):
     return (drive_effort + drive + gravity_effort + torque) / inertia
-
-
-def first_position(start_position):
-    return start_position
 
 
 def first_speed(start_speed):

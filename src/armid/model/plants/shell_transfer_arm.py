@@ -197,6 +197,32 @@ def current_sign(current):
     return current
 
 
+QUANTITIES = (
+    arm_inertia, total_inertia, gravity_moment, gravity_level, gravity_upright, gravity_torque, squeeze, piston_moment,
+    balance_torque, direction, damping, demand, voltage, field_flux, back_emf, motor_torque, drive_ratio, drive_effort,
+    load_effort, recorded_speed,
+)  # fmt: skip
+PORTS = {
+    "torque": "N m", "gravity": "rad", "inertia": "kg m2", "drive": "N m", "flux": "Wb", "winding": "V", "supply": "V",
+    "gas": "Pa", "feedback": "rad/s", "command": "V", "output": "rad/s",
+}  # fmt: skip
+ALIASES = {
+    "I": "current", "speed": "omega", "angle": "theta", "position": "theta", "gravity_effort": "gravity_torque",
+    "T_d": "motor_torque",
+}  # fmt: skip
+# Value and unit of every constant that the paper does not print.
+MECHANICAL = {
+    "I01": (2.0e-3, "kg m2"), "I23": (4.0e-3, "kg m2"), "I45": (1.2e-2, "kg m2"),
+    "I6_loaded": (64.0, "kg m2"), "I6_empty": (31.1, "kg m2"), "i1": (120.0, "1"), "i2": (60.0, "1"),
+    "i3": (24.0, "1"), "eta1": (0.97, "1"), "eta2": (0.97, "1"), "m_loaded": (118.0, "kg"),
+    "m_empty": (72.5, "kg"), "L_loaded": (0.58, "m"), "L_empty": (0.4106, "m"),
+    "alpha": (5.0 * DEGREE, "rad"),
+}  # fmt: skip
+GAS_AND_DRIVE = {
+    "l": (0.060, "m"), "S": (1.9635e-3, "m2"), "V0": (0.40e-3, "m3"), "theta_A": (-55.0 * DEGREE, "rad"),
+    "R": (0.40, "ohm"), "L_a": (2.0e-3, "H"), "K": (4.5e-5, "Wb/A"), "C_e": (20.0, "1"), "C_T": (20.0, "1"),
+    "K_p": (280.0, "V/rad"), "K_d": (70.0, "V s/rad"), "u_th": (0.5, "V"), "delta_E": (25.0 * DEGREE, "rad"),
+}  # fmt: skip
 ESTIMATE = "estimate (REF), not published"
 
 shell_transfer_arm = Plant(
@@ -217,79 +243,17 @@ shell_transfer_arm = Plant(
         State("compression", "1", compression_rate, start_compression),
         State("pressure", "Pa", pressure_rate, start_pressure),
     ),
-    quantities={
-        f.__name__: f
-        for f in (
-            arm_inertia,
-            total_inertia,
-            gravity_moment,
-            gravity_level,
-            gravity_upright,
-            gravity_torque,
-            squeeze,
-            piston_moment,
-            balance_torque,
-            direction,
-            damping,
-            demand,
-            voltage,
-            field_flux,
-            back_emf,
-            motor_torque,
-            drive_ratio,
-            drive_effort,
-            load_effort,
-            recorded_speed,
-        )
-    },
+    quantities={f.__name__: f for f in QUANTITIES},
     constants=(
-        Constant("I01", 2.0e-3, "kg m2", ESTIMATE),
-        Constant("I23", 4.0e-3, "kg m2", ESTIMATE),
-        Constant("I45", 1.2e-2, "kg m2", ESTIMATE),
-        Constant("I6_loaded", 64.0, "kg m2", ESTIMATE),
-        Constant("I6_empty", 31.1, "kg m2", ESTIMATE),
-        Constant("i1", 120.0, "1", ESTIMATE),
-        Constant("i2", 60.0, "1", ESTIMATE),
-        Constant("i3", 24.0, "1", ESTIMATE),
-        Constant("eta1", 0.97, "1", ESTIMATE),
-        Constant("eta2", 0.97, "1", ESTIMATE),
-        Constant("m_loaded", 118.0, "kg", ESTIMATE),
-        Constant("m_empty", 72.5, "kg", ESTIMATE),
-        Constant("L_loaded", 0.58, "m", ESTIMATE),
-        Constant("L_empty", 0.4106, "m", ESTIMATE),
-        Constant("alpha", 5.0 * DEGREE, "rad", ESTIMATE),
+        *(Constant(name, *known, ESTIMATE) for name, known in MECHANICAL.items()),
         Constant("g", 9.81, "m/s2"),
-        Constant("l", 0.060, "m", ESTIMATE),
-        Constant("S", 1.9635e-3, "m2", ESTIMATE),
-        Constant("V0", 0.40e-3, "m3", ESTIMATE),
-        Constant("theta_A", -55.0 * DEGREE, "rad", ESTIMATE),
-        Constant("R", 0.40, "ohm", ESTIMATE),
-        Constant("L_a", 2.0e-3, "H", ESTIMATE),
-        Constant("K", 4.5e-5, "Wb/A", ESTIMATE),
-        Constant("C_e", 20.0, "1", ESTIMATE),
-        Constant("C_T", 20.0, "1", ESTIMATE),
-        Constant("K_p", 280.0, "V/rad", ESTIMATE),
-        Constant("K_d", 70.0, "V s/rad", ESTIMATE),
-        Constant("u_th", 0.5, "V", ESTIMATE),
-        Constant("delta_E", 25.0 * DEGREE, "rad", ESTIMATE),
+        *(Constant(name, *known, ESTIMATE) for name, known in GAS_AND_DRIVE.items()),
         Constant("theta_C", -48.0 * DEGREE, "rad", "start angle of the manoeuvre"),
         Constant("theta_D", 22.0 * DEGREE, "rad", "target angle of the manoeuvre"),
         Constant("shell", 1.0, "1", "1 with the shell, 0 without"),
         Constant("U", 28.0, "V", "supply voltage of the manoeuvre"),
     ),
-    ports={
-        "torque": "N m",
-        "gravity": "rad",
-        "inertia": "kg m2",
-        "drive": "N m",
-        "flux": "Wb",
-        "winding": "V",
-        "supply": "V",
-        "gas": "Pa",
-        "feedback": "rad/s",
-        "command": "V",
-        "output": "rad/s",
-    },
+    ports=PORTS,
     guards=(
         Guard("closed", distance_to_switch, latch=True),
         Guard("dead_zone_low", dead_zone_low),
@@ -304,14 +268,7 @@ shell_transfer_arm = Plant(
         ManoeuvreKey("shell", "shell", boolean=True, required=True),
         ManoeuvreKey("supply_V", "U", 1.0, 1.0, 100.0, required=True),
     ),
-    aliases={
-        "I": "current",
-        "speed": "omega",
-        "angle": "theta",
-        "position": "theta",
-        "gravity_effort": "gravity_torque",
-        "T_d": "motor_torque",
-    },
+    aliases=ALIASES,
     output="recorded_speed",
     output_unit="rad/s",
     scales=Scales(effort=1000.0, speed=2.0, effort_unit="N m", length_unit="rad"),

@@ -1,13 +1,16 @@
 """A driven axis against motions that can be written down: inputs, holds, friction, a pendulum."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from armid.contract.reference import simulate_plainly
 from armid.engine import Schedule, Simulation, calibrate, simulate
-from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS, Input, Manoeuvre, Model, Parameter, Plant, Scales, State
 
 Array = NDArray[np.float64]
 INTERVAL, N_SAMPLES = 0.01, 201
@@ -28,55 +31,36 @@ def move(axis: Model, drive: Array, level: float = 0.0, slope: float = 0.0, offs
     return simulate(axis, manoeuvre, [MASS, level, 0.005, slope, offset], Schedule(substeps), states=True)
 
 
-def test_a_constant_force_accelerates(axis: Model) -> None:
-    found = move(axis, np.full(N_SAMPLES, 2.0), substeps=1)
-    np.testing.assert_allclose(found.output[0], 2.0 * TIMES / MASS, rtol=1e-13)
-    np.testing.assert_allclose(found.states["q"][0], TIMES**2 / MASS, rtol=1e-12)
+RANDOM = np.random.default_rng(1).normal(size=N_SAMPLES)
+ZERO, LAG = np.zeros(N_SAMPLES), MASS / 6.0
+FALLING = 1.5 * np.exp(-TIMES / LAG)
+# Drive, options of `move`, the speed in closed form, its relative and absolute tolerance.
+CLOSED_FORMS = {
+    "constant force": (np.full(N_SAMPLES, 2.0), {"substeps": 1}, 2.0 * TIMES / MASS, 1e-13, 0.0),
+    "constant effort": (ZERO, {"offset": -0.7}, -0.7 * TIMES / MASS, 1e-12, 0.0),
+    "gain": (np.full(N_SAMPLES, 2.0), {"gain": -35.0}, -70.0 * TIMES / MASS, 1e-12, 0.0),
+    "ramp": (5.0 * TIMES, {"substeps": 1}, 2.5 * TIMES**2 / MASS, 1e-12, 1e-15),
+    "viscous friction": (ZERO, {"slope": 6.0, "start_speed": 1.5, "start_position": -2.0}, FALLING, 1e-8, 0.0),
+    "viscous friction under a ramp": (
+        4.0 * TIMES, {"slope": 6.0}, 4.0 / 6.0 * (TIMES - LAG * (1.0 - np.exp(-TIMES / LAG))), 0.0, 1e-9),
+    # Between samples the drive runs straight, or keeps its last sample: the trapezoidal sum, or that of stairs.
+    **{f"{hold} {n}": (RANDOM, {"substeps": n, "hold": hold}, np.append(0.0, np.cumsum(push)) * INTERVAL / MASS,
+                       1e-12, 1e-14)
+       for hold, push in (("linear", 0.5 * (RANDOM[1:] + RANDOM[:-1])), ("zero", RANDOM[:-1])) for n in (1, 3)},
+}  # fmt: skip
 
 
-def test_a_constant_effort_does_what_a_drive_does(axis: Model) -> None:
-    found = move(axis, np.zeros(N_SAMPLES), offset=-0.7)
-    np.testing.assert_allclose(found.output[0], -0.7 * TIMES / MASS, rtol=1e-12)
+@pytest.mark.parametrize("case", CLOSED_FORMS)
+def test_the_speed_is_that_of_the_closed_form(axis: Model, case: str) -> None:
+    drive, options, expected, relative, absolute = CLOSED_FORMS[case]
+    np.testing.assert_allclose(move(axis, drive, **options).output[0], expected, rtol=relative, atol=absolute)
 
 
-def test_gain_turns_the_drive_into_effort(axis: Model) -> None:
-    found = move(axis, np.full(N_SAMPLES, 2.0), gain=-35.0)
-    np.testing.assert_allclose(found.output[0], -70.0 * TIMES / MASS, rtol=1e-12)
-
-
-def test_a_ramp_is_integrated_exactly(axis: Model) -> None:
-    found = move(axis, 5.0 * TIMES, substeps=1)
-    np.testing.assert_allclose(found.output[0], 2.5 * TIMES**2 / MASS, rtol=1e-12, atol=1e-15)
-
-
-@pytest.mark.parametrize("substeps", [1, 3])
-def test_between_samples_the_drive_runs_straight(axis: Model, substeps: int) -> None:
-    """A drive of arbitrary samples gives the trapezoidal sum."""
-    drive = np.random.default_rng(1).normal(size=N_SAMPLES)
-    expected = np.concatenate([[0.0], np.cumsum(0.5 * (drive[1:] + drive[:-1]))]) * INTERVAL / MASS
-    np.testing.assert_allclose(move(axis, drive, substeps=substeps).output[0], expected, rtol=1e-12, atol=1e-14)
-
-
-@pytest.mark.parametrize("substeps", [1, 3])
-def test_with_zero_hold_the_drive_keeps_its_last_sample(axis: Model, substeps: int) -> None:
-    drive = np.random.default_rng(2).normal(size=N_SAMPLES)
-    expected = np.concatenate([[0.0], np.cumsum(drive[:-1])]) * INTERVAL / MASS
-    found = move(axis, drive, substeps=substeps, hold="zero")
-    np.testing.assert_allclose(found.output[0], expected, rtol=1e-12, atol=1e-14)
-
-
-def test_viscous_friction_slows_down_exponentially(axis: Model) -> None:
-    found = move(axis, np.zeros(N_SAMPLES), slope=6.0, start_speed=1.5, start_position=-2.0)
-    speed = 1.5 * np.exp(-6.0 * TIMES / MASS)
-    np.testing.assert_allclose(found.output[0], speed, rtol=1e-8)
-    np.testing.assert_allclose(found.states["q"][0], -2.0 + MASS / 6.0 * (1.5 - speed), rtol=1e-8)
-
-
-def test_viscous_friction_against_a_ramp(axis: Model) -> None:
-    """v = a/c (t - m/c (1 - exp(-c t/m)))."""
-    found = move(axis, 4.0 * TIMES, slope=6.0)
-    lag = MASS / 6.0
-    np.testing.assert_allclose(found.output[0], 4.0 / 6.0 * (TIMES - lag * (1.0 - np.exp(-TIMES / lag))), atol=1e-9)
+def test_the_position_is_the_integral_of_the_speed(axis: Model) -> None:
+    found = move(axis, np.full(N_SAMPLES, 2.0), substeps=1).states["q"][0]
+    np.testing.assert_allclose(found, TIMES**2 / MASS, rtol=1e-12)
+    slowing = move(axis, ZERO, slope=6.0, start_speed=1.5, start_position=-2.0).states["q"][0]
+    np.testing.assert_allclose(slowing, -2.0 + LAG * (1.5 - FALLING), rtol=1e-8)
 
 
 def test_coulomb_friction_stops_the_mass_and_leaves_it_there(axis: Model) -> None:
@@ -145,3 +129,61 @@ def test_an_axis_in_radians_obeys_the_same_equations(axis: Model) -> None:
     found = simulate(turning, manoeuvre, [[MASS]], Schedule(4))
     along = move(axis, np.sin(7.0 * TIMES), gravity_moment=3.0)
     np.testing.assert_allclose(found.output, along.output, atol=1e-13)
+
+
+# Inputs that run straight between samples beside inputs that keep their last value.
+N_SWITCHED, OFF = 101, 40
+SWITCHED = INTERVAL * np.arange(N_SWITCHED)
+
+
+def speed_rate(push, on, mass):
+    return push * on / mass
+
+
+def at_rest():
+    return 0.0
+
+
+def recorded(v, on):
+    return v + 0.5 * on
+
+
+CART = Plant(
+    name="cart", parameters=(Parameter("mass", "kg", 0.5, 2.0),), states=(State("v", "m/s", speed_rate, at_rest),),
+    quantities={"recorded": recorded}, inputs=(Input("push", "N"), Input("on", "1", hold="zero")), output="recorded",
+    output_unit="m/s", scales=Scales(1.0, 1.0, "N", "m"), from_rest=False,
+)  # fmt: skip
+INPUTS = {"push": SWITCHED, "on": np.where(np.arange(N_SWITCHED) < OFF, 1.0, 0.0)}
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_a_switch_jumps_at_its_sample_and_a_force_does_not(substeps):
+    """v = t^2/2 up to the switch, then v stays; what is recorded sees the switch at its own sample."""
+    found = simulate(Model(CART), Manoeuvre(INTERVAL, N_SWITCHED, inputs=INPUTS), [[1.0]], Schedule(substeps)).output[0]
+    speed = 0.5 * np.minimum(SWITCHED, SWITCHED[OFF]) ** 2
+    np.testing.assert_allclose(found, speed + 0.5 * INPUTS["on"], atol=1e-14)
+
+
+def test_what_the_plant_says_of_an_input_wins():
+    straight = replace(CART, inputs=(Input("push", "N", hold="linear"), Input("on", "1", hold="zero")))
+    told = [
+        simulate(Model(plant), Manoeuvre(INTERVAL, N_SWITCHED, inputs=INPUTS, hold=hold), [[1.0]]).output[0]
+        for plant, hold in ((CART, "linear"), (straight, "zero"), (CART, "zero"))
+    ]
+    np.testing.assert_array_equal(told[0], told[1])
+    stairs = np.cumsum(np.append(0.0, (SWITCHED * INPUTS["on"])[:-1])) * INTERVAL
+    np.testing.assert_allclose(told[2], stairs + 0.5 * INPUTS["on"], atol=1e-14)
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+def test_the_plain_reference_holds_alike(hold):
+    manoeuvre = Manoeuvre(INTERVAL, 60, inputs={k: v[:60] for k, v in INPUTS.items()}, hold=hold)
+    plain = simulate_plainly(Model(CART), manoeuvre, np.array([1.3]))
+    np.testing.assert_allclose(simulate(Model(CART), manoeuvre, [[1.3]]).output[0], plain, atol=1e-9)
+
+
+def test_an_input_that_contradicts_itself_is_refused():
+    with pytest.raises(ArmidError, match=r"'stairs'.*'linear', 'zero' or ''"):
+        Input("u", "N", hold="stairs")
+    with pytest.raises(ArmidError, match="a smaller and a larger value"):
+        Input("u", "N", typical=(1.0, 1.0))

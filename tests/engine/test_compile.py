@@ -15,7 +15,7 @@ import pytest
 
 from armid.engine import cache_folder, compile_model, simulate
 from armid.engine.compile import load_module, module_name
-from armid.engine.generate import generate_module
+from armid.engine.generate import kernel_parts
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
 
@@ -73,26 +73,19 @@ def effect_of(folder: Path, text: str) -> Effect:
     return Effect("own", (Parameter("level", "effort", 0, 1, null=0.0),), {"torque": names["torque"]})  # type: ignore[dict-item]
 
 
-def test_a_changed_equation_gives_another_module(tmp_path: Path) -> None:
+def test_a_module_is_named_by_its_equations(tmp_path: Path) -> None:
+    """By what they compute and what they take from their file, not by the words beside them."""
+    head = "def torque(omega, level):\n    return -level * "
     texts = [
-        "def torque(omega, level):\n    return -level * omega\n",
-        "def torque(omega, level):\n    return -level * omega * 2\n",
-        "F = 4\ndef torque(omega, level):\n    return -level * omega * F\n",
-        "F = 3\ndef torque(omega, level):\n    return -level * omega * F\n",
-        "def f(x):\n    return x\ndef torque(omega, level):\n    return -level * f(omega)\n",
-        "def f(x):\n    return -x\ndef torque(omega, level):\n    return -level * f(omega)\n",
-    ]
-    models = [Model(PLANTS["driven_axis"]) + effect_of(tmp_path, t) for t in texts]
-    assert len({module_name(generate_module(m, 8)) for m in models}) == len(texts)
-
-
-def test_words_beside_the_equation_change_nothing(tmp_path: Path) -> None:
-    texts = [
-        "def torque(omega, level):\n    return -level * omega\n",
+        f"{head}omega\n", f"{head}omega * 2\n", f"F = 4\n{head}omega * F\n", f"F = 3\n{head}omega * F\n",
+        f"def f(x):\n    return x\n{head}f(omega)\n", f"def f(x):\n    return -x\n{head}f(omega)\n",
         'def torque(omega: float, level: float) -> float:\n    """Say something."""\n    return -level*omega  # so\n',
-    ]
+    ]  # fmt: skip
     models = [Model(PLANTS["driven_axis"]) + effect_of(tmp_path, t) for t in texts]
-    assert len({module_name(generate_module(m, 8)) for m in models}) == 1
+    names = [module_name(kernel_parts(m, 8)) for m in models]
+    assert len(set(names[:-1])) == len(texts) - 1
+    assert names[-1] == names[0]
+    assert names[0] != module_name(kernel_parts(models[0], 4))
 
 
 def test_a_known_model_is_looked_up(arm: Model) -> None:
@@ -105,7 +98,7 @@ def test_a_cache_folder_that_cannot_be_written_is_refused(tmp_path: Path, monkey
     blocked.write_text("")
     monkeypatch.setenv("ARMID_CACHE", str(blocked / "cache"))
     with pytest.raises(ArmidError, match=r"the cache folder .*cache cannot be written \(.+\): set ARMID_CACHE"):
-        load_module("x = 'never seen before'\n")
+        load_module(kernel_parts(Model(PLANTS["driven_axis"]), 2))
 
 
 def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """No stair-step: the misfit to a record of other parameters is smooth along a fine line through parameter space."""
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,9 +14,7 @@ from armid.problem.measures import rmse
 N_POINTS, STEP, DISAGREEMENT = 2000, 1e-6, 1e-3
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 # Directions of the line: all parameters at once, and each alone.
-DIRECTIONS = {
-    "all": [1.0, 0.7, -0.9, 0.8], "p0": [1, 0, 0, 0], "k": [0, 1, 0, 0], "eta3": [0, 0, 1, 0], "n": [0, 0, 0, 1],
-}  # fmt: skip
+DIRECTIONS = [[1.0, 0.7, -0.9, 0.8], *np.eye(4).tolist()]
 
 
 def central(values: Array, points: int) -> Array:
@@ -24,19 +23,18 @@ def central(values: Array, points: int) -> Array:
     return np.asarray((np.roll(values, -points) - np.roll(values, points))[middle]) / (2 * points * STEP)
 
 
-@pytest.mark.parametrize("direction", DIRECTIONS)
 @pytest.mark.parametrize("accuracy", ["standard", "fine"])
 @pytest.mark.parametrize("name", ["lower", "raise"])
 def test_derivatives_at_two_steps_agree(
-    name: str, accuracy: str, direction: str, arm: Model, manoeuvres: dict[str, Manoeuvre],
+    name: str, accuracy: str, arm: Model, manoeuvres: dict[str, Manoeuvre],
     schedule_for: Callable[[str, str], Schedule],
 ) -> None:  # fmt: skip
     schedule = schedule_for(name, accuracy)
     record = simulate(arm, manoeuvres[name], TRUTH, schedule).output[0]
-    for start in drawn(arm, 3, 11):
-        along = 1.0 + STEP * np.arange(N_POINTS)[:, np.newaxis] * np.array(DIRECTIONS[direction])
+    for direction, start in product(DIRECTIONS, drawn(arm, 2, 11)):
+        along = 1.0 + STEP * np.arange(N_POINTS)[:, np.newaxis] * np.array(direction)
         misfit = rmse(record, simulate(arm, manoeuvres[name], start * along, schedule).output)
         wide, narrow = central(misfit, 100), central(misfit, 10)
         counted = np.abs(wide) >= 0.1 * np.median(np.abs(wide))
         assert counted.mean() > 0.5
-        assert np.max(np.abs(narrow - wide)[counted] / np.abs(wide)[counted]) <= DISAGREEMENT
+        assert np.max(np.abs(narrow - wide)[counted] / np.abs(wide)[counted]) <= DISAGREEMENT, direction

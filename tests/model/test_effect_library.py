@@ -36,23 +36,19 @@ MAGNITUDES = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def resolved() -> dict[str, Parameter]:
-    """Parameters of every form on the arm, SI."""
+def test_ranges_cover_what_a_real_arm_has_with_room():
     forms = [form for effect in EFFECTS.values() for form in effect.every_form]
-    return {name: p for form in forms for name, p in (Model(ARM) + form).parameters.items()}
-
-
-@pytest.mark.parametrize(("name", "weak", "strong"), [(n, *both) for n, both in MAGNITUDES.items()])
-def test_ranges_cover_what_a_real_arm_has_with_room(resolved, name, weak, strong):
-    p = resolved[name]
-    null = p.low if p.null is None else p.null
-    far = p.high if strong > null else p.low
-    assert abs(strong - null) <= 0.81 * abs(far - null)
-    assert p.low <= weak <= p.high
+    resolved = {name: p for form in forms for name, p in (Model(ARM) + form).parameters.items()}
+    for name, (weak, strong) in MAGNITUDES.items():
+        p = resolved[name]
+        null = p.low if p.null is None else p.null
+        far = p.high if strong > null else p.low
+        assert abs(strong - null) <= 0.81 * abs(far - null), name
+        assert p.low <= weak <= p.high, name
 
 
 def test_every_effect_of_the_specification_is_there():
+    assert all(name == effect.name for name, effect in EFFECTS.items())
     named = {name.split(".")[0] for name in MAGNITUDES}
     also = {"torque_offset", "asymmetric_viscous", "output_lag", "load_friction"}
     assert named | also <= set(EFFECTS)
@@ -71,18 +67,16 @@ def test_a_plant_refuses_with_the_name_that_it_lacks():
 
 
 @pytest.mark.parametrize("effect", EVERY_FORM)
-def test_each_says_where_it_comes_from_and_can_be_simulated_at_its_defaults(effect):
+def test_each_is_documented_and_can_be_simulated_at_its_defaults(effect):
     assert effect.source
     assert effect.note
+    assert all(f.__doc__ for f in effect.adds.values())
     for p in effect.parameters:
         assert p.note
         assert p.null is not None or p.fixed is not None or p.nominal is not None
         assert p.null in (None, 0.0)
     assert any(p.null == 0.0 and p.fixed is None for p in effect.parameters)
-
-
-@pytest.mark.parametrize("effect", EVERY_FORM)
-def test_only_widths_of_smoothed_kinks_and_departures_from_the_usual_form_are_fixed(effect):
+    # Only widths of smoothed kinks and departures from the usual form are fixed.
     rest = {p.name: p.fixed for p in effect.parameters if p.fixed is not None and p.name not in ("width", "least")}
     assert rest.items() <= {"exponent": 2.0, "hardening": 0.0, "cooling": 0.0, "period": 0.0}.items()
 

@@ -13,12 +13,10 @@ STEPS = 3
 
 
 def smooth_sign(x, width=WIDTH):
-    """Sign of x, smoothed."""
     return x / np.sqrt(x**2 + width**2)
 
 
 def torque(x):
-    """A helper with the name of a port."""
     return -x
 
 
@@ -28,12 +26,10 @@ def s(x):
 
 
 def plain(omega, level):
-    """One line."""
     return -level * omega
 
 
 def with_helper(omega, level):
-    """A helper that takes its width from the file."""
     return -level * smooth_sign(omega)
 
 
@@ -72,7 +68,6 @@ def logic(omega, level):
 
 
 def several_lines(omega, level):
-    """Local names, one of them changed in place."""
     push: float = level * omega
     push *= 2.0
     push -= 0.1 * level
@@ -105,7 +100,6 @@ def branches(omega, level):
 
 
 def branches_as_choice(omega, level):
-    """The same without statements."""
     return np.where(omega > 0.3, -level, np.where(omega > 0.1, -0.5 * level, 0.0))
 
 
@@ -124,7 +118,6 @@ def repeated(omega, level):
 
 
 def rare(omega, level):
-    """Functions and operators that lanes do not have."""
     return -level * (np.arcsinh(omega) + math.expm1(omega) + omega % 0.1 + np.ceil(omega) + round(omega, 2))
 
 
@@ -142,8 +135,6 @@ def names_of_the_loop(omega, level):
 
 
 def made(factor):
-    """Return an equation that closes over a number and a function."""
-
     def closure(omega, level):
         return -factor * level * smooth_sign(omega)
 

@@ -6,17 +6,7 @@ import numpy as np
 import pytest
 
 from armid.model import EFFECTS
-from armid.model.effects import balance as gas_heat_loss
-from armid.model.effects import balance as line_loss
-from armid.model.effects import bodies as shell_rocking
-from armid.model.effects import control as controller_delay
-from armid.model.effects import control as tachometer_lag
-from armid.model.effects import drive as worm_direction
-from armid.model.effects import drive as worm_speed
-from armid.model.effects import friction as load_friction
-from armid.model.effects import friction as presliding
-from armid.model.effects import motor as flux_saturation
-from armid.model.effects import sensor as gyro_lag
+from armid.model.effects import balance, bodies, control, drive, friction, motor, sensor
 
 RNG = np.random.default_rng(4)
 OMEGA = np.array([-2.5, -1.0, -0.3, 0.3, 1.0, 2.5])
@@ -41,7 +31,7 @@ def test_nothing_is_added_at_null(effect):
 
 def test_without_loss_of_heat_the_pressure_is_the_plant_s():
     known = {"deviation": 0.0, "loss_rate": 0.0}
-    assert np.all(gas_heat_loss.deviation_rate(**drawn(gas_heat_loss.deviation_rate, **known)) == 0.0)
+    assert np.all(balance.deviation_rate(**drawn(balance.deviation_rate, **known)) == 0.0)
 
 
 @pytest.mark.parametrize("name", FRICTIONS)
@@ -56,55 +46,55 @@ def test_friction_takes_energy_out_in_both_directions(name):
 
 def test_line_loss_takes_energy_out():
     """Lowering compresses the gas: a higher pressure at the piston brakes."""
-    assert np.all(line_loss.gas(OMEGA, 3e4) * OMEGA > 0.0)
+    assert np.all(balance.line_pressure(OMEGA, 3e4) * OMEGA > 0.0)
 
 
 def test_flux_follows_its_published_forms():
     current, K, saturating = np.array([-150.0, -20.0, 0.0, 0.4, 60.0, 160.0]), 4.5e-5, 120.0
     size = np.abs(current)
-    rational = K * size + flux_saturation.flux(current, K, 1 / saturating)
+    rational = K * size + motor.rational_flux(current, K, 1 / saturating)
     np.testing.assert_allclose(rational, K * size / (1 + size / saturating), rtol=1e-13)
-    arctangent = K * size + flux_saturation.arctangent_flux(current, K, 1 / saturating**2)
+    arctangent = K * size + motor.arctangent_flux(current, K, 1 / saturating**2)
     np.testing.assert_allclose(arctangent, K * saturating * np.arctan(size / saturating), rtol=1e-13)
 
 
 def test_series_of_the_arctangent_meets_its_closed_form():
     x = np.array([0.05, 0.0999999, 0.1000001, 0.2])
-    np.testing.assert_allclose(flux_saturation.missing_share(x**2), 1 - np.arctan(x) / x, rtol=1e-11)
+    np.testing.assert_allclose(motor.missing_share(x**2), 1 - np.arctan(x) / x, rtol=1e-11)
 
 
 @pytest.mark.parametrize("effort", [-800.0, 800.0])
 def test_worm_gives_less_only_where_it_is_driven_backwards(effort):
-    found = worm_direction.drive(OMEGA, effort, 0.3, 1e-6, 1e-6)
+    found = drive.worm_direction_loss(OMEGA, effort, 0.3, 1e-6, 1e-6)
     np.testing.assert_allclose(found, np.where(effort * OMEGA < 0.0, -0.3 * effort, 0.0), atol=1e-6)
 
 
 def test_worm_loses_at_standstill_and_nothing_at_speed():
-    for drive in (worm_speed.drive, worm_speed.agma_drive):
-        loss = -drive(np.array([0.0, 0.6, 300.0]), 100.0, 0.2, 0.6, 1e-9) / 100.0
+    for lost in (drive.worm_speed_loss, drive.agma_loss):
+        loss = -lost(np.array([0.0, 0.6, 300.0]), 100.0, 0.2, 0.6, 1e-9) / 100.0
         np.testing.assert_allclose(loss, [0.2, 0.2 / np.e, 0.0], atol=1e-4)
 
 
 def test_load_is_what_is_held():
     """At rest in balance the drive holds the load: friction is a share of either; without a load, of half the drive."""
-    held = load_friction.torque(1.0, 300.0, 0.1, 1e-6, 1e-6, load_effort=-300.0)
+    held = friction.load_friction_torque(1.0, 300.0, 0.1, 1e-6, 1e-6, load_effort=-300.0)
     assert held == pytest.approx(-30.0)
-    assert load_friction.torque(1.0, 300.0, 0.1, 1e-6, 1e-6) == pytest.approx(-15.0)
+    assert friction.load_friction_torque(1.0, 300.0, 0.1, 1e-6, 1e-6) == pytest.approx(-15.0)
 
 
 def test_shell_and_arm_exchange_momentum():
     """What the spring does to the arm it does not do to the body, and held it swings at its frequency."""
     values = {"frequency": 8.0, "damping_ratio": 0.05, "hardening": 1e-3, "twist": 0.01, "omega": 0.1}
     values["body_speed"] = 0.3
-    on_arm = shell_rocking.torque(30.0, 1.0, **values)
-    assert on_arm == pytest.approx(-30.0 * shell_rocking.body_speed_rate(**values))
-    matrix = np.array([[0.0, 1.0], [shell_rocking.body_speed_rate(8.0, 0.05, 0.0, 1.0, 0.0, 0.0),
-                                    shell_rocking.body_speed_rate(8.0, 0.05, 0.0, 0.0, 1.0, 0.0)]])  # fmt: skip
+    on_arm = bodies.rocking_torque(30.0, 1.0, **values)
+    assert on_arm == pytest.approx(-30.0 * bodies.body_speed_rate(**values))
+    matrix = np.array([[0.0, 1.0], [bodies.body_speed_rate(8.0, 0.05, 0.0, 1.0, 0.0, 0.0),
+                                    bodies.body_speed_rate(8.0, 0.05, 0.0, 0.0, 1.0, 0.0)]])  # fmt: skip
     root = np.linalg.eigvals(matrix)[0]
     assert abs(root) / (2 * np.pi) == pytest.approx(8.0)
     assert -root.real / abs(root) == pytest.approx(0.05)
-    assert shell_rocking.torque(30.0, 0.0, **values) == 0.0
-    assert shell_rocking.inertia(30.0, 0.0) == 0.0
+    assert bodies.rocking_torque(30.0, 0.0, **values) == 0.0
+    assert bodies.rocking_inertia(30.0, 0.0) == 0.0
 
 
 def test_gas_with_heat_loss_obeys_the_whole_equation():
@@ -112,11 +102,9 @@ def test_gas_with_heat_loss_obeys_the_whole_equation():
     n, squeeze, rate, pressure, p0, compression = 1.4, 0.8, 0.25, 4.0e6, 3.0e6, 1.25
     deviation = -1.1e5
     total = pressure + deviation
-    found = n * pressure * squeeze + gas_heat_loss.deviation_rate(
-        n, deviation, squeeze, rate, pressure, p0, compression
-    )
+    found = n * pressure * squeeze + balance.deviation_rate(n, deviation, squeeze, rate, pressure, p0, compression)
     assert found == pytest.approx(n * total * squeeze - rate * (total - p0 * compression))
-    assert gas_heat_loss.deviation_rate(n, p0 * compression - pressure, 0.0, rate, pressure, p0, compression) == 0.0
+    assert balance.deviation_rate(n, p0 * compression - pressure, 0.0, rate, pressure, p0, compression) == 0.0
 
 
 @pytest.mark.parametrize("frequency", [1.0, 10.0, 20.0])
@@ -126,11 +114,11 @@ def test_delay_is_a_dead_time_at_the_frequencies_of_the_arm(frequency, delay):
     s = 2j * np.pi * frequency
     longest = max(delay, 2e-3)
     smooth = 1.0 / (1.0 + 0.5 * longest * s + longest**2 * s**2 / 12)
-    assert controller_delay.slope_rate(delay, 0.0, 1.0, smooth, s * smooth) == pytest.approx(s**2 * smooth)
+    assert control.slope_rate(delay, 0.0, 1.0, smooth, s * smooth) == pytest.approx(s**2 * smooth)
     late = np.exp(-s * delay)
     allowed = abs(s * longest) ** 5 / 700 + abs(s) ** 2 * max(2e-3 - delay, 0.0) * delay / 1.9
-    assert abs(1.0 + controller_delay.feedback(delay, 0.0, 1.0, smooth, s * smooth) - late) <= allowed
-    angle = 1.0 / s - controller_delay.command(1, 1, 1.0, 0, 0, 0, 1.0, 0, 1, 1, 0, delay, 0.0, smooth, s * smooth)
+    assert abs(1.0 + control.late_feedback(delay, 0.0, 1.0, smooth, s * smooth) - late) <= allowed
+    angle = 1.0 / s - control.late_command(1, 1, 1.0, 0, 0, 0, 1.0, 0, 1, 1, 0, delay, 0.0, smooth, s * smooth)
     assert abs(s * angle - late) <= allowed
 
 
@@ -139,10 +127,10 @@ def test_delay_is_a_dead_time_at_the_frequencies_of_the_arm(frequency, delay):
 def test_a_sampled_control_is_a_hold_after_a_dead_time(frequency, delay, period):
     s = 2j * np.pi * frequency
     held = (1.0 - np.exp(-s * period)) / (s * period) * np.exp(-s * delay)
-    x = s * controller_delay.filter_time(delay, period)
+    x = s * control.filter_time(delay, period)
     smooth = 1.0 / (1.0 + 0.5 * x + x**2 / 12)
-    found = 1.0 + controller_delay.feedback(delay, period, 1.0, smooth, s * smooth)
-    angle = 1.0 / s - controller_delay.command(1, 1, 1.0, 0, 0, 0, 1.0, 0, 1, 1, 0, delay, period, smooth, s * smooth)
+    found = 1.0 + control.late_feedback(delay, period, 1.0, smooth, s * smooth)
+    angle = 1.0 / s - control.late_command(1, 1, 1.0, 0, 0, 0, 1.0, 0, 1, 1, 0, delay, period, smooth, s * smooth)
     assert abs(found - held) <= (abs(x) ** 4 / 500 if delay == 0.0 else abs(x) ** 3 / 200)
     assert s * angle == pytest.approx(found)
 
@@ -152,15 +140,15 @@ def test_a_sampled_control_is_a_hold_after_a_dead_time(frequency, delay, period)
 ])  # fmt: skip
 def test_a_sampled_control_switches_at_a_sample(delay, period, switch):
     """The loop closes at 0.1043 s: the first sample after the dead time is waited for."""
-    assert controller_delay.still_to_wait(1.0, delay, period, 0.0, 0.1043) == pytest.approx(switch - 0.1043)
-    assert controller_delay.still_to_wait(0.0, delay, period, 0.0, 0.1043) > 0.0
+    assert control.still_to_wait(1.0, delay, period, 0.0, 0.1043) == pytest.approx(switch - 0.1043)
+    assert control.still_to_wait(0.0, delay, period, 0.0, 0.1043) > 0.0
 
 
 def test_late_switch_keeps_the_full_voltage():
     """While the switch waits the demand, after what the plant puts on top of the command, is that before the switch."""
     K_p, theta_D, theta, damping, omega, feedback, U, u_th = 280.0, 0.4, 0.1, 70.0, 2.0, 0.1, 28.0, 0.5
     seen = K_p, theta_D, theta, damping, omega, feedback
-    added = controller_delay.command(1.0, 0.0, *seen, 1.0, U, u_th, 0.01, 0.0, 0.0, 0.0)
+    added = control.late_command(1.0, 0.0, *seen, 1.0, U, u_th, 0.01, 0.0, 0.0, 0.0)
     assert K_p * (theta_D - theta) + added - damping * (omega + feedback) == pytest.approx(2 * (U + u_th))
 
 
@@ -168,10 +156,10 @@ def test_late_switch_keeps_the_full_voltage():
 def test_a_lag_is_a_time_behind_a_steady_acceleration(given):
     """A filter that has settled is a tau behind, below and above the shortest time constant of its state."""
     acceleration, at_least = 20.0, max(given, 1e-3)
-    assert tachometer_lag.lagging_rate(given, -acceleration * at_least, 0.0) == pytest.approx(acceleration)
-    assert tachometer_lag.feedback(given, -acceleration * at_least, 0.0) == pytest.approx(-acceleration * given)
-    assert gyro_lag.slope_rate(given, 0.7, -1.4 * at_least * acceleration, acceleration, 0.0) == pytest.approx(0.0)
-    behind = gyro_lag.output(given, -1.4 * at_least * acceleration, 0.0)
+    assert sensor.lagging_rate(given, -acceleration * at_least, 0.0) == pytest.approx(acceleration)
+    assert sensor.lag_error(given, -acceleration * at_least, 0.0) == pytest.approx(-acceleration * given)
+    assert sensor.gyro_slope_rate(given, 0.7, -1.4 * at_least * acceleration, acceleration, 0.0) == pytest.approx(0.0)
+    behind = sensor.lag_error(given, -1.4 * at_least * acceleration, 0.0)
     assert behind == pytest.approx(-1.4 * given * acceleration)
 
 
@@ -179,6 +167,6 @@ def test_presliding_friction_builds_up_over_its_way():
     """Moving one way, 1 - exp(-x/way) of the friction after a way x; the same in either direction."""
     way, speed = 0.02, 0.5
     for share in (0.0, 0.4, 0.9):
-        rate = presliding.share_rate(speed, share, way, 1e-9)
+        rate = friction.share_rate(speed, share, way, 1e-9)
         assert rate == pytest.approx((1 - share) * speed / way)
-        assert presliding.share_rate(-speed, -share, way, 1e-9) == pytest.approx(-rate)
+        assert friction.share_rate(-speed, -share, way, 1e-9) == pytest.approx(-rate)

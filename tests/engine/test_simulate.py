@@ -1,0 +1,159 @@
+"""What `simulate` takes, refuses and returns; no candidate depends on who is simulated beside it or on threads."""
+
+import tracemalloc
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_cases import Array, drawn
+
+from armid.engine import Schedule, Simulation, simulate
+from armid.errors import ArmidError
+from armid.model import PLANTS, Effect, Manoeuvre, Model, Parameter
+
+KILOBYTE = 1024
+AXIS = Model(PLANTS["driven_axis"])
+
+
+def test_shapes(arm: Model) -> None:
+    found = simulate(arm, Manoeuvre(0.001, 60), drawn(arm, 11, 1), states=True)
+    assert found.output.shape == (11, 60)
+    assert found.failed.shape == found.switch_times["closed"].shape == (11,)
+    assert {s.shape for s in found.states.values()} == {(11, 60)}
+    assert np.array_equal(found.output, found.states["omega"])
+    assert simulate(arm, Manoeuvre(0.001, 60), drawn(arm, 1, 1)).states == {}
+    none = simulate(arm, Manoeuvre(0.001, 60), np.empty((0, 4)))
+    assert (none.output.shape, none.failed.shape) == ((0, 60), (0,))
+    candidate = drawn(arm, 1, 2)
+    one, row = (simulate(arm, Manoeuvre(0.001, 60), c).output for c in (candidate[0], candidate))
+    assert np.array_equal(one, row)
+    assert np.array_equal(simulate(arm, Manoeuvre(0.001, 1), drawn(arm, 3, 1)).output, np.zeros((3, 1)))
+
+
+@pytest.mark.parametrize("plan", [None, np.full(899, 4)], ids=["no plan", "a plan of another length"])
+def test_more_samples_do_not_change_the_first(arm: Model, plan: Array | None) -> None:
+    population = drawn(arm, 5, 3)
+    short, long = (simulate(arm, Manoeuvre(0.001, n), population, Schedule(plan=plan)).output for n in (301, 900))
+    assert np.array_equal(short, long[:, :301])
+
+
+def test_the_arm_parks_when_the_switch_is_never_reached(arm: Model) -> None:
+    """A supply too weak to lift: no switch, and no time of one."""
+    weak = Manoeuvre(0.001, 200, {"U": 1.0, "theta_C": 0.3, "theta_D": -0.8})
+    assert np.isnan(simulate(arm, weak, drawn(arm, 3, 1)).switch_times["closed"]).all()
+
+
+def test_refused(arm: Model) -> None:
+    with pytest.raises(ArmidError, match=r"shape \(2, 3\) was given: \(n_candidates, 4\) is expected for p0, k, eta3"):
+        simulate(arm, Manoeuvre(0.001, 60), np.ones((2, 3)))
+    with pytest.raises(ArmidError, match="constant 'theta_E' is not one of plant 'shell_transfer_arm': did you mean"):
+        simulate(arm, Manoeuvre(0.001, 60, {"theta_E": 0.1}), drawn(arm, 1, 1))
+    with pytest.raises(ArmidError, match="the manoeuvre lacks the input 'u' of plant 'driven_axis'"):
+        simulate(AXIS, Manoeuvre(0.001, 60), [[1.0]])
+    with pytest.raises(ArmidError, match=r"input 'u' has shape \(59,\): \(60,\) is expected"):
+        simulate(AXIS, Manoeuvre(0.001, 60, inputs={"u": np.ones(59)}), [[1.0]])
+
+
+def cubic_drive(omega, gain):
+    """Torque that grows with the cube of the speed: what it drives runs away."""
+    return gain * omega**3
+
+
+@pytest.fixture(scope="module")
+def runaway_arm(arm: Model) -> Model:
+    return arm + Effect("runaway", (Parameter("gain", "effort", 0.0, 50.0, null=0.0),), {"torque": cubic_drive})
+
+
+@pytest.fixture(scope="module")
+def schedule(schedule_for: Callable[[str, str], Schedule]) -> Schedule:
+    return schedule_for("lower", "standard")
+
+
+def same(found: Simulation, rows: Array | slice, expected: Simulation) -> bool:
+    """Compare outputs, failures and switch times bit for bit."""
+    pairs = [(found.output, expected.output), (found.failed, expected.failed)]
+    pairs += [(found.switch_times[k], v) for k, v in expected.switch_times.items()]
+    return all(np.array_equal(a[rows], b, equal_nan=True) for a, b in pairs)
+
+
+def test_neighbours_threads_and_weights_change_no_bit(
+    arm: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
+) -> None:
+    population = drawn(arm, 50, 21)
+    whole = simulate(arm, manoeuvres["lower"], population, schedule)
+    for i in (0, 7, 8, 49):
+        assert same(whole, slice(i, i + 1), simulate(arm, manoeuvres["lower"], population[i], schedule))
+    order = np.random.default_rng(22).permutation(50)
+    assert same(whole, order, simulate(arm, manoeuvres["lower"], population[order], schedule))
+    for threads in (2, 3, 8, 64):
+        found = simulate(arm, manoeuvres["lower"], population, schedule, threads=threads)
+        assert same(whole, slice(None), found)
+    assert schedule.weights is not None
+    for weights in (None, -schedule.weights, np.ones(4)):
+        other = simulate(arm, manoeuvres["lower"], population, replace(schedule, weights=weights))
+        assert same(whole, slice(None), other)
+
+
+@pytest.mark.parametrize("name", ["lower", "raise_empty", "inside_E"])
+def test_beside_candidates_that_diverge(
+    name: str, runaway_arm: Model, manoeuvres: dict[str, Manoeuvre], schedule_for: Callable[[str, str], Schedule]
+) -> None:
+    calm = np.column_stack([drawn(runaway_arm, 20, 25)[:, :4], np.zeros(20)])
+    wild = calm.copy()
+    wild[::3, 4] = 5e4
+    schedule = replace(schedule_for(name, "standard"), weights=None)
+    alone, mixed = (simulate(runaway_arm, manoeuvres[name], c, schedule) for c in (calm, wild))
+    others = np.arange(20)[wild[:, 4] == 0.0]
+    assert not alone.failed.any()
+    assert mixed.failed[::3].all()
+    assert np.array_equal(mixed.output[others], alone.output[others])
+    assert np.array_equal(mixed.switch_times["closed"][others], alone.switch_times["closed"][others])
+
+
+def test_a_diverged_candidate_is_nan_from_then_on(runaway_arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    candidates = np.column_stack([drawn(runaway_arm, 30, 26)[:, :4], np.geomspace(1e3, 1e7, 30)])
+    for schedule in (Schedule(), Schedule(plan=np.full(1200, 8)), Schedule(3)):
+        found = simulate(runaway_arm, manoeuvres["lower"], candidates, schedule)
+        lost = np.isnan(found.output)
+        assert np.array_equal(lost.any(axis=1), found.failed)
+        assert found.failed[-1]
+        # once lost, lost for good
+        assert np.array_equal(np.maximum.accumulate(lost, axis=1), lost)
+        assert np.nanmax(np.abs(found.output)) <= 1e3 * runaway_arm.plant.scales.speed
+
+
+def test_an_impossible_parameter_fails_alone(arm: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule) -> None:
+    population, others = drawn(arm, 12, 27), np.arange(12) != 5
+    expected = simulate(arm, manoeuvres["lower"], population, schedule)
+    for value in (np.nan, np.inf, -1e300, 1e300):
+        spoilt = population.copy()
+        spoilt[5, 0] = value
+        found = simulate(arm, manoeuvres["lower"], spoilt, schedule)
+        assert np.array_equal(found.failed, ~others)
+        assert np.isnan(found.output[5, -1])
+        assert np.array_equal(found.output[others], expected.output[others])
+
+
+def test_memory_is_flat_beyond_the_output(arm: Model) -> None:
+    """What Python holds at the peak, and what tracemalloc cannot see: the compiled loop's own arrays."""
+
+    def beyond_output(n_candidates: int, n_samples: int) -> int:
+        population = drawn(arm, n_candidates, 1)
+        tracemalloc.start()
+        try:
+            found = simulate(arm, Manoeuvre(0.001, n_samples), population)
+            return tracemalloc.get_traced_memory()[1] - found.output.nbytes
+        finally:
+            tracemalloc.stop()
+
+    simulate(arm, Manoeuvre(0.001, 9), drawn(arm, 1, 1))
+    small, large = beyond_output(80, 300), beyond_output(1280, 2000)
+    # The population itself is kept once more, lane by lane: 1280 x 4 x 8 bytes and their order.
+    assert large - small <= 300 * KILOBYTE
+    assert 50 * large < 1280 * 2000 * 8
+    resource = pytest.importorskip("resource", reason="this system does not say the resident size")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    found = simulate(arm, Manoeuvre(0.001, 2000), drawn(arm, 1280, 2))
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    assert grown * KILOBYTE <= found.output.nbytes + 4 * KILOBYTE**2
