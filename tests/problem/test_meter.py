@@ -1,16 +1,13 @@
 """The meter alone, and the termination that looks at it."""
 
-import ast
 import copy
 import pickle
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from armid.problem.meter import Log, Meter, MeterTermination
-from armid.problem.meter import __file__ as meter_file
 
 
 def simulate(meter: Meter, fitness: list[float], failed: list[bool] | None = None) -> None:
@@ -143,13 +140,6 @@ def test_a_copied_termination_looks_at_the_same_meter() -> None:
     twin = copy.deepcopy(termination)
     assert twin.meter is termination.meter
     assert (twin.n_max_gen, twin.force_termination) == (7, True)
-
-
-def test_the_meter_needs_no_pymoo() -> None:
-    nodes = list(ast.walk(ast.parse(Path(meter_file).read_text())))
-    imported = {a.name for n in nodes if isinstance(n, ast.Import) for a in n.names}
-    imported |= {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module}
-    assert {name.split(".")[0] for name in imported} == {"typing", "numpy", "armid"}
 
 
 def log_of(x: list[float], f: list[float]) -> Log:

@@ -17,8 +17,7 @@ from armid.errors import ArmidError
 from armid.estimation.information import Information, information_at
 from armid.identifiers import Identifier, can_run_alone, run_alone
 from armid.model import Model
-from armid.problem.fitness import Fitness
-from armid.problem.measures import chi_square, mean_square
+from armid.problem.fitness import Fitness, chi_square, mean_square
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem, fitness_of, weights_of
 from armid.problem.replay import Replay, replays
