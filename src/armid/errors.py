@@ -12,12 +12,7 @@ class ArmidError(ValueError):
     """
 
     def __init__(self, sentence: str) -> None:
-        super().__init__("".join(c if c.isprintable() else escaped(c) for c in sentence))
-
-
-def escaped(character: str) -> str:
-    """Return a character as Python's source shows it."""
-    return character.encode("unicode_escape").decode("ascii")
+        super().__init__("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in sentence))
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -3,9 +3,9 @@
 import importlib.util
 import inspect
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any
@@ -14,31 +14,55 @@ from armid.errors import ArmidError, nearest
 from armid.model import EFFECTS, PLANTS, Effect, Plant
 
 PLUGIN_PREFIX = "armid_plugin_"
-KINDS = ("plants", "effects", "fitness", "identifiers")
+
+
+def is_fitness(thing: Any) -> bool:
+    """Tell whether an object is a Fitness or a function of (measured, simulated)."""
+    if hasattr(thing, "function") and hasattr(thing, "join"):
+        return True
+    return inspect.isfunction(thing) and {"measured", "simulated"} <= set(inspect.signature(thing).parameters)
+
+
+def is_identifier(thing: Any) -> bool:
+    """Tell whether an object is an Identifier, or a class or a function that may make an algorithm."""
+    return hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing)
+
+
+# Kind -> what belongs to it; an object is of the first kind that takes it.
+ACCEPTS: dict[str, Callable[[Any], bool]] = {
+    "plants": lambda thing: isinstance(thing, Plant),
+    "effects": lambda thing: isinstance(thing, Effect),
+    "fitness": is_fitness,
+    "identifiers": is_identifier,
+}
+KINDS = tuple(ACCEPTS)
+EXPECTED = "a Plant, an Effect, a fitness function (measured, simulated) or an algorithm of pymoo is expected"
 
 
 @dataclass
 class Registry:
-    """Hold what a command may name; `fitness` and `identifiers` are read from their catalogues when first asked for."""
+    """Hold what a command may name; `fitness` and `identifiers` are read from their catalogues when first asked for.
+
+    own: kind -> name -> what the user has registered beside a catalogue, as it was given.
+    """
 
     plants: dict[str, Plant] = field(default_factory=lambda: dict(PLANTS))
     effects: dict[str, Effect] = field(default_factory=lambda: dict(EFFECTS))
-    own_fitness: dict[str, Any] = field(default_factory=dict)
-    own_identifiers: dict[str, Any] = field(default_factory=dict)
+    own: dict[str, dict[str, Any]] = field(default_factory=lambda: {kind: {} for kind in KINDS})
 
     @property
     def fitness(self) -> dict[str, Any]:
         """Name -> Fitness."""
         from armid.problem.fitness import FITNESS, as_fitness
 
-        return FITNESS | {name: as_fitness(name, own) for name, own in self.own_fitness.items()}
+        return FITNESS | {name: as_fitness(name, own) for name, own in self.own["fitness"].items()}
 
     @property
     def identifiers(self) -> dict[str, Any]:
         """Name -> Identifier."""
         from armid.identifiers import IDENTIFIERS, as_identifier
 
-        return IDENTIFIERS | {name: as_identifier(name, own) for name, own in self.own_identifiers.items()}
+        return IDENTIFIERS | {name: as_identifier(name, own) for name, own in self.own["identifiers"].items()}
 
     def identifier_of(self, name: str) -> Any:
         """Return the Identifier of a name, a chain such as `pso+bobyqa` or `multistart:bobyqa`; errors in words."""
@@ -51,45 +75,34 @@ class Registry:
 
         Raises ArmidError when the name is taken: a user's own must not stand silently in for ours.
         """
-        known: dict[str, Any] = {"plants": self.plants, "effects": self.effects, "fitness": self.own_fitness,
-                 "identifiers": self.own_identifiers}[kind]  # type: ignore[assignment]  # fmt: skip
-        builtin = getattr(self, kind)
-        if name in builtin:
+        if name in getattr(self, kind):
             raise ArmidError(f"{kind}: '{name}' is there already, give yours another name")
-        known[name] = thing
+        self.own[kind][name] = thing
+        if kind in ("plants", "effects"):
+            getattr(self, kind)[name] = thing
 
 
 def load_registry(plugins: Iterable[str] = ()) -> Registry:
     """Return the catalogues, the entry points of installed packages, and what `FILE.py:attribute` names.
 
-    Raises ArmidError for a plug-in that cannot be found or is none of ours.
+    Raises ArmidError for a plug-in that cannot be found, fails, belongs to another kind or is none of ours.
     """
     registry = Registry()
     installed = entry_points()
     for kind in KINDS:
         for point in installed.select(group=f"armid.{kind}"):
-            thing = loaded(point, kind)
+            where = f"entry point '{point.name}' ({point.value}) of armid.{kind}"
+            try:
+                thing = point.load()
+            except Exception as error:
+                raise ArmidError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
+            found = kind_of(thing, where)
+            if found != kind:
+                raise ArmidError(f"{where} belongs to {found}: armid.{found} is expected")
             registry.add(kind, name_of(thing, point.name), thing)
     for plugin in plugins:
-        kind, name, thing = load_plugin(plugin)
-        registry.add(kind, name, thing)
+        registry.add(*load_plugin(plugin))
     return registry
-
-
-def loaded(point: EntryPoint, kind: str) -> Any:
-    """Return the object of an installed package's entry point.
-
-    Raises ArmidError when the package cannot be loaded or the object is of another kind.
-    """
-    where = f"entry point '{point.name}' ({point.value}) of armid.{kind}"
-    try:
-        thing = point.load()
-    except Exception as error:
-        raise ArmidError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
-    found = kind_of(thing, where)
-    if found != kind:
-        raise ArmidError(f"{where} belongs to {found}: armid.{found} is expected")
-    return thing
 
 
 def load_plugin(plugin: str) -> tuple[str, str, Any]:
@@ -140,29 +153,16 @@ def name_of(thing: Any, found_under: str) -> str:
     return name if isinstance(name, str) else found_under
 
 
+def kind_of(thing: Any, where: str) -> str:
+    """Tell of which kind a user's object is; refuse with ArmidError one of no kind."""
+    for kind, accepts in ACCEPTS.items():
+        if accepts(thing):
+            return kind
+    raise ArmidError(f"{where} is of type {type(thing).__name__}: {EXPECTED}")
+
+
 def place_in_plugin(error: BaseException) -> str | None:
     """Return file and line of the user's plug-in in which an error arose, None when no plug-in was running."""
     frames = [(f, line) for f, line in walk_tb(error.__traceback__)
               if str(f.f_globals.get("__name__")).startswith(PLUGIN_PREFIX)]  # fmt: skip
     return f"{frames[-1][0].f_code.co_filename}, line {frames[-1][1]}" if frames else None
-
-
-def kind_of(thing: Any, where: str) -> str:
-    """Tell what a user's object is.
-
-    Raises ArmidError for an object that is neither plant, effect, fitness nor identifier.
-    """
-    if isinstance(thing, Plant):
-        return "plants"
-    if isinstance(thing, Effect):
-        return "effects"
-    if hasattr(thing, "function") and hasattr(thing, "join"):
-        return "fitness"
-    if inspect.isfunction(thing) and {"measured", "simulated"} <= set(inspect.signature(thing).parameters):
-        return "fitness"
-    if hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing):
-        return "identifiers"
-    raise ArmidError(
-        f"{where} is of type {type(thing).__name__}: a Plant, an Effect, a fitness function "
-        "(measured, simulated) or an algorithm of pymoo is expected"
-    )

@@ -1,37 +1,22 @@
-"""Every registered plant, effect, fitness and identifier keeps its contract; what breaks one is found."""
+"""Every registered plant, effect, fitness and identifier keeps its contract."""
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from armid.contract.check import check_thing
-from armid.contract.effect import check_effect
-from armid.contract.fitness import check_fitness
+from armid.contract.equations import check_effect, check_effects, check_plant
 from armid.contract.identifier import check_identifier
-from armid.contract.plant import check_plant
 from armid.identifiers import IDENTIFIERS, identifier_of
-from armid.model import EFFECTS, PLANTS, Effect, Parameter, applicable
-from armid.problem.fitness import FITNESS, Fitness
+from armid.model import EFFECTS, PLANTS, applicable
+from armid.problem.fitness import FITNESS
 
-# Compiling takes some 10 s an effect and plant, so all but one of them are left to continuous integration. What every
-# effect keeps is tried on one compiled model of all of them (tests/model/effects); here, whole, one of each kind: a
-# plain torque, states, a switch with states, and two forms.
-WHOLE = ("coulomb", "gyro_lag", "controller_delay", "flux_saturation")
-LATER = [name for name in EFFECTS if name != "coulomb"]
-ROTARY = PLANTS["driven_axis"].for_unit("rad/s")
-AXIS = {"driven_axis": replace(PLANTS["driven_axis"], variants=())}
+ARM = PLANTS["shell_transfer_arm"]
+AXIS = replace(PLANTS["driven_axis"].for_unit("m/s"), variants=())
 COMPOSED = (
     "pso+bobyqa", "de+nelder_mead", "pso+least_squares", "cmaes+least_squares", "multistart:bobyqa",
     "multistart:least_squares", "random+multistart:slsqp", "pymoo_pso+cobyla+sbplx",
 )  # fmt: skip
-ALL = [
-    pytest.param(kind, name, thing, id=f"{kind}-{name}", marks=[pytest.mark.slow] if name in LATER else [])
-    for kind, things in (
-        ("plants", PLANTS), ("effects", {name: EFFECTS[name] for name in WHOLE}), ("fitness", FITNESS),
-        ("identifiers", IDENTIFIERS),
-    ) for name, thing in things.items()
-]  # fmt: skip
 
 
 def failures(findings):
@@ -39,48 +24,37 @@ def failures(findings):
     return [f"{f.name}: {f.sentence}" for f in findings if not f.passed]
 
 
-@pytest.mark.parametrize(("kind", "name", "thing"), ALL)
+@pytest.mark.parametrize(("kind", "name", "thing"), [
+    pytest.param(kind, name, thing, id=f"{kind}-{name}")
+    for kind, things in (("plants", PLANTS), ("fitness", FITNESS), ("identifiers", IDENTIFIERS))
+    for name, thing in things.items()
+])  # fmt: skip
 def test_registered_things_keep_their_contract(kind, name, thing):
     assert failures(check_thing(kind, name, thing)) == []
 
 
+# All effects in one compiled model of a plant, all but one at their nulls.
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, e in applicable(EFFECTS, ROTARY).items() if name not in WHOLE])
-def test_effects_of_any_shaft_keep_their_contract_on_an_axis(name):
-    assert failures(check_effect(EFFECTS[name], {"driven_axis": ROTARY}, strict=True)) == []
+@pytest.mark.parametrize("plant", [ARM, AXIS], ids=["arm", "axis"])
+def test_every_effect_keeps_its_contract(plant):
+    effects = list(applicable(EFFECTS, plant).values())
+    found = check_effects(effects, {plant.name: plant}, strict=True)
+    assert {e.name: failures(points) for e, points in zip(effects, found, strict=True) if failures(points)} == {}
+    points = {f.name.split(" on ")[0].split(" in ")[0] for f in found[0]}
+    assert points >= {"binds", "null values", "documented", "printed", "null law", "acts", "responds", "finite",
+                      "deterministic", "compiled"}  # fmt: skip
+
+
+def test_one_effect_keeps_its_contract_by_itself():
+    """As `armid check` tries it: compiled alone, in each of its forms."""
+    found = check_effect(EFFECTS["worm_speed"], {"driven_axis": AXIS}, strict=True)
+    assert failures(found) == []
+    assert {f.name.rpartition(" in the form ")[2] for f in found} == {f.form for f in EFFECTS["worm_speed"].every_form}
 
 
 @pytest.mark.parametrize("name", COMPOSED)
 def test_composed_identifiers_keep_their_contract(name):
     assert failures(check_identifier(identifier_of(name, IDENTIFIERS))) == []
-
-
-def test_effect_that_does_not_vanish_at_null_is_found():
-    def torque(omega, slope):
-        """Friction with an offset."""
-        return -slope * omega - 1.0
-
-    stubborn = Effect("stubborn", (Parameter("slope", "effort/speed", 0, 0.1, null=0.0),), {"torque": torque})
-    assert any("null law" in text for text in failures(check_effect(stubborn, AXIS)))
-
-
-def test_effect_that_fits_nothing_is_found():
-    lost = Effect("lost", (Parameter("c", "1", 0, 1, null=0.0),), {"torque": lambda altitude, c: c * altitude})
-    assert any("binds" in text and "altitude" in text for text in failures(check_effect(lost, PLANTS)))
-
-
-def test_fitness_that_prefers_a_misfit_is_found():
-    upside_down = Fitness("upside_down", lambda measured, simulated: -np.abs(simulated - measured).max(axis=1))
-    assert any("perfect match" in text for text in failures(check_fitness(upside_down)))
-
-
-def test_identifier_that_forgets_its_seed_is_found():
-    from pymoo.algorithms.soo.nonconvex.pattern import PatternSearch
-
-    from armid.identifiers import as_identifier
-
-    findings = check_identifier(as_identifier("pattern", lambda budget: PatternSearch()))
-    assert any("reproducible" in text or "survives" in text for text in failures(findings))
 
 
 def test_plant_contract_reports_every_sibling():

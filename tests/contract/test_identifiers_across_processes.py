@@ -13,10 +13,9 @@ from armid.identifiers import IDENTIFIERS
 NAMES = (*IDENTIFIERS, "pso+bobyqa", "de+nelder_mead+sbplx", "cmaes+least_squares", "multistart:lbfgs")
 SCRIPT = """
 import hashlib, json, sys
-from armid.contract.identifier import BUDGET, run
-from armid.contract.trial_problem import Trial
+from armid.contract.identifier import BUDGET, Trial, run
 from armid.identifiers import IDENTIFIERS, identifier_of
-from armid.problem import Meter
+from armid.problem.meter import Meter
 found = {}
 for name in sys.argv[1:]:
     log = run(identifier_of(name, IDENTIFIERS), 7, Trial(Meter(BUDGET), holes=True))[0].log()

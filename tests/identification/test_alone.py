@@ -10,13 +10,13 @@ from pymoo.core.callback import Callback
 from pymoo.optimize import minimize
 
 from armid.estimation.identify import search
-from armid.identifiers import IDENTIFIERS, Identifier, Searching, can_run_alone, identifier_of, run_alone
+from armid.identifiers import IDENTIFIERS, Identifier, SearchAlgorithm, can_run_directly, identifier_of, run_directly
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem
 
 COMPOSED = ("pso+bobyqa", "cmaes+least_squares", "multistart:cobyla", "random+multistart:slsqp", "ga+cobyla+sbplx")
-ALONE = [n for n in (*IDENTIFIERS, *COMPOSED) if can_run_alone(identifier_of(n, IDENTIFIERS).build(100))]
+ALONE = [n for n in (*IDENTIFIERS, *COMPOSED) if can_run_directly(identifier_of(n, IDENTIFIERS).build(100))]
 BUDGET = 150
 
 
@@ -39,7 +39,7 @@ def by_pymoo(problem: IdentificationProblem, meter: Meter, identifier: Identifie
     return used
 
 
-def test_the_searches_of_ours_run_alone_and_pymoo_s_own_do_not() -> None:
+def test_the_searches_of_ours_run_directly_and_pymoo_s_own_do_not() -> None:
     assert set(IDENTIFIERS) - set(ALONE) == {"pso", "pymoo_pso", "ga", "de"}
     assert set(COMPOSED) < set(ALONE)
 
@@ -87,7 +87,7 @@ def test_an_error_of_the_problem_comes_out(posed, monkeypatch, name, error) -> N
     if name == "random":
         left[0] = 1
     with pytest.raises((type(error), RuntimeError)) as came:
-        run_alone(identifier_of(name, IDENTIFIERS).build(BUDGET), problem, 1, lambda: meter.exhausted)
+        run_directly(identifier_of(name, IDENTIFIERS).build(BUDGET), problem, 1, lambda: meter.exhausted)
     # a StopIteration that passes a generator becomes a RuntimeError, Python says
     assert error in (came.value, came.value.__cause__)
     assert after == [1]
@@ -100,14 +100,14 @@ def test_what_pymoo_s_loop_has_to_see_to_leaves_it_to_pymoo(posed) -> None:
         def notify(self, algorithm: Any) -> None:
             Told.calls += 1
 
-    class Mine(Searching):
+    class Mine(SearchAlgorithm):
         pass
 
     method = IDENTIFIERS["random"].build(100).method
-    assert can_run_alone(Searching(method, 100))
-    assert not can_run_alone(Mine(method, 100))
-    assert not can_run_alone(Searching(method, 100, callback=Told()))
-    assert not can_run_alone(Searching(method, 100, archive=None))
+    assert can_run_directly(SearchAlgorithm(method, 100))
+    assert not can_run_directly(Mine(method, 100))
+    assert not can_run_directly(SearchAlgorithm(method, 100, callback=Told()))
+    assert not can_run_directly(SearchAlgorithm(method, 100, archive=None))
 
 
 def test_a_budget_within_a_generation_is_cut_off_exactly(posed) -> None:

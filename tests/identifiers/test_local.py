@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from searches import Bowl, identifier, ran
 
 from armid.identifiers.least_squares import CENTRAL, FORWARD, slopes, stencil
-from armid.identifiers.nlopt import ALGORITHMS, Calls, optimised
+from armid.identifiers.nlopt import NLOPT, Calls, optimised
 from armid.identifiers.search import Height, NoFitnessError, pulled
 
+ALGORITHMS = {kind.name: kind.algorithm for kind in NLOPT}
 Array = NDArray[np.float64]
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")
 # A seed whose start is in the middle of the box, where no step has to turn.

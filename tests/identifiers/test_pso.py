@@ -131,33 +131,7 @@ def test_the_literal_limit_is_the_magnitude_of_the_box() -> None:
     assert PaperPSO(velocity_limit=0.2).setup(problem)._limit.tolist() == pytest.approx([0.1, 1.0, 1.0])
 
 
-SCRIPT = """
-import sys
-sys.path.insert(0, {folder!r})
-from test_pso import PaperPSO, Valley, minimize
-result = minimize(Valley(), PaperPSO(), seed=7)
-print(result.X.tobytes().hex(), result.F.tobytes().hex(), result.pop.get("X").tobytes().hex()[-64:])
-"""
-
-
-def test_the_same_bits_in_another_process() -> None:
-    result = minimize(Valley(), PaperPSO(), seed=7)
-    here = [result.X.tobytes().hex(), result.F.tobytes().hex(), result.pop.get("X").tobytes().hex()[-64:]]
-    script = SCRIPT.format(folder=str(Path(__file__).parent))
-    for _ in range(2):
-        there = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-        assert there.stdout.split() == here
-    other = minimize(Valley(), PaperPSO(), seed=8)
-    assert other.X.tobytes().hex() != here[0]
-
-
-def test_global_random_numbers_are_left_alone() -> None:
-    before = pickle.dumps(np.random.get_state())
-    minimize(Valley(), PaperPSO(), ("n_gen", 3), seed=1)
-    assert pickle.dumps(np.random.get_state()) == before
-
-
-@pytest.mark.parametrize("budget", [1, 79, 80, 81, 1000, 12000])
+@pytest.mark.parametrize("budget", [1, 80, 81, 1000])
 def test_the_meter_ends_the_run_exactly(budget: int) -> None:
     meter = Meter(budget)
     problem = Valley(meter=meter)
@@ -170,18 +144,9 @@ def test_the_meter_ends_the_run_exactly(budget: int) -> None:
     np.testing.assert_array_equal(meter.log().X, seen[:budget])
 
 
-def test_the_meter_ends_the_run_at_its_target() -> None:
-    meter = Meter(12000, target=0.2)
-    result = minimize(Valley(meter=meter), PaperPSO(), MeterTermination(meter), seed=1)
-    assert meter.best_f <= 0.2
-    assert meter.used < 12000
-    assert result.F[0] == meter.best_f
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_best_is_never_lost_and_the_box_is_kept(seed: int) -> None:
+def test_the_best_is_never_lost_and_the_box_is_kept() -> None:
     problem, bests = Valley(), Bests()
-    result = minimize(problem, PaperPSO(), seed=seed, callback=bests)
+    result = minimize(problem, PaperPSO(), seed=1, callback=bests)
     seen = np.concatenate(problem.seen)
     values = valley(seen)
     assert (np.abs(seen) <= 2.0).all()
@@ -267,42 +232,29 @@ def test_values_of_the_problem_beside_the_fitness_reach_the_individuals() -> Non
     np.testing.assert_array_equal(pop.get("twice"), 2.0 * pop.get("F")[:, 0])
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"n_particle": 80}, "no option 'n_particle', did you mean 'n_particles'?"),
-        ({"sede": 3}, "no option 'sede', did you mean 'seed'?"),
-        ({"n_particles": 0}, "n_particles is 0, expected a whole number above 0"),
-        ({"n_iterations": 1.5}, "n_iterations is 1.5"),
-        ({"c1": -1.0}, "c1 is -1.0, expected a number of at least 0"),
-        ({"c2": float("nan")}, "c2 is nan"),
-        ({"first_inertia": "0.9"}, "first_inertia is '0.9'"),
-        ({"velocity_limit": "litteral"}, "velocity_limit is 'litteral', expected 'literal' or a fraction"),
-        ({"velocity_limit": 0.0}, "velocity_limit is 0.0"),
-        ({"first_velocity": None}, "first_velocity is None"),
-    ],
-)
+@pytest.mark.parametrize(("options", "sentence"), [
+    ({"n_particle": 80}, "no option 'n_particle', did you mean 'n_particles'?"),
+    ({"sede": 3}, "no option 'sede', did you mean 'seed'?"),
+    ({"n_particles": 0}, "n_particles is 0, expected a whole number above 0"),
+    ({"n_iterations": 1.5}, "n_iterations is 1.5"),
+    ({"c1": -1.0}, "c1 is -1.0, expected a number of at least 0"), ({"c2": float("nan")}, "c2 is nan"),
+    ({"first_inertia": "0.9"}, "first_inertia is '0.9'"),
+    ({"velocity_limit": "litteral"}, "velocity_limit is 'litteral', expected 'literal' or a fraction"),
+    ({"velocity_limit": 0.0}, "velocity_limit is 0.0"), ({"first_velocity": None}, "first_velocity is None"),
+])  # fmt: skip
 def test_refuses_options_in_a_sentence(options: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ValueError) as refusal:
         PaperPSO(**options)
     assert sentence in str(refusal.value)
 
 
-def test_refuses_what_minimize_would_swallow() -> None:
-    with pytest.raises(ValueError, match="no option 'sede', did you mean 'seed'"):
-        minimize(Valley(), PaperPSO(), sede=3)
-
-
-@pytest.mark.parametrize(
-    ("problem", "sentence"),
-    [
-        (Problem(n_var=2, n_obj=2, xl=0.0, xu=1.0), "2 objectives"),
-        (Problem(n_var=2, n_obj=1, n_ieq_constr=1, xl=0.0, xu=1.0), "1 constraints"),
-        (Problem(n_var=2, n_obj=1), "bounds are None and None"),
-        (Problem(n_var=2, n_obj=1, xl=0.0, xu=np.inf), "expected a finite box"),
-        (Problem(n_var=2, n_obj=1, xl=1.0, xu=0.0), "expected a finite box"),
-    ],
-)
+@pytest.mark.parametrize(("problem", "sentence"), [
+    (Problem(n_var=2, n_obj=2, xl=0.0, xu=1.0), "2 objectives"),
+    (Problem(n_var=2, n_obj=1, n_ieq_constr=1, xl=0.0, xu=1.0), "1 constraints"),
+    (Problem(n_var=2, n_obj=1), "bounds are None and None"),
+    (Problem(n_var=2, n_obj=1, xl=0.0, xu=np.inf), "expected a finite box"),
+    (Problem(n_var=2, n_obj=1, xl=1.0, xu=0.0), "expected a finite box"),
+])  # fmt: skip
 def test_refuses_problems_it_cannot_search(problem: Problem, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         minimize(problem, PaperPSO(), seed=1)
@@ -346,6 +298,7 @@ print(json.dumps(errors))
 """
 
 
+@pytest.mark.slow
 def test_pyswarms_finds_as_much(tmp_path: Path) -> None:
     # in a process and a folder of its own: pyswarms draws from the global generator, reconfigures logging, writes a log
     # file; its first iteration counts as 0 and its first velocities fill the limit, so both are matched to ours there
@@ -357,19 +310,16 @@ def test_pyswarms_finds_as_much(tmp_path: Path) -> None:
     assert abs(np.median(a) - np.median(b)) < 0.5
 
 
-@pytest.mark.parametrize(
-    ("budget", "n_particles", "n_iterations"), [(12000, 80, 150), (81, 80, 2), (80, 80, 1), (7, 7, 1)]
-)
-def test_the_catalogue_stretches_the_schedule_over_the_budget(budget: int, n_particles: int, n_iterations: int) -> None:
-    swarm = IDENTIFIERS["pso"].build(budget)
-    assert (swarm.n_particles, swarm.n_iterations) == (n_particles, n_iterations)
-    assert swarm is not IDENTIFIERS["pso"].build(budget)
-
-
-def test_the_catalogue_refuses_a_budget_that_is_none() -> None:
-    for budget in (0, -5, 1.5, "12"):
+def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
+    for budget, n_particles, n_iterations in ((12000, 80, 150), (81, 80, 2), (80, 80, 1), (7, 7, 1)):
+        swarm = IDENTIFIERS["pso"].build(budget)
+        assert (swarm.n_particles, swarm.n_iterations) == (n_particles, n_iterations)
+    given = IDENTIFIERS["pso"].with_options({"velocity_limit": 0.2, "c1": 2, "n_particles": 20}).build(200)
+    assert (given.velocity_limit, given.c1, given.n_particles, given.n_iterations) == (0.2, 2.0, 20, 10)
+    assert IDENTIFIERS["pso"].with_options({}) is IDENTIFIERS["pso"]
+    for wrong in (0, -5, 1.5, "12"):
         with pytest.raises(ValueError, match="expected a whole number above 0"):
-            IDENTIFIERS["pso"].build(budget)  # type: ignore[arg-type]
+            IDENTIFIERS["pso"].build(wrong)  # type: ignore[arg-type]
 
 
 def a_small_swarm(budget: int) -> PaperPSO:
@@ -388,20 +338,14 @@ def test_as_identifier() -> None:
         assert pickle.loads(pickle.dumps(identifier)).build(40).n_particles > 0
 
 
-@pytest.mark.parametrize(
-    ("obj", "sentence"),
-    [
-        (PaperPSO(), "is a PaperPSO built already, expected a subclass"),
-        (3, "is 3, expected a subclass of pymoo's Algorithm or a function of the budget"),
-        (dict, "expected a subclass"),
-        (lambda budget, more: PaperPSO(), "expected a subclass"),
-    ],
-)
+@pytest.mark.parametrize(("obj", "sentence"), [
+    (PaperPSO(), "is a PaperPSO built already, expected a subclass"),
+    (3, "is 3, expected a subclass of pymoo's Algorithm or a function of the budget"),
+    (dict, "expected a subclass"), (lambda budget, more: PaperPSO(), "expected a subclass"),
+    (lambda budget: budget, "identifier 'mine' returned a int, expected an Algorithm"),
+])  # fmt: skip
 def test_as_identifier_refuses(obj: Any, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
-        as_identifier("mine", obj)
-
-
-def test_a_function_that_returns_no_algorithm_is_refused() -> None:
-    with pytest.raises(ValueError, match="identifier 'mine' returned a int, expected an Algorithm"):
-        as_identifier("mine", lambda budget: budget).build(10)
+        as_identifier("mine", obj).build(10)
+    with pytest.raises(ValueError, match="takes no options"):
+        as_identifier("mine", a_small_swarm).with_options({"pop_size": 10})

@@ -13,12 +13,12 @@ from searches import COMPOSED, Bowl, identifier, ran
 
 from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS
-from armid.identifiers.adapter import Searching
+from armid.identifiers.pymoo_adapter import SearchAlgorithm
 from armid.problem.fitness import FITNESS
 
 ALL = (*IDENTIFIERS, *COMPOSED)
 ON_SCALARS = [name for name in ALL if "least_squares" not in name]
-OURS = [name for name in ALL if isinstance(identifier(name).build(10), Searching)]
+OURS = [name for name in ALL if isinstance(identifier(name).build(10), SearchAlgorithm)]
 
 
 @pytest.mark.parametrize("name", ON_SCALARS)
@@ -119,7 +119,7 @@ def test_what_minimize_would_swallow_is_refused() -> None:
     with pytest.raises(ArmidError, match="no option 'sede', did you mean 'seed'"):
         minimize(Bowl(), identifier("bobyqa").build(10), sede=3)
     with pytest.raises(ArmidError, match="no option 'terminaton'"):
-        Searching(lambda task: iter(()), 10, terminaton=3)  # type: ignore[arg-type,return-value]
+        SearchAlgorithm(lambda task: iter(()), 10, terminaton=3)  # type: ignore[arg-type,return-value]
     with pytest.raises(ArmidError, match="no problem yet"):
         identifier("bobyqa").build(10).ask()
     with pytest.raises(ArmidError, match="2 objectives"):

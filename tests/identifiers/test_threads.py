@@ -13,7 +13,7 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from searches import Bowl, identifier, ran
 
-from armid.identifiers.search import Asker, as_search
+from armid.identifiers.search import Asker, in_thread
 
 IN_THREADS = ("nelder_mead", "lbfgs", "least_squares", "multistart:bobyqa", "random+bobyqa")
 
@@ -84,7 +84,7 @@ def failing(routine_error: BaseException) -> Callable[[Asker], bool]:
 def test_an_error_of_the_routine_comes_out(error: BaseException) -> None:
     from armid.identifiers.search import Told
 
-    search = as_search(failing(error))
+    search = in_thread(failing(error))
     assert next(search).X.shape == (1, 2)
     with pytest.raises(type(error)) as came:
         search.send(Told(np.zeros(1)))

@@ -7,7 +7,6 @@ import pytest
 
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
-from armid.model import EFFECTS, Model
 from armid.problem.replay import accuracy_for, replay_of, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
@@ -65,13 +64,3 @@ def test_threads_change_no_bit(lowering, arm, arm_space, lowering_replays):
     two = replays(lowering.train, arm, arm_space, threads=2)
     candidates = arm_space.complete(np.random.default_rng(1).uniform(arm_space.low, arm_space.high, (70, 4)))
     np.testing.assert_array_equal(two[0].signal(candidates), lowering_replays[0].signal(candidates))
-
-
-def test_effects_enter(lowering, arm, arm_space):
-    model = Model(arm.plant) + EFFECTS["coulomb"]
-    replay = replay_of(lowering.train[0], model, space_of(model))
-    still = np.array([[*TRUTH[0], 0.0, 0.01]])
-    rubbing = np.array([[*TRUTH[0], 60.0, 0.01]])
-    bare = replay_of(lowering.train[0], arm, arm_space).signal(TRUTH)
-    np.testing.assert_allclose(replay.signal(still), bare, atol=2e-5)
-    assert np.max(np.abs(replay.signal(rubbing) - replay.signal(still))) > 0.05

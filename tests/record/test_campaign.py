@@ -1,17 +1,16 @@
-"""What a campaign that can be used reads as."""
+"""What a campaign that can be used reads as, and how one is written."""
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Effect, Parameter
-from armid.record import Override, read_campaign
+from armid.record import Override, read_campaign, write_campaign
+from armid.record.table import read_table
 
 DEGREE = np.pi / 180
-REPOSITORY = Path(__file__).parents[2]
 ARM = """\
 name = "c00"
 plant = "shell_transfer_arm"
@@ -113,10 +112,6 @@ def test_parameters_by_either_spelling(write_two, text):
     assert campaign.parameters == {"p0": Override(low=2.9e6, high=3.2e6), "coulomb.width": Override(fixed=0.01)}
 
 
-def test_one_bound_is_enough(write_two):
-    assert read_campaign(write_two(top="[parameters.n]\nhigh = 1.45")).parameters == {"n": Override(high=1.45)}
-
-
 def test_own_plants_and_effects_can_be_named(write_two):
     hum = Effect("hum", (Parameter("size", "effort", 0.0, 0.1, null=0.0),), {"torque": lambda size: size})
     folder = write_two(top="[parameters.hum.size]\nhigh = 4.0")
@@ -173,8 +168,34 @@ def test_a_faint_signal_below_the_gyro_range_is_not_saturated(write_two, arm_col
     assert read_campaign(folder).records[0].n_samples == 1201
 
 
-def test_the_committed_campaign_reads():
-    folder = REPOSITORY / "studies" / "campaigns" / "paper_arm"
-    if not folder.is_dir():
-        pytest.skip(f"{folder.name} is not there: this checkout comes without studies")
-    assert read_campaign(folder).train
+TABLES = {"a.csv": {"time_s": np.arange(5) / 3, "velocity_m_s": np.array([0.1, 1e-300, -7.0, 1 / 3, 1e20])}}
+
+
+def test_numbers_read_back_to_the_bit(tmp_path):
+    folder = write_campaign(tmp_path / "deep" / "out", "name = 'x'\n", TABLES)
+    assert (folder / "campaign.toml").read_text() == "name = 'x'\n"
+    columns = read_table(folder / "a.csv", "a.csv").columns
+    assert list(columns) == ["time_s", "velocity_m_s"]
+    for name, values in TABLES["a.csv"].items():
+        np.testing.assert_array_equal(columns[name], values)
+    assert [p.name for p in folder.parent.iterdir()] == ["out"]
+
+
+def test_nothing_is_overwritten_but_an_empty_folder(tmp_path):
+    (tmp_path / "empty").mkdir()
+    assert (write_campaign(tmp_path / "empty", "", TABLES) / "a.csv").is_file()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine.txt").write_text("mine")
+    with pytest.raises(ArmidError, match="out' exists already"):
+        write_campaign(tmp_path / "out", "", TABLES)
+    with pytest.raises(ArmidError, match=r"mine\.txt' exists already"):
+        write_campaign(tmp_path / "out" / "mine.txt", "", TABLES)
+    with pytest.raises(ArmidError, match="cannot be written"):
+        write_campaign(tmp_path / "out" / "mine.txt" / "below", "", TABLES)
+
+
+def test_nothing_half_written_stays(tmp_path):
+    uneven = {"a.csv": {"time_s": np.arange(5), "velocity_m_s": np.arange(4)}}
+    with pytest.raises(ValueError, match="shorter"):
+        write_campaign(tmp_path / "out", "", uneven)
+    assert list(tmp_path.iterdir()) == []

@@ -28,6 +28,8 @@ def test_white_rest(rng):
 def test_short_white_rest_stays_white(rng):
     fractions = [noise_of(rng.normal(0, 1, 100), MOTION, INTERVAL).effective_fraction for _ in range(200)]
     assert np.median(fractions) == 1.0
+    alternating = np.diff(rng.normal(0, 1, 20_001))
+    assert noise_of(alternating, MOTION, INTERVAL).effective_fraction == 1.0
 
 
 @pytest.mark.parametrize("time_constant", [0.002, 0.01])
@@ -40,19 +42,11 @@ def test_coloured_rest(rng, time_constant):
     assert noise.effective_fraction == pytest.approx((1 - phi) / (1 + phi), rel=0.1)
 
 
-def test_alternating_rest_is_not_better_than_white(rng):
-    rest = np.diff(rng.normal(0, 1, 20_001))
-    assert noise_of(rest, MOTION, INTERVAL).effective_fraction == 1.0
-
-
-@pytest.mark.parametrize("level", [0.0, 0.1])
-def test_a_silent_rest_is_noise_free(level):
-    noise = noise_of(np.full(100, level), MOTION, INTERVAL)
-    assert (noise.rms, noise.correlation_time_s, noise.effective_fraction) == (0.0, 0.0, 1.0)
-    assert noise.mean == pytest.approx(level)
-
-
-def test_a_silent_rest_of_a_coarse_signal_has_the_noise_of_its_steps():
+def test_a_silent_rest_is_noise_free_but_for_the_steps_of_a_coarse_signal():
+    for level in (0.0, 0.1):
+        noise = noise_of(np.full(100, level), MOTION, INTERVAL)
+        assert (noise.rms, noise.correlation_time_s, noise.effective_fraction) == (0.0, 0.0, 1.0)
+        assert noise.mean == pytest.approx(level)
     noise = noise_of(np.zeros(100), np.round(MOTION, 2), INTERVAL)
     assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
 
@@ -71,11 +65,8 @@ def test_differences_keep_transients_out(rng):
     assert difference_rms(jerky + rng.normal(0, 0.005, 2000)) == pytest.approx(0.005, rel=0.3)
 
 
-def test_differences_of_a_smooth_motion_vanish():
+def test_differences_of_a_smooth_motion_vanish_and_of_a_coarse_one_are_its_steps():
     assert difference_rms(MOTION) < 1e-12
-
-
-def test_differences_of_a_coarse_signal_have_its_steps():
     coarse = np.round(MOTION / 0.05) * 0.05
     assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
 

@@ -10,6 +10,11 @@ from numpy.typing import NDArray
 from armid.engine import probes
 from armid.model import Effect, Input, Manoeuvre, Model, Parameter, Plant
 
+Array = NDArray[np.float64]
+N_SAMPLES, INTERVAL = 401, 2e-3
+# The moment of gravity that a hanging axis gets, as a share of the effort scale.
+GRAVITY = 0.4
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -23,11 +28,14 @@ class Finding:
 def check_parameters(parameters: Iterable[Parameter]) -> list[Finding]:
     """Tell whether bounds are finite, other values lie between them, and units are named."""
     given = list(parameters)
+    outside = [
+        p.name for p in given if not all(p.low <= v <= p.high for v in (p.null, p.fixed, p.nominal) if v is not None)
+    ]
     named = "the only parameter" if len(given) == 1 else f"all {len(given)} parameters"
     return [
         finding("bounds", [p.name for p in given if not np.isfinite([p.low, p.high]).all()],
                 "bounds of {} are not finite", f"finite and ordered for {named}"),
-        finding("values", [p.name for p in given if not inside(p)],
+        finding("values", outside,
                 "null, fixed or nominal value of {} is outside the bounds", f"inside the bounds for {named}"),
         finding("units", [p.name for p in given if not p.unit.strip()],
                 "{} has no unit: '1' is expected for a plain number", f"named for {named}"),
@@ -37,14 +45,6 @@ def check_parameters(parameters: Iterable[Parameter]) -> list[Finding]:
 def finding(name: str, wrong: list[str], says: str, otherwise: str) -> Finding:
     """Return a finding that fails where names are wrong, and tells them."""
     return Finding(name, not wrong, says.format(", ".join(wrong)) if wrong else otherwise)
-
-
-def inside(p: Parameter) -> bool:
-    """Tell whether every declared value lies between the bounds."""
-    return all(p.low <= v <= p.high for v in (p.null, p.fixed, p.nominal) if v is not None)
-
-
-Array = NDArray[np.float64]
 
 
 def nominal(model: Model) -> Array:
@@ -91,7 +91,7 @@ def corners(model: Model, effect: Effect) -> Array:
 
 
 def strengths_of(effect: Effect) -> list[Parameter]:
-    """Return the parameters with a null value; one that is fixed by declaration is none, as nothing traces by it."""
+    """Return the parameters with a null value; one that is fixed by declaration is none, as nothing is found by it."""
     return [p for p in effect.parameters if p.null is not None and p.fixed is None]
 
 
@@ -110,37 +110,26 @@ def from_null(model: Model, effect: Effect, shares: Array) -> Array:
     return np.array(moved)
 
 
-N_SAMPLES, INTERVAL = 401, 2e-3
-GRAVITY = 0.4
-
-
 def trial_manoeuvres(plant: Plant) -> list[Manoeuvre]:
-    """Return two manoeuvres of a plant: there and back; inputs are a sine and a sawtooth over their typical range."""
+    """Return two manoeuvres of a plant: there and back; inputs are a sine and a sawtooth over their typical range.
+
+    An input without one moves over half the effort scale, per unit of gain.
+    """
     times = INTERVAL * np.arange(N_SAMPLES)
     shapes = (np.sin(9.0 * times), 2.0 * ((1.3 * times) % 1.0) - 1.0)
+    gain = next((c.value for c in plant.constants if c.name == "gain"), 1.0)
+    size = 0.5 * plant.scales.effort / (gain or 1.0)
+
+    def moved(driven: Input, shape: Array) -> Array:
+        if driven.typical is None:
+            return size * shape
+        low, high = driven.typical
+        return 0.5 * (low + high) + 0.5 * (high - low) * shape
+
     return [
-        Manoeuvre(INTERVAL, N_SAMPLES, constants_of(plant, turned), inputs_of(plant, shape))
+        Manoeuvre(INTERVAL, N_SAMPLES, constants_of(plant, turned), {i.name: moved(i, shape) for i in plant.inputs})
         for turned, shape in enumerate(shapes)
     ]
-
-
-def inputs_of(plant: Plant, shape: Array) -> dict[str, Array]:
-    """Return every input, all moving alike."""
-    return {i.name: moved(plant, i, shape) for i in plant.inputs}
-
-
-def moved(plant: Plant, driven: Input, shape: Array) -> Array:
-    """Return an input that moves with a shape from -1 to 1 over its typical range, else over the effort scale."""
-    if driven.typical is None:
-        return size(plant) * shape
-    low, high = driven.typical
-    return 0.5 * (low + high) + 0.5 * (high - low) * shape
-
-
-def size(plant: Plant) -> float:
-    """Return a size for inputs: half the effort scale, per unit of gain."""
-    gain = next((c.value for c in plant.constants if c.name == "gain"), 1.0)
-    return 0.5 * plant.scales.effort / (gain or 1.0)
 
 
 def constants_of(plant: Plant, turned: int) -> dict[str, float]:

@@ -15,10 +15,9 @@ from pymoo.optimize import minimize
 
 from armid.errors import ArmidError
 from armid.estimation.information import Information, information_at
-from armid.identifiers import Identifier, can_run_alone, run_alone
+from armid.identifiers import Identifier, can_run_directly, run_directly
 from armid.model import Model
-from armid.problem.fitness import Fitness
-from armid.problem.measures import chi_square, mean_square
+from armid.problem.fitness import Fitness, chi_square, mean_square
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem, fitness_of, weights_of
 from armid.problem.replay import Replay, replays
@@ -235,8 +234,8 @@ def run(
     algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
 ) -> None:
     """Run an algorithm until it is over, which is asked after each generation; one of ours without pymoo's loop."""
-    if can_run_alone(algorithm):
-        run_alone(algorithm, problem, seed, is_over)
+    if can_run_directly(algorithm):
+        run_directly(algorithm, problem, seed, is_over)
         return
 
     def after_generation(running: Algorithm) -> None:

@@ -1,11 +1,24 @@
-"""Who searches: the paper's swarm and others, each an algorithm of pymoo."""
+"""Who searches: the paper's swarm and others, each an algorithm of pymoo.
 
-from armid.identifiers.adapter import Searching, can_run_alone, run_alone
+In reading order:
+identifier         what an identifier is, checks of its options, and how a user's own becomes one
+catalogue          identifiers by name, the composed ones too
+pso                the paper's swarm
+pymoo_algorithms   pymoo's own swarm, genetic algorithm and differential evolution
+cmaes              CMA-ES with restarts, and uniform random search
+nlopt              the local searches of NLopt
+least_squares      the trust region of scipy on the residual vector, and derivatives by differences
+chain              identifiers one after another, and multistart
+search             what a search is: it asks for candidates and is told their fitness; threads, starts, failures
+pymoo_adapter      a search as an algorithm of pymoo, an algorithm of pymoo as a search, and a run without pymoo's loop
+"""
+
 from armid.identifiers.catalogue import IDENTIFIERS, identifier_of
 from armid.identifiers.identifier import Identifier, as_identifier
 from armid.identifiers.pso import PaperPSO
+from armid.identifiers.pymoo_adapter import SearchAlgorithm, can_run_directly, run_directly
 
 __all__ = [
-    "IDENTIFIERS", "Identifier", "PaperPSO", "Searching", "as_identifier", "can_run_alone", "identifier_of",
-    "run_alone",
+    "IDENTIFIERS", "Identifier", "PaperPSO", "SearchAlgorithm", "as_identifier", "can_run_directly", "identifier_of",
+    "run_directly",
 ]  # fmt: skip

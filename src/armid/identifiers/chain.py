@@ -11,9 +11,176 @@ from pymoo.core.algorithm import Algorithm
 
 from armid.engine import golden_steps
 from armid.errors import ArmidError, nearest
-from armid.identifiers.adapter import Searching, search_of, takes_start
 from armid.identifiers.identifier import Identifier, checked_share
-from armid.identifiers.search import Array, Ask, Asker, Best, Dropped, Method, Search, Task, Told
+from armid.identifiers.pymoo_adapter import SearchAlgorithm, search_of, takes_start
+from armid.identifiers.search import Array, Ask, Best, Dropped, Method, Search, SearchTask, Told
+
+PREFIX = "multistart:"
+Build = Callable[[], Algorithm]
+
+
+def chain_of(phases: Sequence[Identifier]) -> Identifier:
+    """Return the identifier that runs several one after another.
+
+    Option `share`: of the budget for each phase but the last, "0.5" or "0.5:0.3"; without it each phase has half of
+    what is left. Options of a phase carry its name, as in `pso.velocity_limit`.
+    Raises ArmidError for a global one after the first.
+    """
+    for phase in phases[1:]:
+        if phase.is_global and not phase.name.startswith("multistart:"):
+            raise ArmidError(f"identifier '{phase.name}' is global, in a chain it is expected to be the first")
+    return Identifier(
+        "+".join(phase.name for phase in phases), partial(built_chain, tuple(phases)),
+        ", then ".join(phase.name for phase in phases), is_global=any(phase.is_global for phase in phases),
+        uses_gradient=any(phase.uses_gradient for phase in phases),
+        is_stochastic=any(phase.is_stochastic for phase in phases),
+        needs_residuals=any(phase.needs_residuals for phase in phases),
+    )  # fmt: skip
+
+
+def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> SearchAlgorithm:
+    """Build the algorithm; refuse with ArmidError unknown options, bad shares, and a later phase without a start."""
+    told = of_phases(options, phases, ("share",), f"'{'+'.join(phase.name for phase in phases)}'")
+    shares = shares_of(options.get("share"), len(phases))
+    builds = [partial(phase.build, max(1, round(share * budget))) for phase, share in zip(told, shares, strict=True)]
+    for phase, build in zip(phases, builds, strict=True):
+        if not takes_start(build()) and phase is not phases[0]:
+            raise ArmidError(f"identifier '{phase.name}' takes no start x0, in a chain it is expected to be the first")
+    ends = [round(end * budget) for end in accumulate(shares[:-1])]
+    return SearchAlgorithm(chain_method(list(zip(builds, ends, strict=False)), builds[-1]), budget)
+
+
+def shares_of(given: Any, n_phases: int) -> list[float]:
+    """Return the share of the budget of each phase, the last gets the rest.
+
+    Raises ArmidError for another number of shares than phases but one, and for shares that leave the last nothing.
+    """
+    if given is None:
+        shares = [0.5**phase for phase in range(1, n_phases)]
+    else:
+        parts = given.split(":") if isinstance(given, str) else given if isinstance(given, list | tuple) else [given]
+        shares = [checked_share("share", as_number(part)) for part in parts]
+    if len(shares) != n_phases - 1 or sum(shares) >= 1.0:
+        raise ArmidError(f"share is {given!r}, expected {n_phases - 1} shares of the budget with a sum below 1, "
+                         "one for each phase but the last, such as 0.5 or 0.5:0.3")  # fmt: skip
+    return [*shares, 1.0 - sum(shares)]
+
+
+def as_number(part: Any) -> Any:
+    """Return a text as a number where it is one."""
+    try:
+        return float(part) if isinstance(part, str) else part
+    except ValueError:
+        return part
+
+
+def chain_method(first: Sequence[tuple[Build, int]], last: Build) -> Method:
+    """Return the search that ends each of the first phases at so many simulations, counted from the chain's start."""
+
+    def method(task: SearchTask) -> Search:
+        seen = Seen(task)
+        for build, end in first:
+            yield from seen.until(build, end)
+        yield from seen.until(last, None)
+        return seen.best.x is not None
+
+    return method
+
+
+class Seen:
+    """Follow the phases of a chain: count what they ask for and keep the best, where the next one starts."""
+
+    def __init__(self, task: SearchTask) -> None:
+        self.task, self.best, self.used = task, Best(), 0
+        self.best.x = task.start
+
+    def until(self, build: Build, end: int | None) -> Search:
+        """Run a fresh phase until it ends by itself or so many simulations are used; its last batch may be cut."""
+
+        def over() -> bool:
+            return end is not None and self.used >= end
+
+        def cut(X: Array) -> Array:
+            return X if end is None else X[: end - self.used]
+
+        def ask(X: Array, residuals: bool = False) -> Told:
+            assert self.task.ask is not None
+            kept = cut(X)
+            told = self.see(kept, self.task.ask(kept, residuals))
+            if over():
+                raise Dropped
+            return told
+
+        if over():
+            return True
+        asker = None if self.task.ask is None else ask
+        search = search_of(build(), replace(self.task, start=self.best.x, ask=asker))
+        told: Told | None = None
+        try:
+            while not over():
+                asked = search.send(told)  # type: ignore[arg-type]
+                kept = cut(asked.X)
+                told = self.see(kept, (yield Ask(kept, asked.residuals)))
+        except StopIteration:
+            return True
+        except Dropped:
+            if not over():
+                raise
+        finally:
+            search.close()
+        return True
+
+    def see(self, X: Array, told: Told) -> Told:
+        """Count candidates and keep the best; return what was told of them."""
+        self.used += len(X)
+        self.best.see(X, told.F)
+        return told
+
+
+def multistart_of(local: Identifier) -> Identifier:
+    """Return the identifier that starts a local one from points spread over the box until the budget is used.
+
+    Options of the local one carry its name, as in `bobyqa.tolerance`.
+    Raises ArmidError for a global one.
+    """
+    if local.is_global:
+        raise ArmidError(f"identifier '{local.name}' is global, {PREFIX} expects a local one")
+    return Identifier(
+        f"{PREFIX}{local.name}", partial(built_multistart, local), f"{local.name} from ever new starts", is_global=True,
+        uses_gradient=local.uses_gradient, needs_residuals=local.needs_residuals,
+    )  # fmt: skip
+
+
+def built_multistart(local: Identifier, budget: int, **options: Any) -> SearchAlgorithm:
+    """Build the algorithm; refuse with ArmidError a local one that takes no start, and options that nobody knows."""
+    (told,) = of_phases(options, (local,), (), f"'{PREFIX}{local.name}'")
+    build = partial(told.build, budget)
+    algorithm = build()
+    if not takes_start(algorithm):
+        raise ArmidError(f"identifier '{local.name}' takes no start x0, {PREFIX} expects one that does")
+    return SearchAlgorithm(multistart_method(build), budget)
+
+
+def multistart_method(build: Callable[[], Algorithm]) -> Method:
+    """Return the search that starts a fresh local one at the task's start, if it has one, then at spread points."""
+
+    def method(task: SearchTask) -> Search:
+        cube = task.cube
+        start = task.start
+        for point in spread(task.random, cube.n):
+            yield from search_of(build(), task.at(cube.candidates(point)[0] if start is None else start))
+            start = None
+        return True
+
+    return method
+
+
+def spread(random: np.random.Generator, n: int) -> Iterator[Array]:
+    """Yield points that fill the unit cube ever more evenly: a Kronecker sequence from a random point, (n,) each."""
+    steps, point = golden_steps(n), random.random(n)
+    while True:
+        yield point
+        point = (point + steps) % 1.0
 
 
 def of_phases(
@@ -44,181 +211,3 @@ def told(phase: Identifier, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options as the phase itself wants them: a multistart passes them on by name."""
     prefix = f"{simple_name(phase)}." if phase.name != simple_name(phase) else ""
     return {f"{prefix}{option}": value for option, value in options.items()}
-
-
-Build = Callable[[], Algorithm]
-
-
-def chain_of(phases: Sequence[Identifier]) -> Identifier:
-    """Return the identifier that runs several one after another.
-
-    Option `share`: of the budget for each phase but the last, "0.5" or "0.5:0.3"; without it each phase has half of
-    what is left. Options of a phase carry its name, as in `pso.velocity_limit`.
-    Raises ArmidError for a global one after the first.
-    """
-    for phase in phases[1:]:
-        if phase.is_global and not phase.name.startswith("multistart:"):
-            raise ArmidError(f"identifier '{phase.name}' is global, in a chain it is expected to be the first")
-    return Identifier(
-        "+".join(phase.name for phase in phases), partial(built_chain, tuple(phases)),
-        ", then ".join(phase.name for phase in phases), is_global=any(phase.is_global for phase in phases),
-        uses_gradient=any(phase.uses_gradient for phase in phases),
-        is_stochastic=any(phase.is_stochastic for phase in phases),
-        needs_residuals=any(phase.needs_residuals for phase in phases),
-    )  # fmt: skip
-
-
-def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> Searching:
-    """Build the algorithm; refuse with ArmidError unknown options, bad shares, and a later phase without a start."""
-    told = of_phases(options, phases, ("share",), f"'{'+'.join(phase.name for phase in phases)}'")
-    shares = shares_of(options.get("share"), len(phases))
-    builds = [partial(phase.build, max(1, round(share * budget))) for phase, share in zip(told, shares, strict=True)]
-    for phase, build in zip(phases, builds, strict=True):
-        if not takes_start(build()) and phase is not phases[0]:
-            raise ArmidError(f"identifier '{phase.name}' takes no start x0, in a chain it is expected to be the first")
-    ends = [round(end * budget) for end in accumulate(shares[:-1])]
-    return Searching(chain_method(list(zip(builds, ends, strict=False)), builds[-1]), budget)
-
-
-def shares_of(given: Any, n_phases: int) -> list[float]:
-    """Return the share of the budget of each phase, the last gets the rest.
-
-    Raises ArmidError for another number of shares than phases but one, and for shares that leave the last nothing.
-    """
-    if given is None:
-        shares = [0.5**phase for phase in range(1, n_phases)]
-    else:
-        parts = given.split(":") if isinstance(given, str) else given if isinstance(given, list | tuple) else [given]
-        shares = [checked_share("share", as_number(part)) for part in parts]
-    if len(shares) != n_phases - 1 or sum(shares) >= 1.0:
-        raise ArmidError(f"share is {given!r}, expected {n_phases - 1} shares of the budget with a sum below 1, "
-                         "one for each phase but the last, such as 0.5 or 0.5:0.3")  # fmt: skip
-    return [*shares, 1.0 - sum(shares)]
-
-
-def as_number(part: Any) -> Any:
-    """Return a text as a number where it is one."""
-    try:
-        return float(part) if isinstance(part, str) else part
-    except ValueError:
-        return part
-
-
-def chain_method(first: Sequence[tuple[Build, int]], last: Build) -> Method:
-    """Return the search that ends each of the first phases at so many simulations, counted from the chain's start."""
-
-    def method(task: Task) -> Search:
-        seen = Seen(task)
-        for build, end in first:
-            yield from seen.until(build, end)
-        yield from seen.until(last, None)
-        return seen.best.x is not None
-
-    return method
-
-
-class Seen:
-    """Follow the phases of a chain: count what they ask for and keep the best, where the next one starts."""
-
-    def __init__(self, task: Task) -> None:
-        self.task, self.best, self.used = task, Best(), 0
-        self.best.x = task.start
-
-    def until(self, build: Build, end: int | None) -> Search:
-        """Run a fresh phase until it ends by itself or so many simulations are used; its last batch may be cut."""
-        if self.over(end):
-            return True
-        search = search_of(build(), replace(self.task, start=self.best.x, ask=self.asker(end)))
-        told: Told | None = None
-        try:
-            while not self.over(end):
-                asked = search.send(told)  # type: ignore[arg-type]
-                cut = self.cut(asked.X, end)
-                told = yield Ask(cut, asked.residuals)
-                self.see(cut, told)
-        except StopIteration:
-            return True
-        except Dropped:
-            if not self.over(end):
-                raise
-        finally:
-            search.close()
-        return True
-
-    def asker(self, end: int | None) -> Asker | None:
-        """Return what answers a phase at once, as the task does, until so many simulations are used."""
-        ask = self.task.ask
-        if ask is None:
-            return None
-
-        def within(X: Array, residuals: bool = False) -> Told:
-            cut = self.cut(X, end)
-            told = ask(cut, residuals)
-            self.see(cut, told)
-            if self.over(end):
-                raise Dropped
-            return told
-
-        return within
-
-    def over(self, end: int | None) -> bool:
-        """Tell whether so many simulations are used."""
-        return end is not None and self.used >= end
-
-    def cut(self, X: Array, end: int | None) -> Array:
-        """Return the candidates that a phase may still ask for."""
-        return X if end is None else X[: end - self.used]
-
-    def see(self, X: Array, told: Told) -> None:
-        """Count candidates and keep the best."""
-        self.used += len(X)
-        self.best.see(X, told.F)
-
-
-PREFIX = "multistart:"
-
-
-def multistart_of(local: Identifier) -> Identifier:
-    """Return the identifier that starts a local one from points spread over the box until the budget is used.
-
-    Options of the local one carry its name, as in `bobyqa.tolerance`.
-    Raises ArmidError for a global one.
-    """
-    if local.is_global:
-        raise ArmidError(f"identifier '{local.name}' is global, {PREFIX} expects a local one")
-    return Identifier(
-        f"{PREFIX}{local.name}", partial(built_multistart, local), f"{local.name} from ever new starts", is_global=True,
-        uses_gradient=local.uses_gradient, needs_residuals=local.needs_residuals,
-    )  # fmt: skip
-
-
-def built_multistart(local: Identifier, budget: int, **options: Any) -> Searching:
-    """Build the algorithm; refuse with ArmidError a local one that takes no start, and options that nobody knows."""
-    (told,) = of_phases(options, (local,), (), f"'{PREFIX}{local.name}'")
-    build = partial(told.build, budget)
-    algorithm = build()
-    if not takes_start(algorithm):
-        raise ArmidError(f"identifier '{local.name}' takes no start x0, {PREFIX} expects one that does")
-    return Searching(multistart_method(build), budget)
-
-
-def multistart_method(build: Callable[[], Algorithm]) -> Method:
-    """Return the search that starts a fresh local one at the task's start, if it has one, then at spread points."""
-
-    def method(task: Task) -> Search:
-        cube = task.cube
-        start = task.start
-        for point in spread(task.random, cube.n):
-            yield from search_of(build(), task.at(cube.candidates(point)[0] if start is None else start))
-            start = None
-        return True
-
-    return method
-
-
-def spread(random: np.random.Generator, n: int) -> Iterator[Array]:
-    """Yield points that fill the unit cube ever more evenly: a Kronecker sequence from a random point, (n,) each."""
-    steps, point = golden_steps(n), random.random(n)
-    while True:
-        yield point
-        point = (point + steps) % 1.0

@@ -3,16 +3,13 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pymoo.core.algorithm import Algorithm
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
 from armid.errors import ArmidError
 from armid.identifiers.identifier import OF_PYMOO, OF_SETUP, checked, checked_count, checked_population, refuse_unknown
-from armid.identifiers.search import SwarmEvaluator, as_population, box
-
-Array = NDArray[np.float64]
+from armid.identifiers.search import Array, SwarmEvaluator, as_population, bounds_of
 
 OWN = (
     "n_particles", "n_iterations", "c1", "c2", "first_inertia", "last_inertia", "velocity_limit", "first_velocity",
@@ -74,7 +71,7 @@ class PaperPSO(Algorithm):  # type: ignore[misc]
         return self.last_inertia + (self.first_inertia - self.last_inertia) * (last - min(t, last)) / last
 
     def _setup(self, problem: Problem, **_: Any) -> None:
-        self._low, self._high = box(problem)
+        self._low, self._high = bounds_of(problem)
         if self.velocity_limit is None:
             self._limit = np.maximum(abs(self._low), abs(self._high))
         else:

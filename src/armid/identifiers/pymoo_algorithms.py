@@ -2,13 +2,16 @@
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from pymoo.core.algorithm import Algorithm
 
 from armid.errors import ArmidError
 from armid.identifiers.identifier import (
+    Identifier,
     checked,
     checked_choice,
     checked_count,
@@ -30,52 +33,45 @@ def checked_variant(name: str, value: Any) -> str:
     return value
 
 
-def checked_velocity(name: str, value: Any) -> str:
-    """Return how the first velocities are made."""
-    return checked_choice(name, value, ("random", "zero"))
+@dataclass(frozen=True, eq=False)
+class PymooAlgorithm:
+    """Declare an algorithm of pymoo: where it stands, how many individuals it has, and the options that it may get.
+
+    options: option, as pymoo calls it -> check of its value; pymoo would swallow any other.
+    """
+
+    name: str
+    note: str
+    place: str
+    pop_size: int
+    options: Mapping[str, Check]
+
+    def __call__(self, budget: int, **options: Any) -> Algorithm:
+        """Return the algorithm; refuse with ArmidError options that pymoo would swallow, and bad values."""
+        checked_count("the budget", budget)
+        refuse_unknown(options, self.options, f"'{self.name}'")
+        given = {"pop_size": self.pop_size} | options
+        checked_values = {option: self.options[option](option, value) for option, value in given.items()}
+        module, kind = self.place.split(":")
+        algorithm = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{module}"), kind)
+        return algorithm(evaluator=SwarmEvaluator(finite=True), **checked_values)
+
+    def identifier(self) -> Identifier:
+        """Return its identifier."""
+        return Identifier(self.name, self, self.note, is_global=True)
 
 
-# Option, as pymoo calls it, and what it may be; pymoo would swallow any other.
-SWARM: Mapping[str, Check] = {
-    "pop_size": checked_population, "w": checked, "c1": checked, "c2": checked, "adaptive": checked_flag,
-    "initial_velocity": checked_velocity, "max_velocity_rate": checked_share, "pertube_best": checked_flag,
-}  # fmt: skip
-GENETIC: Mapping[str, Check] = {
-    "pop_size": checked_population, "n_offsprings": checked_population, "eliminate_duplicates": checked_flag,
-}  # fmt: skip
-DIFFERENTIAL: Mapping[str, Check] = {
-    "pop_size": checked_population, "n_offsprings": checked_population, "variant": checked_variant,
-    "CR": checked_share, "F": partial(checked, least=1e-6, expected="a number above 0"), "jitter": checked_flag,
-}  # fmt: skip
-
-
-def pymoo_swarm(budget: int, **options: Any) -> Algorithm:
-    """Return pymoo's adaptive swarm, 40 particles unless `pop_size` says otherwise."""
-    from pymoo.algorithms.soo.nonconvex.pso import PSO
-
-    return checked_algorithm(PSO, "pymoo_pso", budget, 40, SWARM, options)
-
-
-def genetic(budget: int, **options: Any) -> Algorithm:
-    """Return pymoo's genetic algorithm, 80 individuals unless `pop_size` says otherwise."""
-    from pymoo.algorithms.soo.nonconvex.ga import GA
-
-    return checked_algorithm(GA, "ga", budget, 80, GENETIC, options)
-
-
-def differential(budget: int, **options: Any) -> Algorithm:
-    """Return pymoo's differential evolution, 40 individuals unless `pop_size` says otherwise."""
-    from pymoo.algorithms.soo.nonconvex.de import DE
-
-    return checked_algorithm(DE, "de", budget, 40, DIFFERENTIAL, options)
-
-
-def checked_algorithm(
-    kind: type[Algorithm], name: str, budget: int, pop_size: int, known: Mapping[str, Check],
-    options: dict[str, Any],
-) -> Algorithm:  # fmt: skip
-    """Return an algorithm of pymoo; refuse with ArmidError options that it would swallow, and bad values."""
-    checked_count("the budget", budget)
-    refuse_unknown(options, known, f"'{name}'")
-    wanted = {option: known[option](option, value) for option, value in ({"pop_size": pop_size} | options).items()}
-    return kind(evaluator=SwarmEvaluator(finite=True), **wanted)
+PYMOO = (
+    PymooAlgorithm("pymoo_pso", "adaptive particle swarm (pymoo)", "pso:PSO", 40, {
+        "pop_size": checked_population, "w": checked, "c1": checked, "c2": checked, "adaptive": checked_flag,
+        "initial_velocity": partial(checked_choice, known=("random", "zero")), "max_velocity_rate": checked_share,
+        "pertube_best": checked_flag,
+    }),
+    PymooAlgorithm("ga", "genetic algorithm (pymoo)", "ga:GA", 80, {
+        "pop_size": checked_population, "n_offsprings": checked_population, "eliminate_duplicates": checked_flag,
+    }),
+    PymooAlgorithm("de", "differential evolution (pymoo)", "de:DE", 40, {
+        "pop_size": checked_population, "n_offsprings": checked_population, "variant": checked_variant,
+        "CR": checked_share, "F": partial(checked, least=1e-6, expected="a number above 0"), "jitter": checked_flag,
+    }),
+)  # fmt: skip

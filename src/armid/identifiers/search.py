@@ -1,4 +1,8 @@
-"""Individuals of pymoo made, read and evaluated in a fraction of its time."""
+"""What a search is: a generator that asks for candidates and is told their fitness.
+
+Also: the threads in which routines that call for values are run, the starts of local searches, and individuals of pymoo
+made, read and evaluated in a fraction of its time.
+"""
 
 import weakref
 from collections.abc import Callable, Generator
@@ -20,71 +24,8 @@ from armid.errors import ArmidError
 from armid.problem.meter import PENALTY
 
 Array = NDArray[np.float64]
-
-
-class SwarmEvaluator(Evaluator):  # type: ignore[misc]
-    """Evaluate as pymoo's Evaluator does, with one pass over the individuals instead of one for each attribute.
-
-    finite: give PENALTY instead of a fitness that is no finite number, for algorithms that a NaN would poison.
-    """
-
-    def __init__(self, finite: bool = False, **of_pymoo: Any) -> None:
-        super().__init__(**of_pymoo)
-        self.finite = finite
-
-    def eval(self, problem: Problem, pop: Population, *args: Any, **kwargs: Any) -> Population:
-        """Set F of individuals that nobody evaluated before; leave every other case to pymoo."""
-        plain = not args and kwargs.keys() <= {"algorithm"} and {"F", "G", "H"} <= set(self.evaluate_values_of)
-        fresh = isinstance(pop, Population) and not any(individual.evaluated for individual in pop)
-        if not (plain and fresh) or problem.has_constraints():
-            return self._finite(super().eval(problem, pop, *args, **kwargs))
-        x = np.array([individual.X for individual in pop])
-        values = [name for name in self.evaluate_values_of if name not in "GH"]
-        out = problem.evaluate(x, return_values_of=values, return_as_dictionary=True, **kwargs)
-        for individual, value in zip(pop, out.pop("F"), strict=True):
-            individual.F = value
-            individual.evaluated = {"F", "G", "H", *out}
-        for name, column in out.items():
-            pop.set(name, column)
-        self.n_eval += len(pop)
-        if self.callback:
-            self.callback(pop)
-        return self._finite(pop)
-
-    def _finite(self, evaluated: Any) -> Any:
-        if self.finite:
-            for individual in [evaluated] if isinstance(evaluated, Individual) else evaluated:
-                if not np.isfinite(individual.F).all():
-                    individual.F = np.where(np.isfinite(individual.F), individual.F, PENALTY)
-        return evaluated
-
-
-@cache
-def blank() -> dict[str, Any]:
-    """Return the attributes of an individual of which nothing is known."""
-    return dict(vars(Individual()))
-
-
-def as_population(x: Array, n_iter: int | None) -> Population:
-    """Return individuals at the candidates x, (n, n_parameters), as Population.new does, in a fraction of its time."""
-    attributes = blank()
-    pop = np.empty(len(x), dtype=object).view(Population)
-    for i in range(len(x)):
-        pop[i] = individual = Individual.__new__(Individual)
-        own = {"_X": x[i], "data": {"n_gen": n_iter, "n_iter": n_iter}, "evaluated": set()}
-        individual.__dict__ = attributes | own
-    return pop
-
-
-def box(problem: Problem) -> tuple[Array, Array]:
-    """Return the bounds of a problem; refuse with ArmidError one that our algorithms cannot search."""
-    if problem.n_obj != 1 or problem.has_constraints():
-        raise ArmidError(
-            f"the problem has {problem.n_obj} objectives and {problem.n_constr} constraints, expected 1 and 0"
-        )
-    if not problem.has_bounds() or not np.isfinite([problem.xl, problem.xu]).all() or (problem.xl > problem.xu).any():
-        raise ArmidError(f"the problem's bounds are {problem.xl} and {problem.xu}, expected a finite box")
-    return problem.xl, problem.xu
+# A start on a bound stalls the simplex.
+PULLED = 1e-3
 
 
 class Ask(NamedTuple):
@@ -112,8 +53,12 @@ class Dropped(BaseException):
     """Unwind a routine: nobody wants its candidates any more. No error, so that nobody catches it by the way."""
 
 
+class NoFitnessError(Exception):
+    """Say that the start of a local search has no fitness."""
+
+
 @dataclass(frozen=True, eq=False)
-class Task:
+class SearchTask:
     """Hold what a search works on: the problem, everything random, and where to start (None: wherever it likes).
 
     ask: answers at once where whoever runs the search lets it, and raises Dropped at the end of the run; a routine
@@ -125,14 +70,14 @@ class Task:
     start: Array | None = None
     ask: Asker | None = None
 
-    def at(self, start: Array | None) -> "Task":
+    def at(self, start: Array | None) -> "SearchTask":
         """Return the task with another start, (n_parameters,)."""
         return replace(self, start=start)
 
     @property
     def cube(self) -> "Cube":
         """The unit cube in which local searches work."""
-        return Cube(*box(self.problem))
+        return Cube(*bounds_of(self.problem))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +109,9 @@ class Cube:
 
 
 Search = Generator[Ask, Told, bool]
-Method = Callable[[Task], Search]
+Method = Callable[[SearchTask], Search]
 """What makes a search of a task; the search returns whether it met any candidate that has a fitness."""
+Routine = Callable[[Asker], bool]
 
 
 class Best:
@@ -182,105 +128,25 @@ class Best:
             self.x, self.f = X[i].copy(), float(F[i])
 
 
-class End(NamedTuple):
-    """How the routine ended: with a result, or with an error of its own."""
-
-    result: bool
-    error: BaseException | None
-
-
-class Line:
-    """The two queues between a search and its thread; the search holds it, the thread holds the queues alone."""
-
-    def __init__(self, routine: Callable[[Asker], bool]) -> None:
-        self.asked: SimpleQueue[Any] = SimpleQueue()
-        self.told: SimpleQueue[Told | None] = SimpleQueue()
-        self.thread = Thread(target=work, args=(routine, self.asked, self.told), name="armid search", daemon=True)
-        # also at the interpreter's exit, while daemon threads still run: later nobody could wait for them
-        self.hang_up = weakref.finalize(self, ended, self.told, self.thread)
-
-
-def as_search(routine: Callable[[Asker], bool]) -> Search:
-    """Run a routine in a thread that moves only while the search waits for its next question.
-
-    routine: takes a function that evaluates candidates and returns whether any of them has a fitness.
-    The thread ends with the routine, and when the search is closed or dropped or the interpreter exits.
-    """
-    line = Line(routine)
-    try:
-        line.thread.start()
-        while not isinstance(question := line.asked.get(), End):
-            line.told.put((yield question))
-    finally:
-        line.hang_up()
-    if question.error is not None:
-        raise question.error
-    return question.result
-
-
-def work(routine: Callable[[Asker], bool], asked: "SimpleQueue[Any]", told: "SimpleQueue[Told | None]") -> None:
-    """Run the routine and say how it ended."""
-
-    def ask(X: Array, residuals: bool = False) -> Told:
-        asked.put(Ask(X, residuals))
-        answer = told.get()
-        if answer is None:
-            raise Dropped
-        return answer
-
-    try:
-        asked.put(End(routine(ask), None))
-    except Dropped:
-        # nobody listens; kept, its frames would hold NLopt's object and that the routine, in a circle that never ends
-        return
-    except BaseException as error:
-        # nothing is swallowed: the thread that waits for the routine raises it
-        asked.put(End(False, error))
-
-
-def ended(told: "SimpleQueue[Told | None]", thread: Thread) -> None:
-    """Tell a thread to end and wait for it; memory may be tidied by the thread itself, which cannot wait for itself."""
-    told.put(None)
-    if thread.is_alive() and thread is not current_thread():
-        thread.join()
-
-
-# A start on a bound stalls the simplex.
-PULLED = 1e-3
-
-
-class NoFitnessError(Exception):
-    """Say that the start of a local search has no fitness."""
-
-
-def started(task: Task, routine: Callable[[Asker, Array], None]) -> Search:
+def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> Search:
     """Run a routine from the task's start, or from points drawn in the box until one of them has a fitness.
 
-    routine: takes what it asks and its start in the unit cube, (n_parameters,).
+    routine: takes what it asks and its start in the unit cube, (n_parameters,), pulled inside by 0.1 % of the range
+    where it sits on a bound. It runs at once where the task answers at once, else in a thread.
     """
     cube = task.cube
     start = cube.drawn(task.random) if task.start is None else cube.point(task.start)
-    while not (yield from moved(task, attempt(routine, pulled(start)))):
-        start = cube.drawn(task.random)
-    return True
 
-
-def moved(task: Task, routine: Callable[[Asker], bool]) -> Search:
-    """Run a routine: at once where the task answers at once, else in a thread that yields what it asks for."""
-    return (yield from as_search(routine)) if task.ask is None else routine(task.ask)
-
-
-def attempt(routine: Callable[[Asker, Array], None], start: Array) -> Callable[[Asker], bool]:
-    """Return a run of the routine from a start that says whether the start has a fitness."""
-
-    def run(ask: Asker) -> bool:
+    def attempt(ask: Asker) -> bool:
         try:
-            routine(ask, start)
+            routine(ask, pulled(start))
         except NoFitnessError:
             return False
         return True
 
-    return run
+    while not (attempt(task.ask) if task.ask is not None else (yield from in_thread(attempt))):
+        start = cube.drawn(task.random)
+    return True
 
 
 def pulled(u: Array) -> Array:
@@ -291,8 +157,8 @@ def pulled(u: Array) -> Array:
 class Height:
     """Turn fitness values into heights of about 1, and give what failed a height above all that was seen.
 
-    Line searches expect a scale of 1, and a likelihood may be of any; more than a little above all that was seen would
-    bend every model that is laid through it.
+    Line searches expect a scale of 1, and a likelihood may be of any. A failure that is much higher than everything
+    else would distort every model that a search fits through it.
     """
 
     def __init__(self) -> None:
@@ -312,3 +178,134 @@ class Height:
         if not self.scale:
             raise NoFitnessError
         return 2.0 * self.highest - self.lowest
+
+
+class End(NamedTuple):
+    """How a routine ended: with a result, or with an error of its own."""
+
+    result: bool
+    error: BaseException | None
+
+
+class SearchThread:
+    """The thread of a search and the queues to it; the search holds all of them, the thread holds the queues alone."""
+
+    def __init__(self, routine: Routine) -> None:
+        self.asked: SimpleQueue[Any] = SimpleQueue()
+        self.told: SimpleQueue[Told | None] = SimpleQueue()
+        arguments = (routine, self.asked, self.told)
+        self.thread = Thread(target=run_routine, args=arguments, name="armid search", daemon=True)
+        # also at the interpreter's exit, while daemon threads still run: later nobody could wait for them
+        self.hang_up = weakref.finalize(self, end_thread, self.told, self.thread)
+
+
+def in_thread(routine: Routine) -> Search:
+    """Run a routine in a thread that moves only while the search waits for its next question.
+
+    routine: takes a function that evaluates candidates and returns whether any of them has a fitness.
+    The thread ends with the routine, and when the search is closed or dropped or the interpreter exits.
+    """
+    line = SearchThread(routine)
+    try:
+        line.thread.start()
+        while not isinstance(question := line.asked.get(), End):
+            line.told.put((yield question))
+    finally:
+        line.hang_up()
+    if question.error is not None:
+        raise question.error
+    return question.result
+
+
+def run_routine(routine: Routine, asked: "SimpleQueue[Any]", told: "SimpleQueue[Told | None]") -> None:
+    """Run a routine in its thread and say how it ended."""
+
+    def ask(X: Array, residuals: bool = False) -> Told:
+        asked.put(Ask(X, residuals))
+        answer = told.get()
+        if answer is None:
+            raise Dropped
+        return answer
+
+    try:
+        asked.put(End(routine(ask), None))
+    except Dropped:
+        # nobody listens; if the exception were kept, its frames would hold NLopt's object and that the routine: a
+        # reference cycle that is never collected
+        return
+    except BaseException as error:
+        # nothing is swallowed: the thread that waits for the routine raises it
+        asked.put(End(False, error))
+
+
+def end_thread(told: "SimpleQueue[Told | None]", thread: Thread) -> None:
+    """Tell a thread to end and wait for it; garbage may be collected in the thread itself, which cannot wait."""
+    told.put(None)
+    if thread.is_alive() and thread is not current_thread():
+        thread.join()
+
+
+class SwarmEvaluator(Evaluator):  # type: ignore[misc]
+    """Evaluate as pymoo's Evaluator does, with one pass over the individuals instead of one for each attribute.
+
+    finite: give PENALTY instead of a fitness that is no finite number, for algorithms that a NaN would poison.
+    """
+
+    def __init__(self, finite: bool = False, **of_pymoo: Any) -> None:
+        super().__init__(**of_pymoo)
+        self.finite = finite
+
+    def eval(self, problem: Problem, pop: Population, *args: Any, **kwargs: Any) -> Population:
+        """Set F of individuals that nobody evaluated before; leave every other case to pymoo."""
+        plain = not args and kwargs.keys() <= {"algorithm"} and {"F", "G", "H"} <= set(self.evaluate_values_of)
+        fresh = isinstance(pop, Population) and not any(individual.evaluated for individual in pop)
+        if plain and fresh and not problem.has_constraints():
+            self._eval_fresh(problem, pop, **kwargs)
+        else:
+            pop = super().eval(problem, pop, *args, **kwargs)
+        if self.finite:
+            for individual in [pop] if isinstance(pop, Individual) else pop:
+                if not np.isfinite(individual.F).all():
+                    individual.F = np.where(np.isfinite(individual.F), individual.F, PENALTY)
+        return pop
+
+    def _eval_fresh(self, problem: Problem, pop: Population, **kwargs: Any) -> None:
+        x = np.array([individual.X for individual in pop])
+        values = [name for name in self.evaluate_values_of if name not in "GH"]
+        out = problem.evaluate(x, return_values_of=values, return_as_dictionary=True, **kwargs)
+        for individual, value in zip(pop, out.pop("F"), strict=True):
+            individual.F = value
+            individual.evaluated = {"F", "G", "H", *out}
+        for name, column in out.items():
+            pop.set(name, column)
+        self.n_eval += len(pop)
+        if self.callback:
+            self.callback(pop)
+
+
+@cache
+def blank() -> dict[str, Any]:
+    """Return the attributes of an individual of which nothing is known."""
+    return dict(vars(Individual()))
+
+
+def as_population(x: Array, n_iter: int | None) -> Population:
+    """Return individuals at the candidates x, (n, n_parameters), as Population.new does, in a fraction of its time."""
+    attributes = blank()
+    pop = np.empty(len(x), dtype=object).view(Population)
+    for i in range(len(x)):
+        pop[i] = individual = Individual.__new__(Individual)
+        own = {"_X": x[i], "data": {"n_gen": n_iter, "n_iter": n_iter}, "evaluated": set()}
+        individual.__dict__ = attributes | own
+    return pop
+
+
+def bounds_of(problem: Problem) -> tuple[Array, Array]:
+    """Return the bounds of a problem; refuse with ArmidError one that our algorithms cannot search."""
+    if problem.n_obj != 1 or problem.has_constraints():
+        raise ArmidError(
+            f"the problem has {problem.n_obj} objectives and {problem.n_constr} constraints, expected 1 and 0"
+        )
+    if not problem.has_bounds() or not np.isfinite([problem.xl, problem.xu]).all() or (problem.xl > problem.xu).any():
+        raise ArmidError(f"the problem's bounds are {problem.xl} and {problem.xu}, expected a finite box")
+    return problem.xl, problem.xu

@@ -1,4 +1,7 @@
-"""What a fitness is: a number per candidate to minimise, and how the records of a campaign join."""
+"""What a fitness is: a number per candidate to minimise, and how the records of a campaign join.
+
+No temporary of the population's size is made. A candidate that holds a NaN or an infinity gets +inf.
+"""
 
 import inspect
 from collections.abc import Callable
@@ -8,21 +11,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from armid.errors import ArmidError, nearest
-from armid.problem.measures import (
-    Array,
-    as_series,
-    chi_square,
-    has_failed,
-    inverse_noise,
-    mean_square,
-    relative_mean_square,
-    unity,
-)
-from armid.problem.similarity import numerical_similarity, scored
+from armid.problem.similarity import as_series, has_failed, numerical_similarity, scored
 
+Array = NDArray[np.float64]
 SERIES = ("measured", "simulated")
 OF_RECORD = ("interval", "noise")
 JOINS = ("duration", "samples", "sum")
@@ -71,7 +66,13 @@ class Fitness:
         for name in self.asks:
             if given[name] is None:
                 raise ArmidError(f"fitness '{self.name}' asks for the {name} of the record, which is not known")
-        values = one_per_candidate(self.name, self.function(**{name: given[name] for name in self.asks}), len(rows))
+        returned = self.function(**{name: given[name] for name in self.asks})
+        try:
+            values = np.asarray(returned, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ArmidError(f"fitness '{self.name}' returned a {type(returned).__name__}, expected numbers") from error
+        if values.shape != (len(rows),):
+            raise ArmidError(f"fitness '{self.name}' returned shape {values.shape}, expected ({len(rows)},)")
         return finite_or_inf(values, has_failed(rows))
 
     def weight_of(self, noise: float) -> float:
@@ -106,17 +107,6 @@ def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
         if series not in parameters:
             raise ArmidError(f"fitness '{name}' has no argument '{series}', expected (measured, simulated)")
     return tuple(argument for argument in parameters if argument in known)
-
-
-def one_per_candidate(name: str, values: object, n_candidates: int) -> Array:
-    """Return the values as float64; refuse with ArmidError anything but one number per candidate."""
-    try:
-        numbers = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArmidError(f"fitness '{name}' returned a {type(values).__name__}, expected numbers") from error
-    if numbers.shape != (n_candidates,):
-        raise ArmidError(f"fitness '{name}' returned shape {numbers.shape}, expected ({n_candidates},)")
-    return numbers
 
 
 def finite_or_inf(values: Array, failed: NDArray[np.bool_]) -> Array:
@@ -167,31 +157,86 @@ def as_fitness(name: str, obj: Fitness | Callable[..., Any]) -> Fitness:
     return obj if isinstance(obj, Fitness) else Fitness(name, obj, note="a function of the user")
 
 
-def one_less(
-    degree: int,
-    measured: ArrayLike,
-    simulated: ArrayLike,
-    interval: float,
-    epsilon: float = 0.03,
-    xi: float = 0.030,
-    slope_threshold: float = 0.2,
-) -> Array:
-    """Return 1 minus a similarity degree per candidate, +inf for one that is not finite.
+def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return the mean of (x - x')^2 [signal's unit squared], (n_candidates,).
 
-    degree: its place in what `similarity` returns; other arguments and errors as there.
+    measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
     """
-    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)
-    values: Array = 1.0 - scores[degree]
+    x, rows = as_series(measured, simulated)
+    return np.asarray(_sums_of_squares(x, rows)) / x.size
+
+
+def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return the mean of (x - x')^2 over the mean of x^2 [1], (n_candidates,).
+
+    Raises ArmidError for a measured series that is zero throughout.
+    """
+    x, rows = as_series(measured, simulated)
+    whole = float(np.square(x).sum())
+    if whole == 0.0:
+        raise ArmidError("the measured series is zero throughout, expected an rms above 0 to divide by")
+    return np.asarray(_sums_of_squares(x, rows)) / whole
+
+
+def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array:
+    """Return the sum of (x - x')^2 / noise^2 [1], (n_candidates,): -2 log likelihood for white noise, up to a constant.
+
+    noise: rms of the measuring noise [signal's unit]. Raises ArmidError unless it is a number above 0.
+    """
+    weight = inverse_noise(noise)
+    x, rows = as_series(measured, simulated)
+    return weight**2 * np.asarray(_sums_of_squares(x, rows))
+
+
+def inverse_noise(noise: float) -> float:
+    """Return 1/noise, the weight of a residual whose noise has this rms [signal's unit]; errors as `chi_square`."""
+    if not 0.0 < noise < np.inf:
+        raise ArmidError(f"the noise of the record is {noise}, expected an rms above 0 in the signal's unit")
+    return 1.0 / noise
+
+
+def unity(noise: float) -> float:
+    """Return 1, the weight of a residual in the rmse, whatever the noise."""
+    return 1.0
+
+
+# Neither nnan nor ninf may be added: a NaN in y has to reach the sum.
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+def _sum_of_squares(x, y):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(x.size):
+        total += (x[i] - y[i]) ** 2
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _sums_of_squares(x, rows):  # type: ignore[no-untyped-def]
+    sums = np.empty(rows.shape[0])
+    for c in range(rows.shape[0]):
+        total = _sum_of_squares(x, rows[c])
+        sums[c] = np.inf if np.isnan(total) else total
+    return sums
+
+
+def dissimilarity(
+    measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
+    slope_threshold: float = 0.2, degree: int = 0,
+) -> Array:  # fmt: skip
+    """Return 1 - S of Eq 10 per candidate, +inf for one that is not finite; degree 2: 1 - S2 of Eq 14, in steps.
+
+    Other arguments and errors as of `similarity`.
+    """
+    values: Array = 1.0 - scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)[degree]
     return values
+
+
+shape_dissimilarity = partial(dissimilarity, degree=2)
 
 
 def numerical_dissimilarity(measured: ArrayLike, simulated: ArrayLike) -> Array:
     """Return 1 - S1 of Eq 13 per candidate, +inf for one that is not finite; errors as `numerical_similarity`."""
     return 1.0 - numerical_similarity(measured, simulated, failed=-np.inf)
 
-
-# 1 - S of Eq 10, and 1 - S2 of Eq 14, a step function
-dissimilarity, shape_dissimilarity = partial(one_less, 0), partial(one_less, 2)
 
 # Those whose value is 1 minus a degree that people know.
 SIMILARITIES = ("similarity", "numerical_similarity", "shape_similarity")
@@ -202,15 +247,8 @@ _FITNESSES = (
     Fitness("shape_similarity", shape_dissimilarity, "duration", note="1 - S2, its shape part (Eq 14), in steps"),
     Fitness("rmse", mean_square, "samples", np.sqrt, "signal", "root of the mean square over all samples", unity),
     Fitness("nrmse", relative_mean_square, "samples", np.sqrt, "1", "rmse with each record divided by its own rms"),
-    Fitness(
-        "likelihood",
-        chi_square,
-        "sum",
-        None,
-        "1",
-        "sum of (x - x')^2 / noise^2: -2 log likelihood, white noise",
-        inverse_noise,
-    ),
-)
+    Fitness("likelihood", chi_square, "sum", None, "1", "sum of (x - x')^2 / noise^2: -2 log likelihood, white noise",
+            inverse_noise),
+)  # fmt: skip
 
 FITNESS: dict[str, Fitness] = {fitness.name: fitness for fitness in _FITNESSES}

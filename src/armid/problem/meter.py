@@ -15,6 +15,11 @@ Array = NDArray[np.float64]
 FIRST_CHUNK = 1024
 # What is asked for has to end within a lifetime.
 LARGEST_BUDGET = 10**15
+# Finite, for identifiers that cannot live with infinity, and worse than any fitness (a sum of squares over the square
+# of a tiny noise is large).
+PENALTY = 1e100
+# What an evaluator asks for by this name in `evaluate_values_of`: the weighted residual vector of each candidate.
+RESIDUALS = "residuals"
 
 
 class Log(NamedTuple):
@@ -137,8 +142,8 @@ class Meter:
         end = self.used + f.size
         if end > self._F.size:
             room = min(self.budget, max(FIRST_CHUNK, 2 * end))
-            self._X = _grown(self._X[: self.used].reshape(self.used, x.shape[1]), room)
-            self._F, self._failed = _grown(self._F[: self.used], room), _grown(self._failed[: self.used], room)
+            self._X = padded(self._X[: self.used].reshape(self.used, x.shape[1]), room)
+            self._F, self._failed = padded(self._F[: self.used], room), padded(self._failed[: self.used], room)
         self._X[self.used : end], self._F[self.used : end], self._failed[self.used : end] = x, f, failed
 
     def _improve(self, x: Array, f: Array) -> None:
@@ -149,13 +154,6 @@ class Meter:
         self._improvements += [(self.used + int(i) + 1, float(f[i])) for i in better]
         if better.size:
             self.best_x, self.best_f = x[better[-1]].copy(), float(f[better[-1]])
-
-
-def _grown(array: NDArray[Any], room: int) -> NDArray[Any]:
-    """Return a longer array that starts with the given one."""
-    longer = np.empty((room, *array.shape[1:]), array.dtype)
-    longer[: len(array)] = array
-    return longer
 
 
 class MeterTermination(Termination):  # type: ignore[misc]
@@ -185,13 +183,6 @@ class MeterTermination(Termination):  # type: ignore[misc]
         twin = MeterTermination(self.meter, self.n_max_gen)
         twin.force_termination, twin.perc = self.force_termination, self.perc
         return twin
-
-
-# Finite, for identifiers that cannot live with infinity, and worse than any fitness (a sum of squares over the square
-# of a tiny noise is large).
-PENALTY = 1e100
-# What an evaluator asks for by this name in `evaluate_values_of`: the weighted residual vector of each candidate.
-RESIDUALS = "residuals"
 
 
 class Metered(Problem):  # type: ignore[misc]
@@ -224,7 +215,12 @@ class Metered(Problem):  # type: ignore[misc]
         if not granted:
             return np.full(len(X), PENALTY), None
         asked = X[:granted]
-        values, vectors = self._remembered_or_evaluated(asked, residuals)
+        # residuals are in no log: candidates with them are simulated again
+        known = np.empty(0) if self.meter is None or residuals else self.meter.recall(asked)
+        values, vectors = known, None
+        if len(known) < granted:
+            values, vectors = self.evaluated(asked[len(known) :], residuals)
+            values = np.concatenate([known, values]) if len(known) else values
         failed = ~np.isfinite(values)
         if failed.any():
             values = np.where(failed, PENALTY, values)
@@ -234,19 +230,9 @@ class Metered(Problem):  # type: ignore[misc]
             return values, vectors
         return padded(values, len(X), PENALTY), None if vectors is None else padded(vectors, len(X), np.nan)
 
-    def _remembered_or_evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
-        """Take what the meter remembers; residuals are in no log, so that candidates with them are simulated again."""
-        if self.meter is None or residuals:
-            return self.evaluated(X, residuals)
-        known = self.meter.recall(X)
-        if len(known) == len(X):
-            return known, None
-        found, _ = self.evaluated(X[len(known) :], residuals)
-        return (np.concatenate([known, found]) if len(known) else found), None
 
-
-def padded(values: Array, n: int, filler: float) -> Array:
+def padded(values: NDArray[Any], n: int, filler: float = 0.0) -> NDArray[Any]:
     """Return rows with others behind them that hold the filler, n in all."""
-    longer = np.full((n, *values.shape[1:]), filler)
+    longer = np.full((n, *values.shape[1:]), filler, values.dtype)
     longer[: len(values)] = values
     return longer

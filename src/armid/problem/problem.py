@@ -1,4 +1,4 @@
-"""The face towards pymoo: identification as a problem that any of its algorithms can work on."""
+"""Identification as a problem on which any algorithm of pymoo can work."""
 
 from functools import cached_property
 from typing import Any
@@ -21,14 +21,25 @@ MOST_VALUES, LANES = 2**23, 16
 class IdentificationProblem(Metered):
     """Minimise a fitness over the free parameters of a model, on the train records of a campaign.
 
-    space: bounds and fixed values; replays: records made ready to be simulated; fitness: how far; meter: the budget,
-    counted in candidates, each simulated through all records; without one there is no limit.
     A candidate that diverges gets PENALTY and is counted; so does one asked for beyond the budget, but it is neither
     simulated nor counted. `names` and `units` describe the columns of X.
     An evaluator that names "residuals" in `evaluate_values_of` gets the weighted residual vectors as well.
 
-    Raises ArmidError when no parameter is free or no record is given, and when residuals are asked of a fitness that
-    has none.
+    Parameters
+    ----------
+    space : Space
+        Bounds and fixed values.
+    replays : tuple of Replay
+        Records made ready to be simulated.
+    fitness : Fitness
+        How far a candidate is from them.
+    meter : Meter or None
+        The budget, counted in candidates, each simulated through all records; without one there is no limit.
+
+    Raises
+    ------
+    ArmidError
+        No parameter is free, no record is given, or residuals are asked of a fitness that has none.
     """
 
     def __init__(self, space: Space, replays: tuple[Replay, ...], fitness: Fitness, meter: Meter | None = None) -> None:

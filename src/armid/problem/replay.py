@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armid.engine import Calibration, Prepared, accuracy_against, calibrate, prepare, probes
-from armid.model import Manoeuvre, Model
+from armid.model import Model
 from armid.problem.space import Space
 from armid.record import Piece, Record
 
@@ -70,25 +70,20 @@ def replay_of(
     """Calibrate the engine on candidates spread over the space and make a record ready to be simulated.
 
     accuracy: "standard", "fine", or None: as the record's noise asks for. known: calibrations of the same model and
-    space; those that are made are added.
+    space by manoeuvre, so that none is calibrated twice; those that are made are added.
     Raises ArmidError for an unknown accuracy.
     """
     spread = space.complete(probes(space.low[space.free], space.high[space.free]))
     wanted = accuracy or accuracy_for(record, model)
     pieces = tuple(p.until_window_end() for p in record.pieces)
     known = {} if known is None else known
-    calibrations = [calibrated(model, p.manoeuvre, spread, wanted, known) for p in pieces]
+    calibrations = []
+    for piece in pieces:
+        key = (wanted, *piece.manoeuvre.likeness())
+        if key not in known:
+            known[key] = calibrate(model, piece.manoeuvre, spread, wanted)
+        calibrations.append(known[key])
     return Replay(record, model, pieces, tuple(calibrations), threads)
-
-
-def calibrated(
-    model: Model, manoeuvre: Manoeuvre, spread: Array, accuracy: str, known: dict[object, Calibration]
-) -> Calibration:
-    """Return the calibration of a manoeuvre; the same manoeuvre is not calibrated twice."""
-    key = (accuracy, *manoeuvre.likeness())
-    if key not in known:
-        known[key] = calibrate(model, manoeuvre, spread, accuracy)
-    return known[key]
 
 
 def replays(

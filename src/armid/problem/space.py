@@ -1,6 +1,6 @@
 """Which parameters are searched, between which bounds, and what the others are."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,20 +54,25 @@ class Space:
 
         Raises ArmidError for an unknown name and for bounds that are no interval.
         """
-        i = self.index(name)
+        at = np.arange(len(self.names)) == self.index(name)
         if not (np.isfinite([low, high]).all() and low < high):
             raise ArmidError(f"bounds of '{name}' are {low:g} and {high:g}: finite numbers, low < high, are expected")
-        return replace(self, low=put(self.low, i, low), high=put(self.high, i, high), fixed=put(self.fixed, i, np.nan))
+        lows, highs, fixed = (
+            np.where(at, low, self.low),
+            np.where(at, high, self.high),
+            np.where(at, np.nan, self.fixed),
+        )
+        return replace(self, low=lows, high=highs, fixed=fixed)
 
     def with_fixed(self, name: str, value: float) -> "Space":
         """Return the space with a parameter fixed.
 
         Raises ArmidError for an unknown name and for a value that is not finite.
         """
-        i = self.index(name)
+        at = np.arange(len(self.names)) == self.index(name)
         if not np.isfinite(value):
             raise ArmidError(f"'{name}' is fixed at {value}: a finite number is expected")
-        return replace(self, fixed=put(self.fixed, i, value))
+        return replace(self, fixed=np.where(at, value, self.fixed))
 
     def only(self, names: Collection[str]) -> "Space":
         """Return the space of some of the parameters, in the order that they have here."""
@@ -83,13 +88,6 @@ class Space:
         return self.names.index(name)
 
 
-def put(values: Array, i: int, value: float) -> Array:
-    """Return a copy with one entry replaced."""
-    changed = values.copy()
-    changed[i] = value
-    return changed
-
-
 def space_of(
     model: Model,
     overrides: Mapping[str, Override] | None = None,
@@ -98,15 +96,22 @@ def space_of(
 ) -> Space:
     """Return the space of a model: declared bounds, then a campaign's overrides, then the caller's bounds and values.
 
+    What a campaign says of an effect that is not in the model is passed over.
     Raises ArmidError for a name that the model does not have, and for a parameter both bounded and fixed.
     """
-    parameters = model.parameters.values()
-    space = Space(
-        tuple(model.parameters), tuple(p.unit for p in parameters), column(p.low for p in parameters),
-        column(p.high for p in parameters), column(np.nan if p.fixed is None else p.fixed for p in parameters),
-    )  # fmt: skip
+    declared = [(p.low, p.high, np.nan if p.fixed is None else p.fixed) for p in model.parameters.values()]
+    units = tuple(p.unit for p in model.parameters.values())
+    columns = np.ascontiguousarray(np.array(declared, dtype=np.float64).reshape(-1, 3).T)
+    space = Space(tuple(model.parameters), units, *columns)
     for name, override in (overrides or {}).items():
-        space = overridden(space, name, override)
+        if name not in space.names:
+            continue
+        i = space.index(name)
+        if override.low is not None or override.high is not None:
+            low = space.low[i] if override.low is None else override.low
+            space = space.with_bounds(name, low, space.high[i] if override.high is None else override.high)
+        if override.fixed is not None:
+            space = space.with_fixed(name, override.fixed)
     for name, (low, high) in (bounds or {}).items():
         if name in (fixed or {}):
             raise ArmidError(f"parameter '{name}' is given both bounds and a fixed value: one of them is expected")
@@ -114,19 +119,3 @@ def space_of(
     for name, value in (fixed or {}).items():
         space = space.with_fixed(name, value)
     return space
-
-
-def overridden(space: Space, name: str, override: Override) -> Space:
-    """Apply what a campaign says; a parameter of an effect that is not in the model is passed over."""
-    if name not in space.names:
-        return space
-    i = space.index(name)
-    if override.low is not None or override.high is not None:
-        low = space.low[i] if override.low is None else override.low
-        space = space.with_bounds(name, low, space.high[i] if override.high is None else override.high)
-    return space if override.fixed is None else space.with_fixed(name, override.fixed)
-
-
-def column(values: Iterable[float]) -> Array:
-    """Return numbers as an array."""
-    return np.array(list(values), dtype=np.float64)

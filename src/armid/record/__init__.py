@@ -1,10 +1,22 @@
-"""What was measured: campaigns, their records, noise and windows."""
+"""What was measured: campaigns of records, their noise and the windows that count.
 
-from armid.record.campaign import Campaign, read_campaign
+In reading order:
+campaign  `read_campaign`: campaign.toml and its CSV files -> Campaign; `write_campaign`
+schema    the kinds of values in a TOML file, and the shape of campaign.toml
+reader    one [[records]] entry and its CSV file -> Record
+table     CSV files of numbers, and what their headers mean
+resample  even time grids out of the times of a file
+noise     the noise of a sensor, from rest or from the motion itself
+pieces    where simulations of a record start, from which state, and which samples count
+record    Record, Piece, Noise, Irregularity: what all of that is put into
+importers public measured sets as campaigns: EMPS, and DFKI's pendulum
+"""
+
+from armid.record.campaign import Campaign, read_campaign, write_campaign
 from armid.record.record import Irregularity, Noise, Piece, Record
 from armid.record.resample import IrregularSamplingWarning
 from armid.record.schema import Override
-from armid.record.writer import write_campaign, write_table
+from armid.record.table import write_table
 
 __all__ = [
     "Campaign", "IrregularSamplingWarning", "Irregularity", "Noise", "Override", "Piece", "Record", "read_campaign",

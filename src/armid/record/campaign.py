@@ -4,70 +4,20 @@ import os.path
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, shown
 from armid.model import EFFECTS, PLANTS, Effect, Parameter, Plant
 from armid.model.parameter import resolve
 from armid.record.pieces import with_window
-from armid.record.reader import Shared, campaign_path, folder_name, gravity_of, load_toml, read_record, record_path
+from armid.record.reader import NAME, SharedEntries, campaign_path, gravity_of, read_record, record_path
 from armid.record.record import Record
-from armid.record.schema import CampaignSheet, Override, RecordSheet, unknown_name, validated
-from armid.record.table import DEGREE
-
-
-def overrides_of(
-    tables: Mapping[str, Mapping[str, Any]], plant: Plant, effects: Mapping[str, Effect], where: str
-) -> dict[str, Override]:
-    """Return qualified parameter name (`p0`, `coulomb.level`) -> Override.
-
-    tables: [parameters] of the file; an effect's parameter is written [parameters."coulomb.level"] or
-    [parameters.coulomb.level]. plant: with its scales set. effects: all that are known, used or not.
-
-    Raises ArmidError for an unknown parameter, an unknown key, bounds of which low is not below high, and bounds of a
-    parameter that is fixed.
-    """
-    known = known_parameters(plant, effects)
-    overrides = {}
-    for name, table in flattened(tables).items():
-        if name not in known:
-            raise unknown_name("parameter", name, known, where)
-        overrides[name] = validated(Override, table, f"{where}, parameters.{name}")
-        check_bounds(overrides[name], resolve(known[name], plant.scales), f"{where}, parameters.{name}")
-    return overrides
-
-
-def known_parameters(plant: Plant, effects: Mapping[str, Effect]) -> dict[str, Parameter]:
-    """Return qualified name -> declaration, of the plant and of every known effect."""
-    own = {p.name: p for p in plant.parameters}
-    return own | {f"{e.name}.{p.name}": p for e in effects.values() for p in e.parameters}
-
-
-def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
-    """Return qualified name -> table, also where the name was written as nested tables."""
-    flat: dict[str, object] = {}
-    for name, table in tables.items():
-        inner = {key: value for key, value in table.items() if isinstance(value, dict)}
-        for key, value in inner.items():
-            flat[f"{name}.{key}"] = value
-        if len(inner) < len(table) or not table:
-            flat[name] = {key: value for key, value in table.items() if key not in inner}
-    return flat
-
-
-def check_bounds(override: Override, declared: Parameter, where: str) -> None:
-    """Refuse bounds that leave nothing between them, and bounds beside a fixed value, which would not count.
-
-    The declared bound (SI) stands for one that is not given.
-    """
-    if override.fixed is not None and (override.low, override.high) != (None, None):
-        raise ArmidError(f"{where}: 'fixed' and a bound are both there, a fixed value or bounds are expected")
-    low = declared.low if override.low is None else override.low
-    high = declared.high if override.high is None else override.high
-    if not low < high:
-        raise ArmidError(f"{where}: low is {low:g} and high is {high:g}, low below high is expected")
+from armid.record.schema import CampaignSheet, Override, RecordSheet, load_toml, unknown_name, validated
+from armid.record.table import DEGREE, write_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,31 +67,47 @@ def read_campaign(
 ) -> Campaign:
     """Read a campaign: a folder with campaign.toml and one CSV file a record, or that campaign.toml.
 
-    plants, effects: name -> those that the file may name. Warns with IrregularSamplingWarning for a record that is
-    resampled for its uneven times.
+    Parameters
+    ----------
+    path : str or Path
+        The folder or the file.
+    plants, effects : Mapping
+        Name -> those that the file may name.
 
-    Raises ArmidError with one sentence (file, line or key, found, expected) for whatever cannot be used.
+    Warns with IrregularSamplingWarning for a record that is resampled for its uneven times.
+
+    Raises
+    ------
+    ArmidError
+        One sentence (file, line or key, found, expected) for whatever cannot be used.
     """
     toml = campaign_path(path)
-    folder = folder_name(toml)
+    above = toml.parent.name or toml.parent.resolve().name
+    # what messages put before the files of the campaign: c00/
+    folder = f"{above if above.isprintable() else shown(above)}/" if above else ""
     where = f"{folder}{toml.name}"
     sheet = validated(CampaignSheet, load_toml(toml, where), where)
     if sheet.plant not in plants:
         raise unknown_name("plant", sheet.plant, plants, where)
-    check_effects(sheet.effects, effects, where)
-    keys = [key.key for key in plants[sheet.plant].keys]
-    entries = [validated(RecordSheet, entry, place(entry, i, where), keys) for i, entry in enumerate(sheet.records)]
-    check_entries(entries, where)
+    for i, name in enumerate(sheet.effects):
+        if name not in effects:
+            raise unknown_name("effect", name, effects, where)
+        if name in sheet.effects[:i]:
+            raise ArmidError(f"{where}: effect '{name}' is declared twice, each effect once is expected")
+    declared = plants[sheet.plant]
+    entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
     gyro_range = None if sheet.gyro_range_deg_s is None else sheet.gyro_range_deg_s * DEGREE
-    shared = Shared(folder, sheet.constants, sheet.inputs, sheet.hold, gyro_range)
+    shared = SharedEntries(folder, sheet.constants, sheet.inputs, sheet.hold, gyro_range)
     places = [f"{where}, record {shown(entry.file)}" for entry in entries]
     paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
     records = [
-        read_record(file, entry, plants[sheet.plant], shared, at)
-        for file, entry, at in zip(paths, entries, places, strict=True)
+        read_record(path, entry, declared, shared, at) for path, entry, at in zip(paths, entries, places, strict=True)
     ]
-    check_units(records, folder)
-    plant = scaled(plants[sheet.plant].for_unit(records[0].unit), records, where)
+    for record in records:
+        if record.unit != records[0].unit:
+            raise ArmidError(f"{folder}{record.file}: the speed is in {record.unit}, {records[0].unit} is expected "
+                             f"as in {records[0].file}")  # fmt: skip
+    plant = scaled(declared.for_unit(records[0].unit), records, where)
     return Campaign(
         name=sheet.name,
         folder=toml.parent,
@@ -154,23 +120,54 @@ def read_campaign(
     )
 
 
-def place(entry: Mapping[str, object], index: int, where: str) -> str:
-    """Return how messages name a [[records]] entry: by its file where it has one."""
-    file = entry.get("file")
-    return f"{where}, record {shown(file) if isinstance(file, str) else index + 1}"
+def write_campaign(
+    out: str | Path, campaign_toml: str, tables: Mapping[str, Mapping[str, NDArray[np.float64]]]
+) -> Path:
+    """Write campaign.toml and its CSV files, whole or not at all, and return the folder.
+
+    Parameters
+    ----------
+    out : str or Path
+        The new folder; it is made beside its place and then renamed, so that nothing half-written is ever there.
+    campaign_toml : str
+        The text.
+    tables : Mapping
+        File -> header -> values, (n_rows,); every number is written with all its digits.
+
+    Raises
+    ------
+    ArmidError
+        The folder holds something already, or cannot be written.
+    """
+    folder = Path(out)
+    if os.path.lexists(folder) and not (folder.is_dir() and not any(folder.iterdir())):
+        raise ArmidError(f"{shown(str(out))} exists already, a new or empty folder is expected")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=folder.parent, prefix=".armid-") as beside:
+            made = Path(beside) / "campaign"
+            made.mkdir()
+            (made / NAME).write_text(campaign_toml, encoding="utf-8")
+            for file, columns in tables.items():
+                write_table(made / file, columns)
+            if folder.is_dir():
+                folder.rmdir()
+            made.rename(folder)
+    except OSError as error:
+        raise ArmidError(f"{shown(str(out))} cannot be written: {error.strerror or error}") from error
+    return folder
 
 
-def check_effects(names: Sequence[str], effects: Mapping[str, Effect], where: str) -> None:
-    """Refuse an effect that nobody registered, and one that is declared twice."""
-    for i, name in enumerate(names):
-        if name not in effects:
-            raise unknown_name("effect", name, effects, where)
-        if name in names[:i]:
-            raise ArmidError(f"{where}: effect '{name}' is declared twice, each effect once is expected")
+def record_entries(tables: Sequence[Mapping[str, Any]], keys: Sequence[str], where: str) -> list[RecordSheet]:
+    """Return the [[records]] entries; keys: those of the plant.
 
-
-def check_entries(entries: Sequence[RecordSheet], where: str) -> None:
-    """Refuse a file that is named twice, a repeat of nothing, and a campaign without a record to train on."""
+    Raises ArmidError for a file that is named twice, a repeat of nothing, and a campaign without a record to train on.
+    """
+    entries = []
+    for i, table in enumerate(tables):
+        file = table.get("file")
+        place = f"{where}, record {shown(file) if isinstance(file, str) else i + 1}"
+        entries.append(validated(RecordSheet, table, place, keys))
     files = [os.path.normpath(entry.file) for entry in entries]
     for i, entry in enumerate(entries):
         if files[i] in files[:i]:
@@ -181,36 +178,73 @@ def check_entries(entries: Sequence[RecordSheet], where: str) -> None:
                              f"another record, {nearest(entry.repeat_of, others)}")  # fmt: skip
     if not any(entry.role == "train" for entry in entries):
         raise ArmidError(f"{where}: no record has the role 'train', at least one is expected")
-
-
-def check_units(records: Sequence[Record], folder: str) -> None:
-    """Refuse records of which one tells an angular and one a linear speed."""
-    for record in records:
-        if record.unit != records[0].unit:
-            raise ArmidError(f"{folder}{record.file}: the speed is in {record.unit}, {records[0].unit} is expected "
-                             f"as in {records[0].file}")  # fmt: skip
+    return entries
 
 
 def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     """Return the plant with the sizes of effort and speed that its train records show, where it asks for that.
 
-    Effort = max |gain x drive|, the moment of gravity where the drive rests, and speed = max |measured speed|; a
-    holdout record has no say.
+    Effort = max |gain x drive|, the drive being its first input, or the moment of gravity where the drive rests, and
+    speed = max |measured speed|; a holdout record has no say.
     """
     if not plant.scales_from_records:
         return plant
     train = [r for r in records if r.role == "train"]
     speed = max(float(np.max(np.abs(r.measured))) for r in train)
-    effort = max(drive_effort(plant, r) for r in train) or max(abs(gravity_of(plant, r.constants)) for r in train)
+    default = {c.name: c.value for c in plant.constants}.get("gain", 1.0)
+    effort = 0.0
+    for r in train if plant.inputs else ():
+        drive = float(np.max(np.abs(r.manoeuvre.inputs[plant.inputs[0].name])))
+        effort = max(effort, abs(r.constants.get("gain", default)) * drive)
+    effort = effort or max(abs(gravity_of(plant, r.constants)) for r in train)
     if effort < 1e-30:
         raise ArmidError(f"{where}: the drive of every train record is 0 throughout, a driven motion is expected")
     return replace(plant, scales=replace(plant.scales, effort=effort, speed=speed))
 
 
-def drive_effort(plant: Plant, record: Record) -> float:
-    """Return the largest |gain x drive| of a record [N or N m], the drive being the plant's first input."""
-    if not plant.inputs:
-        return 0.0
-    default = {c.name: c.value for c in plant.constants}.get("gain", 1.0)
-    drive = record.manoeuvre.inputs[plant.inputs[0].name]
-    return abs(record.constants.get("gain", default)) * float(np.max(np.abs(drive)))
+def overrides_of(
+    tables: Mapping[str, Mapping[str, Any]], plant: Plant, effects: Mapping[str, Effect], where: str
+) -> dict[str, Override]:
+    """Return qualified parameter name (`p0`, `coulomb.level`) -> Override.
+
+    tables: [parameters] of the file; an effect's parameter is written [parameters."coulomb.level"] or
+    [parameters.coulomb.level]. plant: with its scales set. effects: all that are known, used or not.
+
+    Raises ArmidError for an unknown parameter, an unknown key, bounds of which low is not below high, and bounds of a
+    parameter that is fixed.
+    """
+    known = {p.name: p for p in plant.parameters}
+    known |= {f"{e.name}.{p.name}": p for e in effects.values() for p in e.parameters}
+    overrides = {}
+    for name, table in flattened(tables).items():
+        if name not in known:
+            raise unknown_name("parameter", name, known, where)
+        place = f"{where}, parameters.{name}"
+        overrides[name] = validated(Override, table, place)
+        check_bounds(overrides[name], resolve(known[name], plant.scales), place)
+    return overrides
+
+
+def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
+    """Return qualified name -> table, also where the name was written as nested tables."""
+    flat: dict[str, object] = {}
+    for name, table in tables.items():
+        inner = {key: value for key, value in table.items() if isinstance(value, dict)}
+        for key, value in inner.items():
+            flat[f"{name}.{key}"] = value
+        if len(inner) < len(table) or not table:
+            flat[name] = {key: value for key, value in table.items() if key not in inner}
+    return flat
+
+
+def check_bounds(override: Override, declared: Parameter, where: str) -> None:
+    """Refuse bounds that leave nothing between them, and bounds beside a fixed value, which would not count.
+
+    The declared bound (SI) stands for one that is not given.
+    """
+    if override.fixed is not None and (override.low, override.high) != (None, None):
+        raise ArmidError(f"{where}: 'fixed' and a bound are both there, a fixed value or bounds are expected")
+    low = declared.low if override.low is None else override.low
+    high = declared.high if override.high is None else override.high
+    if not low < high:
+        raise ArmidError(f"{where}: low is {low:g} and high is {high:g}, low below high is expected")

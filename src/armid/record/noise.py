@@ -1,4 +1,4 @@
-"""Noise of the sensor, from rest or from the motion itself."""
+"""Noise of a sensor, from rest or from the motion itself."""
 
 from math import comb, log1p
 
@@ -52,22 +52,20 @@ def difference_rms(motion: Array, times: Array | None = None) -> float:
     """Return the rms of what high differences leave of a motion [unit]; white noise is assumed.
 
     The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
-    where the next order gives less than a tenth of it, it still saw the motion (low-passed noise falls less fast) and
-    the next is taken. The median of the absolute values keeps the transients of the motion out.
+    where the next order gives less than a tenth of it, the motion was still in it (low-passed noise falls less fast)
+    and the next is taken. The median of the absolute values keeps the transients of the motion out.
     times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
     """
     estimates = []
     for order in ORDERS:
-        differences = even_differences(motion, order) if times is None else divided_differences(motion, times, order)
+        if times is None:
+            differences = np.diff(motion, n=order) / np.sqrt(comb(2 * order, order))
+        else:
+            differences = divided_differences(motion, times, order)
         estimates.append(1.4826 * float(np.median(np.abs(differences))))
         if len(estimates) > 1 and estimates[-1] > 0.1 * estimates[-2]:
             return float(estimates[-2])
     return float(estimates[-1])
-
-
-def even_differences(values: Array, order: int) -> Array:
-    """Return the k-th differences, scaled so that white noise keeps its rms, shape (n - order,)."""
-    return np.asarray(np.diff(values, n=order) / np.sqrt(comb(2 * order, order)))
 
 
 def divided_differences(values: Array, times: Array, order: int) -> Array:

@@ -1,11 +1,9 @@
 """One record out of its CSV file and its entry in the campaign."""
 
 import os.path
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,130 +11,196 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError, nearest, shown
 from armid.model import Manoeuvre, ManoeuvreKey, Plant
 from armid.record.noise import noise_of, smallest_step
-from armid.record.pieces import (
-    POSITION,
-    SPEED,
-    Track,
-    is_constant,
-    part,
-    piece_length,
-    restarted,
-    track_of,
-    with_window,
-)
-from armid.record.record import Piece, Record
+from armid.record.pieces import Track, is_constant, part, piece_length, track_of, with_window
+from armid.record.record import Record
 from armid.record.resample import Timing, moved_onto_grid, onto_grid, timing_of
 from armid.record.schema import KindError, RecordSheet, number
 from armid.record.table import (
     LARGEST,
     POSITIONS,
     TIME,
-    Table,
+    CsvTable,
     input_columns,
     position_of,
     read_table,
     si_factor,
     speed_column,
-    speed_of,
     time_column,
 )
 
-NAME = "campaign.toml"
-SUFFIX = ".csv"
-
-
-def campaign_path(path: str | Path) -> Path:
-    """Return the campaign.toml that a folder or a file stands for.
-
-    Raises ArmidError when there is none.
-    """
-    if not os.path.exists(path):
-        raise ArmidError(f"campaign {shown(str(path))} does not exist, a folder with a {NAME} is expected")
-    if os.path.isfile(path):
-        return Path(path)
-    if not os.path.isfile(os.path.join(path, NAME)):
-        raise ArmidError(f"campaign {shown(str(path))} holds no {NAME}, a folder with one is expected")
-    return Path(path) / NAME
-
-
-def folder_name(toml: Path) -> str:
-    """Return what messages put before the files of a campaign: `c00/`."""
-    name = toml.parent.name or toml.parent.resolve().name
-    return f"{name if name.isprintable() else shown(name)}/" if name else ""
-
-
-def load_toml(path: Path, named: str = "") -> dict[str, Any]:
-    """Return the tables of a TOML file; named: how messages name it, "": by its own name.
-
-    Raises ArmidError, with the line, for what is no UTF-8 text or no TOML.
-    """
-    where = named or path.name
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ArmidError(f"{where} cannot be read: {error.strerror or error}") from error
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise ArmidError(f"{where}, line {line}: not readable as text, TOML in UTF-8 is expected") from error
-    try:
-        return tomllib.loads(text)
-    except RecursionError as error:
-        raise ArmidError(f"{where} is nested too deeply, plain tables of TOML are expected") from error
-    except ValueError as error:
-        # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
-        raise ArmidError(f"{where} is no valid TOML: {str(error)[:200]}") from error
-
-
-def record_path(folder: Path, file: str, where: str) -> Path:
-    """Return where the file of a record is.
-
-    Raises ArmidError for a name that leads out of the folder (also through a link), is no CSV file, or does not exist.
-    """
-    pure = PurePosixPath(file.replace("\\", "/"))
-    if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
-        raise ArmidError(f"{where}: file {shown(file)} leads out of the campaign's folder, a file inside is expected")
-    if pure.suffix.lower() != SUFFIX or not file.isprintable():
-        raise ArmidError(f"{where}: file {shown(file)} is no CSV file, a name that ends in {SUFFIX} is expected")
-    path = os.path.join(folder, file)
-    if not os.path.isfile(path):
-        there = sorted(p.name for p in folder.glob(f"*{SUFFIX}"))
-        raise ArmidError(f"{where}: file {shown(file)} does not exist, {nearest(file, there)}")
-    real = Path(os.path.realpath(path))
-    if not real.is_relative_to(os.path.realpath(folder)):
-        raise ArmidError(f"{where}: file {shown(file)} links out of the campaign's folder, a file inside is expected")
-    return real
-
-
-MEASURED_STATE = ("start_position", "start_speed")
+Array = NDArray[np.float64]
+NAME, SUFFIX = "campaign.toml", ".csv"
+POSITION, SPEED = "start_position", "start_speed"
 ROUNDING = 1e-9
+SATURATED_SAMPLES = 5
+
+
+@dataclass(frozen=True)
+class SharedEntries:
+    """Hold what the records of a campaign have in common: constants (SI), inputs, hold, gyro range [rad/s].
+
+    folder: what messages put before the name of a file.
+    """
+
+    folder: str
+    constants: Mapping[str, float]
+    inputs: Mapping[str, str]
+    hold: str
+    gyro_range: float | None
+
+
+def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: SharedEntries, where: str) -> Record:
+    """Read the record of one [[records]] entry.
+
+    plant: the one that the campaign names; its sibling for the record's unit is taken. where: how messages name the
+    entry. Warns with IrregularSamplingWarning where the file is resampled for its uneven times.
+
+    Raises ArmidError for all that makes the record unusable.
+    """
+    table = read_table(path, f"{shared.folder}{sheet.file}")
+    times = time_column(table)
+    header, unit, speed = speed_column(table, [p.output_unit for p in (plant, *plant.variants)])
+    try:
+        plant = plant.for_unit(unit)
+    except ArmidError as error:
+        raise ArmidError(f"{table.file}, line 1: a speed in {unit} is not what is expected: {error}") from error
+    timing = timing_of(times, plant.from_rest, table.file)
+    check_speed(speed, timing, shared.gyro_range, unit, table)
+    rest, motion = speed[: timing.first], speed[timing.first :]
+    rest_interval = float(np.median(np.diff(times[: timing.first]))) if timing.first > 1 else timing.interval
+    irregular = times[timing.first :] if timing.irregularity else None
+    others = {name: values for name, values in table.columns.items() if name not in (TIME, header)}
+    record = Record(
+        file=sheet.file,
+        role=sheet.role,
+        unit=unit,
+        manoeuvre=manoeuvre_of(plant, shared, sheet, table, timing, where=where),
+        measured=moved_onto_grid(speed, times, timing),
+        rest=rest,
+        noise=noise_of(rest, motion, rest_interval, irregular),
+        pieces=(),
+        whole_pieces=(),
+        earliest=timing.earliest,
+        columns={name: onto_grid(values, times, timing) for name, values in others.items()},
+        repeat_of=sheet.repeat_of or "",
+        restart_s=sheet.restart_s,
+        irregularity=timing.irregularity,
+    )
+    tracks = {} if plant.from_rest else tracks_of(record, plant, table, speed, timing)
+    return with_window(started(record, plant, tracks, where), sheet.window_s, where)
+
+
+def manoeuvre_of(
+    plant: Plant, shared: SharedEntries, sheet: RecordSheet, table: CsvTable, timing: Timing, *, where: str
+) -> Manoeuvre:
+    """Return the manoeuvre of a whole record, still without the measured state at its start.
+
+    An optional input without a column has its default throughout.
+    """
+    constants = record_constants(plant, shared.constants, sheet, where)
+    hold = sheet.hold or shared.hold
+    sources = input_columns(plant, {**shared.inputs, **sheet.inputs}, table, where)
+    inputs = {}
+    for driven in plant.inputs:
+        header = sources.get(driven.name)
+        if header is None:
+            inputs[driven.name] = np.full(timing.n_samples, driven.default)
+        else:
+            values = table.columns[header] * si_factor(header)
+            inputs[driven.name] = onto_grid(values, table.columns[TIME], timing, driven.hold or hold)
+    return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
+
+
+def check_speed(speed: Array, timing: Timing, gyro_range: float | None, unit: str, table: CsvTable) -> None:
+    """Refuse a signal that shows no motion, or is cut off by the range of the gyro.
+
+    speed: SI, (n_rows,). Saturated are 5 samples in a row within one quantisation step of the range; the step is the
+    smallest change between neighbours, but at most a hundredth of the range.
+    """
+    if is_constant(speed[timing.first :]):
+        raise ArmidError(f"{table.file}: the measured speed is constant after the start, a motion is expected")
+    if gyro_range is None:
+        return
+    if unit != "rad/s":
+        raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {unit}: a speed in deg/s or "
+                         "rad/s is expected")  # fmt: skip
+    step = min(smallest_step(speed), gyro_range / 100)
+    # the slack keeps a value that is one step below the range inside, whatever its last binary digit
+    near = np.abs(speed) >= gyro_range - step * (1 + 1e-6)
+    runs = np.convolve(near, np.ones(SATURATED_SAMPLES), mode="valid")
+    saturated = np.flatnonzero(runs > SATURATED_SAMPLES - 0.5)
+    if saturated.size:
+        row = int(saturated[0])
+        raise ArmidError(f"{table.file}, line {table.line_of(row)}: {SATURATED_SAMPLES} samples in a row are at the "
+                         f"gyro range of {np.rad2deg(gyro_range):.6g} deg/s (saturated), a motion within it is "
+                         "expected")  # fmt: skip
+
+
+def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: str) -> Record:
+    """Return the record with its pieces, each from the state that the tracks tell at its first sample.
+
+    An incomplete last piece is dropped. Raises ArmidError for restarts of a plant that starts from rest.
+    """
+    manoeuvre, measured = record.manoeuvre, record.measured
+    length = measured.size
+    if record.restart_s is not None:
+        if plant.from_rest:
+            raise ArmidError(f"{where}: restart_s is given, but plant '{plant.name}' starts at rest: a record without "
+                             "restarts is expected")  # fmt: skip
+        length = piece_length(record.restart_s, manoeuvre.interval, measured.size, where)
+    starts = range(0, measured.size - length + 1, length)
+    pieces = tuple(part(manoeuvre, measured, start, length, tracks) for start in starts)
+    # the first piece starts where the record does
+    from_there = replace(manoeuvre, constants=pieces[0].manoeuvre.constants)
+    return replace(record, manoeuvre=from_there, whole_pieces=pieces)
+
+
+def tracks_of(record: Record, plant: Plant, table: CsvTable, speed: Array, timing: Timing) -> dict[str, Track]:
+    """Return the signals from which the start constants that the plant declares are taken.
+
+    speed: as in the file, SI, (n_rows,).
+
+    Raises ArmidError where a position is needed and the file has none. An axis without gravity needs none: it starts at
+    its default.
+    """
+    declared = {c.name for c in plant.constants}
+    position, times = position_of(table, record.unit), table.columns[TIME]
+    tracks = {SPEED: track_of(speed, times, timing)} if SPEED in declared else {}
+    if POSITION in declared and position is not None:
+        tracks[POSITION] = track_of(position, times, timing)
+    elif POSITION in declared and ("gravity_moment" not in declared or gravity_of(plant, record.constants) != 0):
+        why = "gravity_moment is not 0" if "gravity_moment" in declared else f"plant '{plant.name}' declares it"
+        headers = " or ".join(name for name, (unit, _) in POSITIONS.items() if unit == record.unit)
+        raise ArmidError(f"{table.file}, line 1: the start needs a position, as {why}: a column {headers} is expected")
+    return tracks
+
+
+def gravity_of(plant: Plant, constants: Mapping[str, float]) -> float:
+    """Return the moment of gravity, 0 for a plant that has none."""
+    declared = {c.name: c.value for c in plant.constants}
+    return constants.get("gravity_moment", declared.get("gravity_moment", 0.0))
 
 
 def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordSheet, where: str) -> dict[str, float]:
     """Return the constants of a record's manoeuvre, SI: the campaign's, then its keys, then [records.constants].
 
-    Raises ArmidError for an unknown constant, a missing key, a value of another kind or outside its range.
+    Raises ArmidError for an unknown constant, one that the record's own start sets, a missing key, a value of another
+    kind or outside its range.
     """
-    check_names(plant, shared, "constants of the campaign", where)
-    check_names(plant, sheet.constants, "constants", where)
+    known = [c.name for c in plant.constants]
+    for what, given in (("constants of the campaign", shared), ("constants", sheet.constants)):
+        for name in given:
+            if name not in known:
+                raise ArmidError(f"{where}: {shown(name)} in {what} is no constant of plant '{plant.name}', "
+                                 f"{nearest(name, known)}")  # fmt: skip
+            if not plant.from_rest and name in (POSITION, SPEED):
+                raise ArmidError(f"{where}: '{name}' in {what} is set, but it comes from the first samples of a "
+                                 "record: another constant is expected")  # fmt: skip
     own = {k.constant: key_value(k, sheet.keys[k.key], where) for k in plant.keys if k.key in sheet.keys}
     constants = {**shared, **own, **sheet.constants}
     for key in plant.keys:
         check_key(key, constants, where)
     return constants
-
-
-def check_names(plant: Plant, given: Mapping[str, float], what: str, where: str) -> None:
-    """Refuse a constant that the plant does not have, or that the record's own start sets."""
-    known = [c.name for c in plant.constants]
-    for name in given:
-        if name not in known:
-            raise ArmidError(f"{where}: {shown(name)} in {what} is no constant of plant '{plant.name}', "
-                             f"{nearest(name, known)}")  # fmt: skip
-        if not plant.from_rest and name in MEASURED_STATE:
-            raise ArmidError(f"{where}: '{name}' in {what} is set, but it comes from the first samples of a record: "
-                             "another constant is expected")  # fmt: skip
 
 
 def key_value(key: ManoeuvreKey, value: object, where: str) -> float:
@@ -179,162 +243,32 @@ def range_of(key: ManoeuvreKey) -> str:
     return f"a value from {key.low:g} to {key.high:g}"
 
 
-Array = NDArray[np.float64]
-SATURATED_SAMPLES = 5
+def campaign_path(path: str | Path) -> Path:
+    """Return the campaign.toml that a folder or a file stands for; refuse with ArmidError where there is none."""
+    if not os.path.exists(path):
+        raise ArmidError(f"campaign {shown(str(path))} does not exist, a folder with a {NAME} is expected")
+    if os.path.isfile(path):
+        return Path(path)
+    if not os.path.isfile(os.path.join(path, NAME)):
+        raise ArmidError(f"campaign {shown(str(path))} holds no {NAME}, a folder with one is expected")
+    return Path(path) / NAME
 
 
-@dataclass(frozen=True)
-class Shared:
-    """Hold what the records of a campaign have in common: constants (SI), inputs, hold, gyro range [rad/s].
+def record_path(folder: Path, file: str, where: str) -> Path:
+    """Return where the file of a record is.
 
-    folder: what messages put before the name of a file.
+    Raises ArmidError for a name that leads out of the folder (also through a link), is no CSV file, or does not exist.
     """
-
-    folder: str
-    constants: Mapping[str, float]
-    inputs: Mapping[str, str]
-    hold: str
-    gyro_range: float | None
-
-
-def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: Shared, where: str) -> Record:
-    """Read the record of one [[records]] entry.
-
-    plant: the one that the campaign names; its sibling for the record's unit is taken. where: how messages name the
-    entry. Warns with IrregularSamplingWarning where the file is resampled for its uneven times.
-
-    Raises ArmidError for all that makes the record unusable.
-    """
-    table = read_table(path, f"{shared.folder}{sheet.file}")
-    times = time_column(table)
-    header, unit = speed_column(table, [p.output_unit for p in (plant, *plant.variants)])
-    plant, speed = sibling(plant, unit, table), speed_of(table, header)
-    timing = timing_of(times, plant.from_rest, table.file)
-    check_speed(speed, timing, shared.gyro_range, unit, table)
-    irregular = times[timing.first :] if timing.irregularity else None
-    others = {name: values for name, values in table.columns.items() if name not in (TIME, header)}
-    record = Record(
-        file=sheet.file,
-        role=sheet.role,
-        unit=unit,
-        manoeuvre=manoeuvre_of(plant, shared, sheet, table, timing, where=where),
-        measured=moved_onto_grid(speed, times, timing),
-        rest=speed[: timing.first],
-        noise=noise_of(speed[: timing.first], speed[timing.first :], rest_interval(times, timing), irregular),
-        pieces=(),
-        whole_pieces=(),
-        earliest=timing.earliest,
-        columns={name: onto_grid(values, times, timing) for name, values in others.items()},
-        repeat_of=sheet.repeat_of or "",
-        restart_s=sheet.restart_s,
-        irregularity=timing.irregularity,
-    )
-    tracks = {} if plant.from_rest else tracks_of(record, plant, table, speed, timing)
-    return with_window(started(record, plant, tracks, where), sheet.window_s, where)
-
-
-def manoeuvre_of(
-    plant: Plant, shared: Shared, sheet: RecordSheet, table: Table, timing: Timing, *, where: str
-) -> Manoeuvre:
-    """Return the manoeuvre of a whole record, still without the measured state at its start."""
-    constants = record_constants(plant, shared.constants, sheet, where)
-    hold = sheet.hold or shared.hold
-    sources = input_columns(plant, {**shared.inputs, **sheet.inputs}, table, where)
-    inputs = inputs_of(plant, sources, table, timing, hold)
-    return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
-
-
-def rest_interval(times: Array, timing: Timing) -> float:
-    """Return the interval between the samples of rest [s]."""
-    return float(np.median(np.diff(times[: timing.first]))) if timing.first > 1 else timing.interval
-
-
-def sibling(plant: Plant, unit: str, table: Table) -> Plant:
-    """Return the plant whose recorded signal has the unit of the file."""
-    try:
-        return plant.for_unit(unit)
-    except ArmidError as error:
-        raise ArmidError(f"{table.file}, line 1: a speed in {unit} is not what is expected: {error}") from error
-
-
-def check_speed(speed: Array, timing: Timing, gyro_range: float | None, unit: str, table: Table) -> None:
-    """Refuse a signal that shows no motion, or is cut off by the range of the gyro.
-
-    speed: SI, (n_rows,). Saturated are 5 samples in a row within one quantisation step of the range; the step is the
-    smallest change between neighbours, but at most a hundredth of the range.
-    """
-    if is_constant(speed[timing.first :]):
-        raise ArmidError(f"{table.file}: the measured speed is constant after the start, a motion is expected")
-    if gyro_range is None:
-        return
-    if unit != "rad/s":
-        raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {unit}: a speed in deg/s or "
-                         "rad/s is expected")  # fmt: skip
-    step = min(smallest_step(speed), gyro_range / 100)
-    # the slack keeps a value that is one step below the range inside, whatever its last binary digit
-    near = np.abs(speed) >= gyro_range - step * (1 + 1e-6)
-    runs = np.convolve(near, np.ones(SATURATED_SAMPLES), mode="valid")
-    saturated = np.flatnonzero(runs > SATURATED_SAMPLES - 0.5)
-    if saturated.size:
-        row = int(saturated[0])
-        raise ArmidError(f"{table.file}, line {table.line_of(row)}: {SATURATED_SAMPLES} samples in a row are at the "
-                         f"gyro range of {np.rad2deg(gyro_range):.6g} deg/s (saturated), a motion within it is "
-                         "expected")  # fmt: skip
-
-
-def inputs_of(plant: Plant, sources: Mapping[str, str], table: Table, timing: Timing, hold: str) -> dict[str, Array]:
-    """Return input -> values on the grid, SI; an optional input without a column has its default throughout."""
-    values = {}
-    for driven in plant.inputs:
-        header = sources.get(driven.name)
-        if header is None:
-            values[driven.name] = np.full(timing.n_samples, driven.default)
-            continue
-        column = table.columns[header] * si_factor(header)
-        values[driven.name] = onto_grid(column, table.columns[TIME], timing, driven.hold or hold)
-    return values
-
-
-def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: str) -> Record:
-    """Return the record with its pieces, each from the state that the tracks tell at its first sample.
-
-    Raises ArmidError for restarts of a plant that starts from rest.
-    """
-    manoeuvre, measured = record.manoeuvre, record.measured
-    if plant.from_rest and record.restart_s is not None:
-        raise ArmidError(f"{where}: restart_s is given, but plant '{plant.name}' starts at rest: a record without "
-                         "restarts is expected")  # fmt: skip
-    if record.restart_s is None:
-        pieces: tuple[Piece, ...] = (part(manoeuvre, measured, 0, measured.size, tracks),)
-    else:
-        length = piece_length(record.restart_s, manoeuvre.interval, measured.size, where)
-        pieces = restarted(manoeuvre, measured, tracks, length)
-    # the first piece starts where the record does
-    from_there = replace(manoeuvre, constants=pieces[0].manoeuvre.constants)
-    return replace(record, manoeuvre=from_there, whole_pieces=pieces)
-
-
-def tracks_of(record: Record, plant: Plant, table: Table, speed: Array, timing: Timing) -> dict[str, Track]:
-    """Return the signals from which the start constants that the plant declares are taken.
-
-    speed: as in the file, SI, (n_rows,).
-
-    Raises ArmidError where a position is needed and the file has none. An axis without gravity needs none: it starts at
-    its default.
-    """
-    declared = {c.name for c in plant.constants}
-    position, times = position_of(table, record.unit), table.columns[TIME]
-    tracks = {SPEED: track_of(speed, times, timing)} if SPEED in declared else {}
-    if POSITION in declared and position is not None:
-        tracks[POSITION] = track_of(position, times, timing)
-    elif POSITION in declared and ("gravity_moment" not in declared or gravity_of(plant, record.constants) != 0):
-        why = "gravity_moment is not 0" if "gravity_moment" in declared else f"plant '{plant.name}' declares it"
-        headers = " or ".join(name for name, (unit, _) in POSITIONS.items() if unit == record.unit)
-        raise ArmidError(f"{table.file}, line 1: the start needs a position, as {why}: a column {headers} is expected")
-    return tracks
-
-
-def gravity_of(plant: Plant, constants: Mapping[str, float]) -> float:
-    """Return the moment of gravity, 0 for a plant that has none."""
-    declared = {c.name: c.value for c in plant.constants}
-    return constants.get("gravity_moment", declared.get("gravity_moment", 0.0))
+    pure = PurePosixPath(file.replace("\\", "/"))
+    if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
+        raise ArmidError(f"{where}: file {shown(file)} leads out of the campaign's folder, a file inside is expected")
+    if pure.suffix.lower() != SUFFIX or not file.isprintable():
+        raise ArmidError(f"{where}: file {shown(file)} is no CSV file, a name that ends in {SUFFIX} is expected")
+    path = os.path.join(folder, file)
+    if not os.path.isfile(path):
+        there = sorted(p.name for p in folder.glob(f"*{SUFFIX}"))
+        raise ArmidError(f"{where}: file {shown(file)} does not exist, {nearest(file, there)}")
+    real = Path(os.path.realpath(path))
+    if not real.is_relative_to(os.path.realpath(folder)):
+        raise ArmidError(f"{where}: file {shown(file)} links out of the campaign's folder, a file inside is expected")
+    return real

@@ -1,4 +1,4 @@
-"""One measurement with its manoeuvre."""
+"""One measurement with its manoeuvre: Record, and the Pieces in which it is simulated."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,10 +18,9 @@ class Noise:
 
     rms: [rad/s or m/s], about the mean. mean: [same], not subtracted anywhere; None where no rest was recorded.
     correlation_time_s: time constant [s] of the exponential correlation with the same sum; 0 for white noise.
-    effective_fraction: independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1].
-    n_samples: samples that were looked at.
-    source: "rest" (the arm under its brake) or "differences" (what is left of the motion in high differences; its
-    correlation cannot be told from them, so the noise is taken for white).
+    effective_fraction: independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1]. n_samples: that were looked at.
+    source: "rest" (the arm under its brake) or "differences" (high differences of the motion, which cannot tell a
+    correlation: the noise is taken for white).
     """
 
     rms: float
@@ -36,7 +35,7 @@ class Noise:
 class Irregularity:
     """Tell how irregular the times of a file are.
 
-    share: share of the intervals off by more than 1 % of the median interval.
+    share: of the intervals, off by more than 1 % of the median interval.
     largest_gap: largest interval in median intervals; at_s: where it begins [s].
     """
 

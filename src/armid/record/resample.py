@@ -1,4 +1,4 @@
-"""Even time grids out of the times of a file."""
+"""Even time grids out of the times of a file, and its columns on them."""
 
 import warnings
 from dataclasses import dataclass
@@ -16,6 +16,9 @@ LATEST_START = 2.0
 MOST_FILLING = 10
 EVEN = 1e-3
 LARGE_GAP = 3.0
+# A row this near to a grid sample, in intervals, stands for it.
+NEAR = 0.75
+NEIGHBOURS = 7
 
 
 class IrregularSamplingWarning(UserWarning):
@@ -40,6 +43,10 @@ class Timing:
     resampled: bool
     irregularity: Irregularity | None
 
+    def grid(self) -> Array:
+        """Return the times of the grid [s], (n_samples,)."""
+        return self.start + self.interval * np.arange(self.n_samples, dtype=np.float64)
+
 
 def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     """Find the even grid of a record.
@@ -51,35 +58,38 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     Raises ArmidError for fewer than 20 samples after the start, a plant from rest whose record starts late, intervals
     too short to be seconds, and times that are mostly gaps.
     """
-    after = "after t = 0" if from_rest else "in the record"
-    first = first_row(times) if from_rest else 0
+    first = 0
+    if from_rest:
+        # a thousandth of an interval before t = 0 counts as 0
+        slack = EVEN * float(np.median(np.diff(times))) if times.size > 1 else 0.0
+        first = int(np.searchsorted(times, -slack))
     motion = times[first:]
-    check_number(motion.size, after, file)
+    check_number(motion.size, from_rest, file)
     interval, tolerance, even = fitted_grid(motion, file)
     begin, start = float(motion[0]), 0.0 if from_rest else float(motion[0])
-    check_start(begin, start, interval, file)
+    if begin - start > LATEST_START * interval:
+        raise ArmidError(f"{file}: the first sample is at {begin:.6g} s, but the arm starts at t = 0: a first sample "
+                         "at or before 0 is expected")  # fmt: skip
     resampled = not even or abs(begin - start) > tolerance
     n_samples = grid_size(motion, start, interval, file) if resampled else motion.size
-    check_number(n_samples, after, file)
+    check_number(n_samples, from_rest, file)
     # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
     earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN))
     irregularity = None if even else irregularity_of(motion)
     if irregularity is not None:
-        tell(irregularity, motion, interval, file)
+        share, widest = irregularity.share, irregularity.largest_gap
+        said = (f"{file}: irregular sampling: {share:.2%} of {motion.size - 1} intervals are off by more than 1 %, the "
+                f"largest is {widest:.3g} times the median, at t = {irregularity.at_s:.6g} s")  # fmt: skip
+        said += ", a large gap that is bridged by a straight line" if widest > LARGE_GAP else ""
+        warnings.warn(f"{said}; resampled evenly at {interval:.6g} s", IrregularSamplingWarning, stacklevel=2)
     return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
 
 
-def first_row(times: Array) -> int:
-    """Return the row of the first sample at or after t = 0, a thousandth of an interval before counting as 0."""
-    slack = EVEN * float(np.median(np.diff(times))) if times.size > 1 else 0.0
-    return int(np.searchsorted(times, -slack))
-
-
-def check_start(begin: float, start: float, interval: float, file: str) -> None:
-    """Refuse a plant from rest whose first sample comes long after t = 0."""
-    if begin - start > LATEST_START * interval:
-        raise ArmidError(f"{file}: the first sample is at {begin:.6g} s, but the arm starts at t = 0: a first sample "
-                         "at or before 0 is expected")  # fmt: skip
+def check_number(n_samples: int, from_rest: bool, file: str) -> None:
+    """Refuse a record that is too short to say anything."""
+    if n_samples < FEWEST_SAMPLES:
+        place = "after t = 0" if from_rest else "in the record"
+        raise ArmidError(f"{file}: {n_samples} samples {place}, at least {FEWEST_SAMPLES} are expected")
 
 
 def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
@@ -96,6 +106,16 @@ def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
     even = off <= tolerance
     # where only jitter is there, each row has its own sample of the grid
     return interval if even or off < 0.5 * interval else float(np.median(np.diff(times))), tolerance, even
+
+
+def rounded(interval: float, offsets: Array) -> float:
+    """Return the roundest interval that the times allow: 0.001 rather than 0.00099999999999.
+
+    offsets: of the times from the fitted line [s], (n_rows,); they tell how exactly its slope is known.
+    """
+    doubt = float(np.max(np.abs(offsets))) * np.sqrt(12 / offsets.size) + 1e-9 * interval
+    candidates = (float(f"{interval:.{digits}g}") for digits in range(1, 16))
+    return next((c for c in candidates if abs(c - interval) * offsets.size <= doubt), interval)
 
 
 def printed_resolution(times: Array, interval: float) -> float:
@@ -119,16 +139,6 @@ def irregularity_of(times: Array) -> Irregularity | None:
     return Irregularity(float(np.mean(np.abs(relative - 1) > 0.01)), float(relative[widest]), float(times[widest]))
 
 
-def tell(irregularity: Irregularity, times: Array, interval: float, file: str) -> None:
-    """Warn how irregular the sampling is, and of a large gap."""
-    share, widest = irregularity.share, irregularity.largest_gap
-    text = (f"{file}: irregular sampling: {share:.2%} of {times.size - 1} intervals are off by more than 1 %, the "
-            f"largest is {widest:.3g} times the median, at t = {irregularity.at_s:.6g} s")  # fmt: skip
-    if widest > LARGE_GAP:
-        text += ", a large gap that is bridged by a straight line"
-    warnings.warn(f"{text}; resampled evenly at {interval:.6g} s", IrregularSamplingWarning, stacklevel=2)
-
-
 def grid_size(times: Array, start: float, interval: float, file: str) -> int:
     """Return the number of grid samples, the last at most half an interval off; refuse a grid that is mostly gaps."""
     length = float(times[-1]) - start
@@ -137,27 +147,6 @@ def grid_size(times: Array, start: float, interval: float, file: str) -> int:
         raise ArmidError(f"{file}: {times.size} samples at a median interval of {interval:.3g} s leave most of "
                          f"{length:.6g} s unmeasured, a record without such gaps is expected")  # fmt: skip
     return int(size + 0.5) + 1
-
-
-def check_number(n_samples: int, after: str, file: str) -> None:
-    """Refuse a record that is too short to say anything."""
-    if n_samples < FEWEST_SAMPLES:
-        raise ArmidError(f"{file}: {n_samples} samples {after}, at least {FEWEST_SAMPLES} are expected")
-
-
-def rounded(interval: float, offsets: Array) -> float:
-    """Return the roundest interval that the times allow: 0.001 rather than 0.00099999999999.
-
-    offsets: of the times from the fitted line [s], (n_rows,); they tell how exactly its slope is known.
-    """
-    doubt = float(np.max(np.abs(offsets))) * np.sqrt(12 / offsets.size) + 1e-9 * interval
-    candidates = (float(f"{interval:.{digits}g}") for digits in range(1, 16))
-    return next((c for c in candidates if abs(c - interval) * offsets.size <= doubt), interval)
-
-
-# A row this near to a grid sample, in intervals, stands for it.
-NEAR = 0.75
-NEIGHBOURS = 7
 
 
 def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear") -> Array:
@@ -169,10 +158,17 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
     """
     if not timing.resampled:
         return np.ascontiguousarray(values[timing.first :])
-    grid = timing.start + timing.interval * np.arange(timing.n_samples, dtype=np.float64)
-    if hold == "zero":
-        return held(values, times, grid, timing.interval)
-    return np.asarray(np.interp(grid, times, values), dtype=np.float64)
+    grid = timing.grid()
+    if hold != "zero":
+        return np.asarray(np.interp(grid, times, values), dtype=np.float64)
+    # a sample counts from a thousandth of an interval before its time on, so that rounding does not delay it
+    edges = np.append(grid, grid[-1] + timing.interval) + EVEN * timing.interval
+    rows = np.maximum(np.searchsorted(times, edges, side="right") - 1, 0)
+    first, last = rows[:-1], rows[1:]
+    impulse = np.append(0.0, np.cumsum(values[:-1] * np.diff(times)))
+    at_edges = impulse[rows] + values[rows] * (edges - times[rows])
+    changes = np.append(0, np.cumsum(np.diff(values) != 0))
+    return np.where(changes[first] == changes[last], values[first], np.diff(at_edges) / timing.interval)
 
 
 def moved_onto_grid(values: Array, times: Array, timing: Timing) -> Array:
@@ -184,16 +180,16 @@ def moved_onto_grid(values: Array, times: Array, timing: Timing) -> Array:
     """
     if not timing.resampled or times.size < NEIGHBOURS:
         return onto_grid(values, times, timing)
-    grid = timing.start + timing.interval * np.arange(timing.n_samples, dtype=np.float64)
+    grid = timing.grid()
     right = np.clip(np.searchsorted(times, grid), 1, times.size - 1)
     nearest = np.where(grid - times[right - 1] < times[right] - grid, right - 1, right)
     along = grid - times[nearest]
-    moved = values[nearest] + slopes(values, times, nearest) * along
+    moved = values[nearest] + parabola_slopes(values, times, nearest) * along
     gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.interval) > NEAR * timing.interval
     return np.where(gap, np.interp(grid, times, values), moved)
 
 
-def slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
+def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
     """Return the slope at each row of the least-squares parabola through 7 neighbours, those at the ends beside it.
 
     v = a + b t + c t^2 with t from the neighbours' mean time; returns b + 2 c t of the row.
@@ -212,15 +208,3 @@ def slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
     own = (times[rows] - middle) / unit
     b, c = (bend * straight - third * curved) / share, (second * curved - third * straight) / share
     return np.asarray((b + 2.0 * c * own) / unit)
-
-
-def held(values: Array, times: Array, grid: Array, interval: float) -> Array:
-    """Return the mean over each interval of an even grid of a column that holds its values, shape (n_samples,)."""
-    # a sample counts from a thousandth of an interval before its time on, so that rounding does not delay it
-    edges = np.append(grid, grid[-1] + interval) + EVEN * interval
-    rows = np.maximum(np.searchsorted(times, edges, side="right") - 1, 0)
-    first, last = rows[:-1], rows[1:]
-    impulse = np.append(0.0, np.cumsum(values[:-1] * np.diff(times)))
-    at_edges = impulse[rows] + values[rows] * (edges - times[rows])
-    changes = np.append(0, np.cumsum(np.diff(values) != 0))
-    return np.where(changes[first] == changes[last], values[first], np.diff(at_edges) / interval)

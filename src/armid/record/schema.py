@@ -1,7 +1,13 @@
-"""The shape of campaign.toml: which keys there are and of what kind."""
+"""The kinds of values in a TOML file, and the shape of campaign.toml: which keys there are and of what kind.
 
+A kind is a function that returns a value as it is wanted, or raises KindError. These few stand here in place of a
+library, whose import alone would take a tenth of the time in which the program starts.
+"""
+
+import tomllib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from armid.errors import ArmidError, nearest, shown
@@ -9,12 +15,6 @@ from armid.record.table import LARGEST
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
-
-
-# Kinds of values in a TOML file.
-#
-# A kind is a function that returns a value as it is wanted, or raises KindError. These few stand here in place of
-# pydantic, whose import alone would take a tenth of the time in which the program starts.
 
 Kind = Callable[[object], Any]
 
@@ -96,10 +96,13 @@ def key(kind: Kind, expected: str) -> dict[str, Any]:
     return {"kind": kind, "expected": expected}
 
 
-SHARED_HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'")
+HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'")
 CONSTANTS = key(table_of(number), "a finite number in SI")
 INPUTS = key(table_of(text), "the name of a column")
 BOUND = key(number, "a finite number in SI")
+WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds")
+RECORDS = key(list_of(any_table, 1), "at least one table headed [[records]]")
+PARAMETERS = key(table_of(any_table), "a table of low, high, fixed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,12 +113,10 @@ class RecordSheet:
     role: str = field(metadata=key(one_of("train", "holdout"), "'train' or 'holdout'"))
     constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
-    window_s: tuple[float, float] | None = field(
-        default=None, metadata=key(list_of(number, 2, 2), "[begin, end] in seconds")
-    )
+    window_s: tuple[float, float] | None = field(default=None, metadata=WINDOW)
     restart_s: float | None = field(default=None, metadata=key(above_zero, "a length in seconds above 0"))
     repeat_of: str | None = field(default=None, metadata=key(text, "the file of another record"))
-    hold: str | None = field(default=None, metadata=SHARED_HOLD)
+    hold: str | None = field(default=None, metadata=HOLD)
     keys: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -125,17 +126,13 @@ class CampaignSheet:
 
     name: str = field(metadata=key(text, "a text"))
     plant: str = field(metadata=key(text, "the name of a plant"))
-    records: tuple[dict[str, Any], ...] = field(
-        metadata=key(list_of(any_table, 1), "at least one table headed [[records]]")
-    )
+    records: tuple[dict[str, Any], ...] = field(metadata=RECORDS)
     effects: tuple[str, ...] = field(default=(), metadata=key(list_of(text), "a list of names of effects"))
     gyro_range_deg_s: float | None = field(default=None, metadata=key(above_zero, "a range in deg/s above 0"))
-    parameters: Mapping[str, dict[str, Any]] = field(
-        default_factory=dict, metadata=key(table_of(any_table), "a table of low, high, fixed")
-    )
+    parameters: Mapping[str, dict[str, Any]] = field(default_factory=dict, metadata=PARAMETERS)
     constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
-    hold: str = field(default="linear", metadata=SHARED_HOLD)
+    hold: str = field(default="linear", metadata=HOLD)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,29 +161,44 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
     for name in table:
         if name not in known:
             raise unknown_name("key", name, known, where)
-    values = {f.name: value_of(f, table, where) for f in declared if f.name in table or is_required(f)}
+    values: dict[str, Any] = {}
+    for f in declared:
+        expected = f.metadata["expected"]
+        if f.name in table:
+            try:
+                values[f.name] = part(f.metadata["kind"], table[f.name], f.name)
+            except KindError as error:
+                raise ArmidError(f"{where}: key {shown(error.path)} is {shown(error.found)}, {expected} is "
+                                 "expected") from error  # fmt: skip
+        elif f.default is MISSING and f.default_factory is MISSING:
+            raise ArmidError(f"{where}: key '{f.name}' is missing, {expected} is expected")
     if further:
         values["keys"] = {name: table[name] for name in further if name in table}
     return sheet(**values)
 
 
-def is_required(declared: Field[Any]) -> bool:
-    """Tell whether a key has no default."""
-    return declared.default is MISSING and declared.default_factory is MISSING
-
-
-def value_of(declared: Field[Any], table: Mapping[str, object], where: str) -> Any:
-    """Return the value of a declared key as its kind wants it."""
-    name, expected = declared.name, declared.metadata["expected"]
-    if name not in table:
-        raise ArmidError(f"{where}: key '{name}' is missing, {expected} is expected")
-    try:
-        return part(declared.metadata["kind"], table[name], name)
-    except KindError as error:
-        raise ArmidError(f"{where}: key {shown(error.path)} is {shown(error.found)}, {expected} is "
-                         "expected") from error  # fmt: skip
-
-
 def unknown_name(what: str, name: str, known: Collection[str], where: str) -> ArmidError:
     """Return the sentence for a name that nobody declared or registered."""
     return ArmidError(f"{where}: {what} {shown(name)} is unknown, {nearest(name, known)}")
+
+
+def load_toml(path: Path, named: str = "") -> dict[str, Any]:
+    """Return the tables of a TOML file; named: how messages name it, "": by its own name.
+
+    Raises ArmidError, with the line, for what is no UTF-8 text or no TOML.
+    """
+    where = named or path.name
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ArmidError(f"{where} cannot be read: {error.strerror or error}") from error
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise ArmidError(f"{where}, line {line}: not readable as text, TOML in UTF-8 is expected") from error
+    except RecursionError as error:
+        raise ArmidError(f"{where} is nested too deeply, plain tables of TOML are expected") from error
+    except ValueError as error:
+        # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
+        raise ArmidError(f"{where} is no valid TOML: {str(error)[:200]}") from error

@@ -1,12 +1,13 @@
-"""A CSV file of numbers under one header line.
+"""CSV files of numbers under one header line, and what the headers of a record mean.
 
 numpy's reader is used, not that of pandas: it is as strict as the format (pandas fills short rows and takes words for
 missing numbers), and a program that reads records of some thousand samples need not import pandas.
+A header is a quantity and its unit, `angular_velocity_deg_s`; a factor turns the column into SI.
 """
 
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,10 +21,19 @@ Array = NDArray[np.float64]
 LARGEST = 1e30
 LONGEST_HEADER = 1 << 16
 NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+DEGREE = np.pi / 180.0
+TIME = "time_s"
+# header -> unit of the speed, SI, and factor; of a position: unit of the speed that it belongs to
+SPEEDS = {
+    "angular_velocity_deg_s": ("rad/s", DEGREE),
+    "angular_velocity_rad_s": ("rad/s", 1.0),
+    "velocity_m_s": ("m/s", 1.0),
+}
+POSITIONS = {"position_m": ("m/s", 1.0), "angle_rad": ("rad/s", 1.0), "angle_deg": ("rad/s", DEGREE)}
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CsvTable:
     """Hold the columns of one file.
 
     file: name to show. path: where it is. columns: header -> values, shape (n_rows,), all finite.
@@ -38,8 +48,14 @@ class Table:
         filled = (number for number, line in lines_of(self.path) if number > 1 and line)
         return next(number for i, number in enumerate(filled) if i == row)
 
+    def only_one_of(self, found: Sequence[str], expected: str) -> str | None:
+        """Return the one header that was found, None without any; refuse several with ArmidError."""
+        if len(found) > 1:
+            raise ArmidError(f"{self.file}, line 1: {' and '.join(found)} are both there, {expected}")
+        return found[0] if found else None
 
-def read_table(path: Path, file: str) -> Table:
+
+def read_table(path: Path, file: str) -> CsvTable:
     """Read a CSV file: one header line, then numbers separated by commas; empty lines are skipped.
 
     file: how messages name it. A million rows of four columns take about a second.
@@ -48,38 +64,47 @@ def read_table(path: Path, file: str) -> Table:
     header with unnamed or repeated columns, a row of another length and anything that is no finite number.
     """
     try:
-        header, values = header_of(path), numbers_of(path)
+        with path.open(encoding="utf-8-sig") as lines:
+            header = lines.readline(LONGEST_HEADER)
+        with warnings.catch_warnings():
+            # of a file without rows; said below in a sentence of our own
+            warnings.filterwarnings("ignore", message=".*input contained no data", category=UserWarning)
+            values: Array = np.loadtxt(path, delimiter=",", comments=None, skiprows=1, ndmin=2, encoding="utf-8-sig")
     except OSError as error:
         raise ArmidError(f"{file} cannot be read: {error.strerror or error}") from error
     except ValueError as error:
-        raise fault_of(path, file, error) from error
-    names = names_of(header, file)
+        raise wrong_line(path, file, error) from error
+    names = column_names(header, file)
     if values.shape[0] == 0:
         raise ArmidError(f"{file} holds no samples: rows of numbers are expected below the header")
-    table = Table(file, path, {})
+    table = CsvTable(file, path, {})
     if values.shape[1] != len(names):
         raise ArmidError(f"{file}, line {table.line_of(0)}: {values.shape[1]} values in a row, {len(names)} are "
                          f"expected as in the header")  # fmt: skip
-    check_size(values, names, table)
+    too_large = ~(np.abs(values) <= LARGEST)
+    if too_large.any():
+        row, column = (int(i) for i in np.argwhere(too_large)[0])
+        value = float(values[row, column])
+        expected = f"a number within +-{LARGEST:g}" if np.isfinite(value) else "a finite number"
+        raise ArmidError(f"{file}, line {table.line_of(row)}: {names[column]} is {value:g}, {expected} is expected")
     table.columns.update({name: np.ascontiguousarray(column) for name, column in zip(names, values.T, strict=True)})
     return table
 
 
-def header_of(path: Path) -> str:
-    """Return the first line; raise ValueError where the file is no text."""
-    with path.open(encoding="utf-8-sig") as lines:
-        return lines.readline(LONGEST_HEADER)
+def write_table(path: Path, columns: Mapping[str, Array]) -> None:
+    """Write columns of equal length as CSV, each number as the shortest text that reads back to the same bits."""
+    rows = zip(*(np.asarray(values, dtype=np.float64).tolist() for values in columns.values()), strict=True)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(columns) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
 
 
-def names_of(line: str, file: str) -> list[str]:
-    """Return the names of the columns in a header.
-
-    Raises ArmidError for a header that names one column twice, leaves one unnamed, or has other separators.
-    """
-    if not line.strip():
+def column_names(header: str, file: str) -> list[str]:
+    """Return the names in a header; refuse one that is repeated, unnamed, or separated by anything but commas."""
+    if not header.strip():
         raise ArmidError(f"{file}, line 1: the file is empty there, a header such as "
                          "'time_s,angular_velocity_deg_s' is expected")  # fmt: skip
-    names = [name.strip().strip('"').strip() for name in line.split(",")]
+    names = [name.strip().strip('"').strip() for name in header.split(",")]
     if len(names) == 1 and any(separator in names[0] for separator in ";\t "):
         raise ArmidError(f"{file}, line 1: one column {shown(names[0])} is there, columns separated by commas are "
                          "expected")  # fmt: skip
@@ -91,49 +116,25 @@ def names_of(line: str, file: str) -> list[str]:
     return names
 
 
-def numbers_of(path: Path) -> Array:
-    """Return the rows below the header, shape (n_rows, n_columns); raise ValueError where they are no table."""
-    with warnings.catch_warnings():
-        # numpy warns of a file without rows; the caller says it in its own sentence
-        warnings.filterwarnings("ignore", message=".*input contained no data", category=UserWarning)
-        values: Array = np.loadtxt(path, delimiter=",", comments=None, skiprows=1, ndmin=2, encoding="utf-8-sig")
-    return values
-
-
-def check_size(values: Array, names: list[str], table: Table) -> None:
-    """Refuse the first number that is not finite or too large to be squared safely."""
-    wrong = ~(np.abs(values) <= LARGEST)
-    if wrong.any():
-        row, column = (int(i) for i in np.argwhere(wrong)[0])
-        value = float(values[row, column])
-        expected = f"a number within +-{LARGEST:g}" if np.isfinite(value) else "a finite number"
-        raise ArmidError(f"{table.file}, line {table.line_of(row)}: {names[column]} is {value:g}, {expected} "
-                         "is expected")  # fmt: skip
-
-
-def fault_of(path: Path, file: str, error: ValueError) -> ArmidError:
+def wrong_line(path: Path, file: str, error: ValueError) -> ArmidError:
     """Return the sentence for a file that is no table of numbers: the first line that is wrong, and why."""
     names: list[str] = []
     for number, line in lines_of(path):
+        where = f"{file}, line {number}"
         try:
             text = line.decode("utf-8-sig" if number == 1 else "utf-8")
         except UnicodeDecodeError:
-            return ArmidError(f"{file}, line {number}: not readable as text, a CSV file in UTF-8 is expected")
+            return ArmidError(f"{where}: not readable as text, a CSV file in UTF-8 is expected")
+        fields = text.split(",")
         if number == 1:
-            names = names_of(text, file)
-        elif text and (wrong := fault_of_row(text.split(","), names)):
-            return ArmidError(f"{file}, line {number}: {wrong}")
+            names = column_names(text, file)
+        elif text and len(fields) != len(names):
+            return ArmidError(f"{where}: {len(fields)} values in a row, {len(names)} are expected as in the header")
+        elif text:
+            for name, value in zip(names, fields, strict=True):
+                if not NUMBER.fullmatch(value):
+                    return ArmidError(f"{where}: {name} is {shown(value.strip())}, a finite number is expected")
     return ArmidError(f"{file} cannot be read as a table of numbers: {shown(str(error))}")
-
-
-def fault_of_row(fields: list[str], names: list[str]) -> str:
-    """Return what is wrong with a row, "" when nothing is."""
-    if len(fields) != len(names):
-        return f"{len(fields)} values in a row, {len(names)} are expected as in the header"
-    wrong = [i for i, text in enumerate(fields) if not NUMBER.fullmatch(text)]
-    if not wrong:
-        return ""
-    return f"{names[wrong[0]]} is {shown(fields[wrong[0]].strip())}, a finite number is expected"
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, bytes]]:
@@ -143,29 +144,8 @@ def lines_of(path: Path) -> Iterator[tuple[int, bytes]]:
             yield number, line.rstrip("\n").encode("latin-1")
 
 
-# What the headers of a record mean: quantity and unit.
-#
-# A header is a quantity and its unit, `angular_velocity_deg_s`; the factor turns the column into SI.
-
-DEGREE = np.pi / 180.0
-TIME = "time_s"
-SPEEDS = {
-    "angular_velocity_deg_s": ("rad/s", DEGREE),
-    "angular_velocity_rad_s": ("rad/s", 1.0),
-    "velocity_m_s": ("m/s", 1.0),
-}
-POSITIONS = {
-    "position_m": ("m/s", 1.0),
-    "angle_rad": ("rad/s", 1.0),
-    "angle_deg": ("rad/s", DEGREE),
-}
-
-
-def time_column(table: Table) -> Array:
-    """Return the times [s], shape (n_rows,).
-
-    Raises ArmidError when the column is missing or the times do not increase.
-    """
+def time_column(table: CsvTable) -> Array:
+    """Return the times [s], (n_rows,); refuse a missing column, and times that do not increase, with ArmidError."""
     if TIME not in table.columns:
         raise missing(table, "time column", [TIME])
     times = table.columns[TIME]
@@ -178,38 +158,30 @@ def time_column(table: Table) -> Array:
     return times
 
 
-def speed_column(table: Table, units: Sequence[str]) -> tuple[str, str]:
-    """Return the header of the recorded speed and its SI unit; units: those that the plant can record.
+def speed_column(table: CsvTable, units: Sequence[str]) -> tuple[str, str, Array]:
+    """Return header, SI unit and SI values, (n_rows,), of the recorded speed; units: those that the plant can record.
 
     Raises ArmidError unless exactly one of the known headers is there.
     """
     found = [name for name in SPEEDS if name in table.columns]
-    if len(found) > 1:
-        raise ArmidError(f"{table.file}, line 1: {' and '.join(found)} are both there, exactly one speed column is "
-                         "expected")  # fmt: skip
-    if not found:
+    header = table.only_one_of(found, "exactly one speed column is expected")
+    if header is None:
         raise missing(table, "speed column", [name for name, (unit, _) in SPEEDS.items() if unit in units])
-    return found[0], SPEEDS[found[0]][0]
+    unit, factor = SPEEDS[header]
+    return header, unit, table.columns[header] * factor
 
 
-def speed_of(table: Table, header: str) -> Array:
-    """Return the recorded speed, SI, shape (n_rows,)."""
-    return table.columns[header] * SPEEDS[header][1]
-
-
-def position_of(table: Table, unit: str) -> Array | None:
-    """Return the position [m or rad] that belongs to a speed in `unit`, shape (n_rows,), None where there is none.
+def position_of(table: CsvTable, unit: str) -> Array | None:
+    """Return the position [m or rad] that belongs to a speed in `unit`, (n_rows,), None where there is none.
 
     Raises ArmidError when two columns tell it.
     """
     found = [name for name, (speed_unit, _) in POSITIONS.items() if speed_unit == unit and name in table.columns]
-    if len(found) > 1:
-        raise ArmidError(f"{table.file}, line 1: {' and '.join(found)} are both there, at most one position column is "
-                         "expected")  # fmt: skip
-    return table.columns[found[0]] * POSITIONS[found[0]][1] if found else None
+    header = table.only_one_of(found, "at most one position column is expected")
+    return None if header is None else table.columns[header] * POSITIONS[header][1]
 
 
-def input_columns(plant: Plant, named: Mapping[str, str], table: Table, where: str) -> dict[str, str]:
+def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where: str) -> dict[str, str]:
     """Return input -> header for every input of the plant that the file holds.
 
     named: input -> header, as the campaign says. where: how messages name the place that says it.
@@ -228,15 +200,15 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: Table, where: s
     return {name: header for name, header in found.items() if header is not None}
 
 
-def declared_column(wanted: Input, table: Table) -> str | None:
+def declared_column(wanted: Input, table: CsvTable) -> str | None:
     """Return the one header that an input is found under by itself, None where an optional one is absent."""
     found = [name for name in wanted.columns if name in table.columns]
-    if len(found) > 1:
-        raise ArmidError(f"{table.file}, line 1: {' and '.join(found)} are both there, one column for input "
-                         f"'{wanted.name}' is expected, or its name under [records.inputs]")  # fmt: skip
-    if not found and wanted.required:
+    header = table.only_one_of(
+        found, f"one column for input '{wanted.name}' is expected, or its name under [records.inputs]"
+    )
+    if header is None and wanted.required:
         raise missing(table, f"column for input '{wanted.name}'", wanted.columns)
-    return found[0] if found else None
+    return header
 
 
 def si_factor(header: str) -> float:
@@ -244,12 +216,11 @@ def si_factor(header: str) -> float:
     return DEGREE if header.endswith(("_deg", "_deg_s")) else 1.0
 
 
-def missing(table: Table, what: str, expected: Iterable[str]) -> ArmidError:
+def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
     """Return the sentence for a column that is not there, naming a look-alike in another unit where there is one."""
-    known: Sequence[str] = list(expected)
-    quantities = {quantity_of(name) for name in known}
+    quantities = {quantity_of(name) for name in expected}
     alike = [name for name in table.columns if quantity_of(name) in quantities]
-    wanted = " or ".join(known) or "a name under [records.inputs]"
+    wanted = " or ".join(expected) or "a name under [records.inputs]"
     if alike:
         return ArmidError(f"{table.file}, line 1: column {shown(alike[0])} is in an unknown unit, {wanted} is expected")
     return ArmidError(f"{table.file}, line 1: no {what} among {shown(list(table.columns))}, {wanted} is expected")

@@ -8,8 +8,7 @@ from typing import Any, Protocol
 
 from armid.errors import ArmidError, shown
 from armid.model import Model
-from armid.record.reader import load_toml
-from armid.record.schema import unknown_name, validated
+from armid.record.schema import load_toml, unknown_name, validated
 from armid.study.cases import Case, cases_of
 from armid.study.kind import IDENTIFIES, KINDS, function
 from armid.study.spec import REPORTS, EntrySheet, Known, StudySheet, chosen, load_known

@@ -1,4 +1,4 @@
-"""The importer of EMPS, on a small synthetic set of the same layout and, where it is at hand, on the measured one."""
+"""The importers of EMPS and of DFKI's pendulum, on small synthetic sets of the same layout and on the measured ones."""
 
 import os
 import sys
@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from armid.cli.main import main
 from armid.errors import ArmidError
 from armid.record import read_campaign
-from armid.record.importers import import_emps, velocity_of
+from armid.record.importers import import_dfki, import_emps, velocity_of
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-MEASURED = Path(os.environ.get("ARMID_MEASURED", REPOSITORY.parent / "shared" / "data")) / "emps"
+NOT_AT_HAND = "the measured files are no part of the repository: ARMID_MEASURED names the folder that holds them"
+MEASURED = Path(os.environ.get("ARMID_MEASURED", REPOSITORY.parent / "shared" / "data"))
 GAIN = 35.15
 
 
@@ -36,7 +38,7 @@ def emps(tmp_path):
     return folder
 
 
-def test_campaign_of_a_synthetic_set(emps, tmp_path):
+def test_campaign_of_a_synthetic_axis(emps, tmp_path):
     campaign = read_campaign(import_emps(emps, tmp_path / "out"))
     assert (campaign.name, campaign.plant.name, campaign.unit) == ("emps", "driven_axis", "m/s")
     assert [r.file for r in campaign.train] == ["DATA_EMPS.csv"]
@@ -120,10 +122,9 @@ def test_a_missing_package_or_network_is_said(tmp_path, monkeypatch):
         import_emps(None, tmp_path / "out")
 
 
-@pytest.mark.skipif(not (MEASURED / "DATA_EMPS.mat").is_file(), reason="the measured EMPS files are not at hand: they "
-                    "are not part of the repository; ARMID_MEASURED names the folder that holds emps/")  # fmt: skip
-def test_the_measured_set(tmp_path):
-    campaign = read_campaign(import_emps(MEASURED, tmp_path / "out"))
+@pytest.mark.skipif(not (MEASURED / "emps" / "DATA_EMPS.mat").is_file(), reason=NOT_AT_HAND)
+def test_the_measured_axis(tmp_path):
+    campaign = read_campaign(import_emps(MEASURED / "emps", tmp_path / "out"))
     train, holdout = campaign.records
     assert train.n_samples == holdout.n_samples == 24841
     assert train.duration == pytest.approx(24.84)
@@ -134,3 +135,91 @@ def test_the_measured_set(tmp_path):
     # where the encoder began and ended is what the velocity adds up to
     travelled = np.cumsum(train.measured) * 0.001
     np.testing.assert_allclose(travelled, train.columns["position_m"] - train.columns["position_m"][0], atol=1e-4)
+
+
+DFKI_RECORDS = ("ddp", "direct_collocation")
+
+
+def columns(interval):
+    times = interval * np.arange(int(2.5 / interval))
+    return {"time": times, "position": 0.4 * np.sin(3 * times), "velocity": 1.2 * np.cos(3 * times),
+            "torque": 0.5 * np.sin(3 * times)}  # fmt: skip
+
+
+def write_dfki(folder, name, table):
+    np.savetxt(folder / f"{name}_measured.csv", np.column_stack(list(table.values())), delimiter=",",
+               header=",".join(table), comments="")  # fmt: skip
+
+
+@pytest.fixture
+def dfki(tmp_path):
+    """Return a folder with a synthetic set."""
+    folder = tmp_path / "set"
+    folder.mkdir()
+    for name, interval in zip(DFKI_RECORDS, (0.002, 0.003), strict=True):
+        write_dfki(folder, name, columns(interval))
+    return folder
+
+
+def test_campaign_of_a_synthetic_pendulum(dfki, tmp_path):
+    campaign = read_campaign(import_dfki(dfki, tmp_path / "out"))
+    assert (campaign.name, campaign.plant.name, campaign.unit) == ("dfki", "driven_axis", "rad/s")
+    assert [r.file for r in campaign.train] == ["ddp.csv", "direct_collocation.csv"]
+    assert campaign.holdout == ()
+    # a rod of 0.13 kg, 0.5 m long, with 0.546 kg at its end, and a rotor behind a gear of 6:1
+    assert campaign.records[0].constants["gravity_moment"] == pytest.approx(9.81 * (0.546 + 0.065) * 0.5, rel=1e-4)
+    inertia = 0.546 * 0.25 + 0.13 * 0.25 / 3 + 36 * 6.0719e-5
+    assert campaign.parameters["inertia"].fixed == pytest.approx(inertia, rel=1e-4)
+    record = campaign.records[1]
+    np.testing.assert_array_equal(record.manoeuvre.inputs["u"], columns(0.003)["torque"])
+    np.testing.assert_array_equal(record.columns["angle_rad"], columns(0.003)["position"])
+    assert [p.start_index for p in record.pieces] == [0, 333]
+    assert record.pieces[1].manoeuvre.constants["start_position"] == pytest.approx(0.4 * np.sin(3 * 0.999), abs=1e-6)
+    text = (tmp_path / "out" / "campaign.toml").read_text()
+    for word in ("ESTIMATES", "BSD-3-Clause", "doi:10.21105/joss.03884", "ed17ea2d32a3"):
+        assert word in text
+
+
+@pytest.mark.slow
+def test_nothing_free_is_identified_through_the_command(dfki, tmp_path, capsys):
+    out = tmp_path / "out"
+    for command in (["import", "dfki", str(dfki), "--out", str(out), "--holdout", "ddp"],
+                    ["identify", str(out), "--fitness", "rmse"]):  # fmt: skip
+        with pytest.raises(SystemExit) as left:
+            main(command)
+        assert left.value.code == 0
+    held = read_campaign(out)
+    assert ([r.file for r in held.train], [r.file for r in held.holdout]) == (["direct_collocation.csv"], ["ddp.csv"])
+    text = capsys.readouterr().out
+    assert "0 of 12000 simulations used, no parameter is free" in text
+    assert "the model, in which nothing is free, lacks something" in " ".join(text.split())
+    assert "has not come to the minimum" not in text
+
+
+@pytest.mark.parametrize(("change", "holdout", "fragments"), [
+    ({"torque": None}, None, ["ddp_measured.csv, line 1", "'torque' is missing", "velocity"]),
+    ({"torque": "absent"}, None, ["ddp_measured.csv does not exist", "results/"]),
+    ({}, "dpd", ["--holdout 'dpd'", "did you mean 'ddp'"]),
+])  # fmt: skip
+def test_refused_pendulum(dfki, tmp_path, change, holdout, fragments):
+    if change.get("torque", "") is None:
+        write_dfki(dfki, "ddp", {k: v for k, v in columns(0.002).items() if k != "torque"})
+    elif change:
+        (dfki / "ddp_measured.csv").unlink()
+    with pytest.raises(ArmidError) as refusal:
+        import_dfki(dfki, tmp_path / "out", holdout)
+    for fragment in fragments:
+        assert fragment in str(refusal.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.filterwarnings("ignore::armid.record.IrregularSamplingWarning")
+@pytest.mark.skipif(not (MEASURED / "dfki_simple_pendulum" / "ddp_measured.csv").is_file(), reason=NOT_AT_HAND)
+def test_the_measured_pendulum(tmp_path):
+    ddp, collocation = read_campaign(import_dfki(MEASURED / "dfki_simple_pendulum", tmp_path / "out")).records
+    assert [len(ddp.pieces), len(collocation.pieces)] == [6, 3]
+    assert ddp.manoeuvre.interval == pytest.approx(0.002, rel=1e-3)
+    assert np.max(np.abs(collocation.measured)) == pytest.approx(9.4, abs=0.05)
+    # the speed that the drive tells adds up to 2 % less than its encoder moved
+    travelled = np.sum(ddp.measured) * ddp.manoeuvre.interval
+    assert travelled == pytest.approx(np.ptp(ddp.columns["angle_rad"][[0, -1]]), rel=0.03)

@@ -1,7 +1,10 @@
-"""A search as an algorithm of pymoo."""
+"""A search as an algorithm of pymoo, an algorithm of pymoo as a search, and a search run without pymoo's loop."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, TypeGuard
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any, ClassVar, TypeGuard
 
 import numpy as np
 from pymoo.algorithms.base.local import LocalSearch
@@ -13,14 +16,25 @@ from pymoo.core.problem import Problem
 from pymoo.core.termination import NoTermination
 
 from armid.errors import ArmidError
-from armid.identifiers.identifier import OF_PYMOO, OF_SETUP, checked_count, refuse_unknown
-from armid.identifiers.search import Array, Ask, Dropped, Method, Search, SwarmEvaluator, Task, Told, as_population, box
-from armid.problem.meter import PENALTY, RESIDUALS, Metered
+from armid.identifiers.identifier import OF_PYMOO, OF_SETUP, Identifier, checked_count, refuse_unknown
+from armid.identifiers.search import (
+    Ask,
+    Dropped,
+    Method,
+    Search,
+    SearchTask,
+    SwarmEvaluator,
+    Told,
+    as_population,
+    bounds_of,
+)
+from armid.problem.meter import PENALTY, RESIDUALS, Array, Metered
 
+SEEDS = 2**31 - 1
 PLAIN = ["F", "G", "H"]
 
 
-class Searching(Algorithm):  # type: ignore[misc]
+class SearchAlgorithm(Algorithm):  # type: ignore[misc]
     """Ask and tell a search as pymoo expects it of an algorithm; what the search asks for at once is one generation.
 
     method: makes the search; budget: simulations after which the run ends when no termination is given.
@@ -43,7 +57,7 @@ class Searching(Algorithm):  # type: ignore[misc]
     def setup(self, problem: Problem, **options: Any) -> Algorithm:
         """Make ready for a problem; options are pymoo's, and the unknown ones that pymoo would swallow are refused."""
         refuse_unknown(options, OF_SETUP, "the search")
-        box(problem)
+        bounds_of(problem)
         if options.get("termination", self.termination) is None:
             options["termination"] = ("n_eval", self.budget)
         return super().setup(problem, **options)
@@ -62,7 +76,7 @@ class Searching(Algorithm):  # type: ignore[misc]
             raise ArmidError("the search has no problem yet, expected a call of setup(problem) first")
         if not self.is_initialized:
             self._initialize()
-            self._search = self.method(Task(self.problem, self.random_state))
+            self._search = self.method(SearchTask(self.problem, self.random_state))
             self._asked = next(self._search)
         if self._asked is None or self._search is None:
             raise ArmidError("the search has ended or is a copy of a running one: it cannot go on, set up a new one")
@@ -92,14 +106,22 @@ class Searching(Algorithm):  # type: ignore[misc]
         """Leave `opt` as `_advance` has set it."""
 
     def _told(self, infills: Population | None) -> Told:
-        """Read what was evaluated; a failed candidate gets +inf."""
+        """Read what was evaluated; a failed candidate gets +inf.
+
+        Residual vectors are taken off the individuals: kept there they would fill the memory.
+        """
         n = 0 if infills is None else len(infills)
         assert self._asked is not None
         if n != len(self._asked.X) or infills is None:
             raise ArmidError(f"{n} candidates were told to the search, expected {len(self._asked.X)} as it asked for")
         f = np.array([individual.F[0] for individual in infills], dtype=np.float64)
         f[~(f < PENALTY)] = np.inf
-        return Told(f, residuals_of(infills) if self._asked.residuals else None)
+        if not self._asked.residuals:
+            return Told(f)
+        rows = [individual.data.pop(RESIDUALS, None) for individual in infills]
+        if any(row is None or np.ndim(row) != 1 for row in rows):
+            raise ArmidError("the problem gives no residual vectors, least_squares expects one that does")
+        return Told(f, np.array(rows, dtype=np.float64))
 
     def _finalize(self) -> None:
         if self._search is not None:
@@ -110,52 +132,62 @@ class Searching(Algorithm):  # type: ignore[misc]
         return self.__dict__ | {"_search": None}
 
 
-def residuals_of(infills: Population) -> Array:
-    """Take the residual vectors off the individuals, (n, n_total): kept there they would fill the memory.
+@dataclass(frozen=True)
+class DeclaredSearch(ABC):
+    """Declare a search of ours: its name, what it is in words, its capabilities, and as fields its options.
 
-    Raises ArmidError when the problem gave none.
+    A subclass checks its options in `__post_init__`; what the capabilities mean, see `Identifier`.
     """
-    rows = [individual.data.pop(RESIDUALS, None) for individual in infills]
-    if any(row is None or np.ndim(row) != 1 for row in rows):
-        raise ArmidError("the problem gives no residual vectors, least_squares expects one that does")
-    return np.array(rows, dtype=np.float64)
+
+    name: ClassVar[str]
+    note: ClassVar[str]
+    is_global: ClassVar[bool] = False
+    uses_gradient: ClassVar[bool] = False
+    needs_residuals: ClassVar[bool] = False
+
+    @abstractmethod
+    def search(self, task: SearchTask) -> Search:
+        """Search; return whether any candidate has had a fitness."""
+
+    @classmethod
+    def identifier(cls) -> Identifier:
+        """Return the identifier of the search, as an algorithm of pymoo."""
+        return Identifier(
+            cls.name, partial(built_search, cls), cls.note, is_global=cls.is_global, uses_gradient=cls.uses_gradient,
+            needs_residuals=cls.needs_residuals,
+        )  # fmt: skip
 
 
-SEEDS = 2**31 - 1
+def built_search(kind: type[DeclaredSearch], budget: int, **options: Any) -> SearchAlgorithm:
+    """Return a search as an algorithm; refuse with ArmidError an unknown option and a bad value."""
+    refuse_unknown(options, [f.name for f in fields(kind)], f"'{kind.name}'")
+    return SearchAlgorithm(kind(**options).search, budget)
 
 
-def search_of(algorithm: Algorithm, task: Task) -> Search:
+def search_of(algorithm: Algorithm, task: SearchTask) -> Search:
     """Return the search that a fresh algorithm makes of a task.
 
     Raises ArmidError when the task has a start and the algorithm takes none.
     """
-    if isinstance(algorithm, Searching):
+    if isinstance(algorithm, SearchAlgorithm):
         return algorithm.method(task)
     if task.start is not None:
-        place_at(algorithm, task.start)
-    return driven(algorithm, task)
+        if not takes_start(algorithm):
+            raise ArmidError(f"{type(algorithm).__name__} takes no start x0, so a chain may begin with it and no more")
+        if isinstance(algorithm, LocalSearch):
+            algorithm.initialization = Initialization(task.start[np.newaxis])
+        else:
+            algorithm.x0 = task.start.copy()
+    return stepped(algorithm, task)
 
 
 def takes_start(algorithm: Algorithm) -> bool:
     """Tell whether an algorithm can be told where to start: pymoo's local ones can, and whatever has an `x0`."""
-    return isinstance(algorithm, Searching | LocalSearch) or hasattr(algorithm, "x0")
+    return isinstance(algorithm, SearchAlgorithm | LocalSearch) or hasattr(algorithm, "x0")
 
 
-def place_at(algorithm: Algorithm, start: Array) -> None:
-    """Let an algorithm start at a candidate, (n_parameters,).
-
-    Raises ArmidError for one that takes no start.
-    """
-    if not takes_start(algorithm):
-        raise ArmidError(f"{type(algorithm).__name__} takes no start x0, so a chain may begin with it and no more")
-    if isinstance(algorithm, LocalSearch):
-        algorithm.initialization = Initialization(start[np.newaxis])
-    else:
-        algorithm.x0 = start.copy()
-
-
-def driven(algorithm: Algorithm, task: Task) -> Search:
-    """Ask and tell an algorithm until it ends by itself; its own evaluator is told of the evaluations."""
+def stepped(algorithm: Algorithm, task: SearchTask) -> Search:
+    """Ask and tell an algorithm until it ends by itself; the evaluations are counted in its own evaluator."""
     seed = int(task.random.integers(1, SEEDS))
     algorithm.setup(task.problem, termination=NoTermination(), seed=seed)
     while algorithm.has_next():
@@ -173,19 +205,19 @@ def driven(algorithm: Algorithm, task: Task) -> Search:
     return True
 
 
-def can_run_alone(algorithm: Algorithm) -> TypeGuard[Searching]:
+def can_run_directly(algorithm: Algorithm) -> TypeGuard[SearchAlgorithm]:
     """Tell whether an algorithm is a search of ours that was given nothing for pymoo's loop to see to."""
-    return type(algorithm) is Searching and algorithm.is_bare
+    return type(algorithm) is SearchAlgorithm and algorithm.is_bare
 
 
-def run_alone(algorithm: Searching, problem: Metered, seed: int, is_over: Callable[[], bool]) -> None:
+def run_directly(algorithm: SearchAlgorithm, problem: Metered, seed: int, is_over: Callable[[], bool]) -> None:
     """Run a search to its end, or until it is over; the problem's meter keeps what it found.
 
     Asks for the same candidates in the same order as pymoo's `minimize` with this seed, bit for bit.
     is_over: called after each evaluation of what was asked for at once, which is a generation of pymoo.
     Raises ArmidError for a problem that has no finite box.
     """
-    box(problem)
+    bounds_of(problem)
 
     def ask(X: Array, residuals: bool = False) -> Told:
         values, vectors = problem.answered(X, residuals)
@@ -193,7 +225,7 @@ def run_alone(algorithm: Searching, problem: Metered, seed: int, is_over: Callab
             raise Dropped
         return Told(np.where(values < PENALTY, values, np.inf), vectors)
 
-    search = algorithm.method(Task(problem, np.random.default_rng(seed), ask=ask))
+    search = algorithm.method(SearchTask(problem, np.random.default_rng(seed), ask=ask))
     told: Told | None = None
     try:
         while True:

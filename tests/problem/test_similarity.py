@@ -111,11 +111,10 @@ SERIES = {
 
 
 @pytest.mark.parametrize("kind", SERIES)
-@pytest.mark.parametrize("seed", range(4))
-def test_agrees_with_the_literal_equations(kind: str, seed: int) -> None:
-    rng = np.random.default_rng([seed, *kind.encode()])
+def test_agrees_with_the_literal_equations(kind: str) -> None:
+    rng = np.random.default_rng([*kind.encode()])
     for n in (2, 3, 5, 10, 40, 150):
-        for _ in range(4):
+        for _ in range(12):
             x = SERIES[kind](rng, n)
             if x.min() == x.max():
                 continue
@@ -152,12 +151,12 @@ def test_noise_alone_costs_what_is_said_of_the_reference_arm(trajectories: Array
     assert s == pytest.approx(0.9985, abs=0.001)
 
 
-@pytest.mark.parametrize("kind", SERIES)
-def test_a_series_equals_itself_exactly(kind: str) -> None:
-    rng = np.random.default_rng(3)
-    for n in (2, 30, 701):
-        x = SERIES[kind](rng, n) + np.linspace(0.0, 1.0, n)
-        assert [float(v[0]) for v in similarity(x, x[np.newaxis], INTERVAL)] == [1.0, 1.0, 1.0]
+def test_a_series_equals_itself_exactly() -> None:
+    for make in SERIES.values():
+        rng = np.random.default_rng(3)
+        for n in (2, 30, 701):
+            x = make(rng, n) + np.linspace(0.0, 1.0, n)
+            assert [float(v[0]) for v in similarity(x, x[np.newaxis], INTERVAL)] == [1.0, 1.0, 1.0]
 
 
 def test_values_by_hand() -> None:
@@ -228,25 +227,16 @@ def test_other_layouts_give_the_same() -> None:
     assert all(v.shape == (0,) for v in similarity(x, np.empty((0, 60)), 1))
 
 
-@pytest.mark.parametrize(
-    ("measured", "options", "sentence"),
-    [
-        (np.zeros(5), {}, "zero throughout"),
-        (np.full(5, 2.0), {}, "constant"),
-        (np.array([1.0, np.nan, 2.0, 3.0, 4.0]), {}, "1 of 5 measured values are no finite numbers"),
-        (np.arange(4.0), {}, r"shape \(1, 5\), expected \(n_candidates, 4\)"),
-        (np.ones((2, 5)), {}, "expected .n_samples,."),
-        (np.arange(5.0), {"interval": 0.0}, "interval is 0.0"),
-        (np.arange(5.0), {"slope_threshold": np.nan}, "slope_threshold nan"),
-        (np.arange(5.0), {"epsilon": -0.1}, "epsilon is -0.1"),
-        (np.arange(5.0), {"xi": np.inf}, "xi inf"),
-    ],
-)
+@pytest.mark.parametrize(("measured", "options", "sentence"), [
+    (np.zeros(5), {}, "zero throughout"), (np.full(5, 2.0), {}, "constant"),
+    (np.array([1.0, np.nan, 2.0, 3.0, 4.0]), {}, "1 of 5 measured values are no finite numbers"),
+    (np.arange(4.0), {}, r"shape \(1, 5\), expected \(n_candidates, 4\)"),
+    (np.ones((2, 5)), {}, "expected .n_samples,."), (np.arange(5.0), {"interval": 0.0}, "interval is 0.0"),
+    (np.arange(5.0), {"slope_threshold": np.nan}, "slope_threshold nan"),
+    (np.arange(5.0), {"epsilon": -0.1}, "epsilon is -0.1"), (np.arange(5.0), {"xi": np.inf}, "xi inf"),
+])  # fmt: skip
 def test_refuses_in_a_sentence(measured: Array, options: dict[str, float], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         similarity(measured, np.ones((1, 5)), **{"interval": 0.001, **options})
-
-
-def test_refuses_a_zero_measurement_for_s1_alone() -> None:
     with pytest.raises(ValueError, match="zero throughout"):
         numerical_similarity(np.zeros(3), np.ones((1, 3)))

@@ -1,0 +1,122 @@
+"""Pieces: the state from which one starts, smoothed as far as the noise asks for it, and which samples count."""
+
+import numpy as np
+import pytest
+
+from armid.errors import ArmidError
+from armid.record import read_campaign
+from armid.record.pieces import Track, smoothed, state_at
+
+TIMES = np.arange(1500) / 500
+MOTION = 3.0 * np.sin(8.0 * TIMES) + 0.5 * np.sin(25.0 * TIMES)
+
+
+@pytest.mark.parametrize("index", [0, 700, 1499])
+def test_a_signal_without_noise_is_not_smoothed(index):
+    assert smoothed(MOTION, index, 0.0) == (MOTION[index], 0.0)
+    value, deviation = smoothed(MOTION, index, 1e-12)
+    assert value == pytest.approx(MOTION[index], abs=5e-12)
+    assert deviation <= 1e-12
+
+
+def test_a_line_is_smoothed_over_the_longest_window():
+    line = 2.0 - 5.0 * TIMES
+    end, middle = smoothed(line, 0, 0.1), smoothed(line, 700, 0.1)
+    assert end[0] == pytest.approx(2.0, abs=1e-12)
+    assert middle[0] == pytest.approx(line[700], abs=1e-12)
+    # of degree 1 + 2, the lower of the two degrees: 16/n at the end, 9/4n in the middle, n near 400
+    assert end[1] == pytest.approx(0.1 * np.sqrt(16 / 370), rel=0.1)
+    assert middle[1] == pytest.approx(0.1 * np.sqrt(9 / 4 / 370), rel=0.1)
+
+
+def test_the_deviation_is_honest():
+    """Over 300 noises on a motion that turns and jerks, errors are as large as they are said to be."""
+    for noise, index in ((1e-3, 0), (1e-3, 700), (1e-2, 333), (0.1, 0), (0.1, 333)):
+        rng = np.random.default_rng(2)
+        found = [smoothed(MOTION + rng.normal(0.0, noise, TIMES.size), index, noise) for _ in range(300)]
+        shares = np.array([(value - MOTION[index]) / deviation for value, deviation in found])
+        assert 0.8 < np.sqrt(np.mean(shares**2)) < 1.25
+        assert np.mean([deviation for _, deviation in found]) < noise
+
+
+def test_a_kink_ends_the_window():
+    kinked = np.where(TIMES < 1.0, 0.0, 40.0 * (TIMES - 1.0))
+    rng = np.random.default_rng(3)
+    errors = [smoothed(kinked + rng.normal(0.0, 0.01, TIMES.size), 500, 0.01)[0] for _ in range(100)]
+    assert np.sqrt(np.mean(np.square(errors))) < 0.02
+
+
+def test_steps_of_a_sensor_at_rest_do_not_average_out():
+    state, deviation = state_at({"start_position": Track(np.full(300, 0.005), 0.0029, 0.01)}, 100)
+    assert state["start_position"] == pytest.approx(0.005)
+    assert deviation["start_position"] == pytest.approx(0.01 / np.sqrt(12))
+
+
+def test_a_clean_record_starts_exactly(write_axis, axis_columns):
+    pieces = read_campaign(write_axis("restart_s = 1.0\n")).records[0].pieces
+    for piece in pieces:
+        assert piece.manoeuvre.constants["start_speed"] == axis_columns["velocity_m_s"][piece.start_index]
+        assert set(piece.start_deviation) == {"start_position", "start_speed"}
+
+
+def test_a_machine_at_rest_has_no_measured_start(write):
+    assert read_campaign(write()).records[0].pieces[0].start_deviation == {}
+
+
+@pytest.mark.parametrize(("window", "expected"), [
+    ("[0.0, 0.7]", slice(0, 701)), ("[0, 0.7]", slice(0, 701)), ("[0.25, 0.7]", slice(250, 701)),
+    ("[0.1004, 0.2004]", slice(101, 201)), ("[-1.0, 0.5]", slice(0, 501)), ("[0.6, 99.0]", slice(600, 1201)),
+    ("[0.0, 1e30]", slice(0, 1201)),
+])  # fmt: skip
+def test_both_ends_count(write, window, expected):
+    folder = write()
+    toml = folder / "campaign.toml"
+    toml.write_text(toml.read_text() + f"window_s = {window}\n")
+    record = read_campaign(folder).records[0]
+    assert record.pieces[0].window == expected
+    assert record.n_samples == expected.stop - expected.start
+    assert record.duration == pytest.approx((expected.stop - expected.start - 1) * 0.001)
+    assert record.measured.size == record.pieces[0].measured.size == 1201
+
+
+def test_a_caller_overrides_the_window(write):
+    folder = write()
+    toml = folder / "campaign.toml"
+    toml.write_text(toml.read_text() + "window_s = [0.5, 0.6]\n")
+    campaign = read_campaign(folder)
+    wide = campaign.with_window(0.0, 0.7)
+    assert campaign.records[0].pieces[0].window == slice(500, 601)
+    assert wide.records[0].pieces[0].window == slice(0, 701)
+    assert wide.with_window(0.1, 0.2).records[0].pieces[0].window == slice(100, 201)
+
+
+def test_what_is_simulated_can_end_with_the_window(write):
+    piece = read_campaign(write()).with_window(0.3, 0.7).records[0].pieces[0].until_window_end()
+    assert piece.manoeuvre.n_samples == piece.measured.size == 701
+    assert piece.window == slice(300, 701)
+
+
+@pytest.mark.parametrize(("begin", "end", "found"), [
+    (0.5, 0.5, r"\[0.5, 0.5\]"), (0.7, 0.0, r"\[0.7, 0\]"), (5.0, 6.0, "0 samples"), (-0.1, -0.01, "0 samples"),
+    (0.1, 0.118, "19 samples"),
+])  # fmt: skip
+def test_refused_windows(write, begin, end, found):
+    folder = write()
+    with pytest.raises(ArmidError, match=found):
+        read_campaign(folder).with_window(begin, end)
+    toml = folder / "campaign.toml"
+    toml.write_text(toml.read_text() + f"window_s = [{begin}, {end}]\n")
+    with pytest.raises(ArmidError, match=f"campaign.toml, record 'lower.csv'.*{found}"):
+        read_campaign(folder)
+
+
+def test_a_window_without_motion_is_refused(write, arm_columns):
+    speed = np.where(arm_columns["time_s"] > 1.0, 3.0, arm_columns["angular_velocity_deg_s"])
+    folder = write(lower={**arm_columns, "angular_velocity_deg_s": speed})
+    with pytest.raises(ArmidError, match=r"lower\.csv is constant in the window"):
+        read_campaign(folder).with_window(1.1, 1.2)
+
+
+def test_a_window_that_no_restarted_piece_fills_is_refused(write_axis):
+    with pytest.raises(ArmidError, match=r"no piece of move\.csv"):
+        read_campaign(write_axis("restart_s = 0.026\nwindow_s = [1.0, 1.025]\n"))
