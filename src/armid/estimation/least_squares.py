@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from armid.engine import probes
 from armid.errors import ArmidError
@@ -23,6 +22,8 @@ Array = NDArray[np.float64]
 STEP = 1e-4
 # A parameter this close to its bound, as a share of the range, is held by the bound and not by the records.
 AT_BOUND = 1e-4
+# Relative fall of chi2 in one step at which a fit has arrived.
+TOLERANCE = 1e-9
 
 
 def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
@@ -61,7 +62,7 @@ class LeastSquaresProblem:
         low, high = self.space.low[self.space.free], self.space.high[self.space.free]
         return np.clip(low + z * self.span, low, high)
 
-    @property
+    @cached_property
     def measured(self) -> Array:
         """Weighted measured signals of all records, end to end, shape (n_samples,)."""
         raise NotImplementedError
@@ -137,13 +138,8 @@ def weighted_records(
     return WeightedRecords(replays, space, tuple(by_noise if weights is None else map(float, weights)))
 
 
-MOST_EVALUATIONS = 60
-# What holds a parameter that the records do not see where it is, as a share of the slopes: below any rounding of chi2.
-ANCHOR = 1e-8
-# An estimate this close to the box, as a share of the range, is tried on the box itself.
-NEAR = 1e-3
 # How many candidates are spread over the box, and from how many of the best a fit starts.
-N_SPREAD, N_STARTS = 400, 4
+N_SPREAD, N_STARTS = 512, 4
 
 
 def refine(
@@ -155,85 +151,71 @@ def refine(
 ) -> Array:
     """Return the candidate near x0 that minimises sum over records of weight^2 |measured - simulated|^2 in the box.
 
-    A reusable local re-fit: scipy's trust-region reflective least squares on the residuals of all records, residual and
-    Jacobian from one population of 2 n_free + 1 candidates. A step into a region that diverges is shortened; an
-    estimate that the box holds ends on the box exactly.
-    x0: free parameters, SI, shape (n_free,), moved into the box. weights: one for each record [1/unit], None: 1/noise
-    rms, or 1 for all where a record has no noise. tolerance: relative change of cost and of step at which to stop.
-    Returns free parameters, SI, shape (n_free,).
+    Levenberg-Marquardt, see `descend`. A step into a region that diverges is shortened; an estimate that the box holds
+    ends on the box exactly.
 
-    Raises ArmidError when the start diverges.
-    Source: Branch, Coleman, Li 1999, doi:10.1137/S1064827595289108.
+    Parameters
+    ----------
+    replays, space
+        The records, ready to be simulated, and the box.
+    x0 : array, SI, (n_free,)
+        Free parameters, moved into the box.
+    weights : (n_records,), 1/unit of the record
+        None: 1/noise rms, or 1 for all where a record has no noise.
+    tolerance : float
+        Relative fall of the sum of squares in one step at which to stop.
+
+    Returns
+    -------
+    array, SI, (n_free,)
+
+    Raises
+    ------
+    ArmidError
+        When the start diverges.
     """
-    records = weighted_records(replays, space, weights)
     if not space.free.any():
         return np.empty(0)
+    records = weighted_records(replays, space, weights)
     return records.values(fit(records, records.shares(np.asarray(x0, dtype=np.float64)), tolerance))
-
-
-def fit(records: LeastSquaresProblem, z0: Array, tolerance: float = 1e-9) -> Array:
-    """Return the local least-squares estimate from a start, both as shares of the range."""
-    start = np.clip(z0, 0.0, 1.0)
-    known: dict[bytes, tuple[Array, Array]] = {}
-
-    def both(z: Array) -> tuple[Array, Array]:
-        if z.tobytes() not in known:
-            known.clear()
-            known[z.tobytes()] = records.residual_and_slopes(z)
-        return known[z.tobytes()]
-
-    if not np.isfinite(both(start)[0]).all():
-        raise ArmidError("a fit cannot start where the simulation diverges: another start is expected")
-    anchor = ANCHOR * (float(np.linalg.norm(both(start)[1])) or 1.0)
-
-    def residual(z: Array) -> Array:
-        return np.concatenate([-both(z)[0], anchor * (z - start)])
-
-    def slopes(z: Array) -> Array:
-        return np.concatenate([both(z)[1], anchor * np.eye(len(z))])
-
-    found = least_squares(
-        residual, start, slopes, bounds=(0.0, 1.0), method="trf", x_scale="jac",
-        ftol=tolerance, xtol=tolerance, gtol=None, max_nfev=MOST_EVALUATIONS,
-    )  # fmt: skip
-    best = np.asarray(found.x, dtype=np.float64)
-    return start if records.chi2(start)[0] < 2.0 * found.cost else onto_the_box(records, best, 2.0 * float(found.cost))
-
-
-def onto_the_box(records: LeastSquaresProblem, z: Array, chi2: float) -> Array:
-    """Return the estimate with shares near 0 or 1 put there, one by one, where that does not raise the sum of squares.
-
-    The search keeps strictly inside, so that an estimate that the box holds stops short of it.
-    """
-    best = z
-    for i in np.flatnonzero((z < NEAR) | (z > 1.0 - NEAR)):
-        tried = best.copy()
-        tried[i] = np.round(best[i])
-        value = float(records.chi2(tried)[0])
-        if value <= chi2:
-            best, chi2 = tried, value
-    return best
 
 
 def estimate(replays: tuple[Replay, ...], space: Space, weights: Sequence[float] | None = None) -> Array:
     """Return the least-squares estimate without a start: the best of fits from the best of candidates over the box.
 
-    Deterministic: 400 candidates of a Kronecker sequence, fits from the 4 best of them. Free parameters, SI, (n_free,).
+    Deterministic: see `spread_starts`. weights: as in `refine`. Returns free parameters, SI, (n_free,).
 
     Raises ArmidError when every candidate diverges.
     """
-    records = weighted_records(replays, space, weights)
-    n = int(space.free.sum())
-    if n == 0:
+    if not space.free.any():
         return np.empty(0)
+    records = weighted_records(replays, space, weights)
+    return records.values(descend(records, spread_starts(records), TOLERANCE, central=True))
+
+
+def fit(records: LeastSquaresProblem, z0: Array, tolerance: float = TOLERANCE) -> Array:
+    """Return the local least-squares estimate from a start, both as shares of the range.
+
+    Raises ArmidError when the start diverges.
+    """
+    start = np.clip(z0, 0.0, 1.0)
+    if not np.isfinite(records.chi2(start)[0]):
+        raise ArmidError("a fit cannot start where the simulation diverges: another start is expected")
+    return descend(records, [start], tolerance, central=True)
+
+
+def spread_starts(records: LeastSquaresProblem) -> list[Array]:
+    """Return from where to look for the estimate: the best 4 of 512 candidates of a Kronecker sequence over the box.
+
+    Raises ArmidError when every candidate diverges.
+    """
+    n = int(records.space.free.sum())
     spread = probes(np.zeros(n), np.ones(n), N_SPREAD)
-    values = records.chi2(spread)
-    order = np.argsort(values, kind="stable")[:N_STARTS]
-    starts = [spread[i] for i in order if np.isfinite(values[i])]
+    chi2 = records.chi2(spread)
+    starts = [spread[i] for i in np.argsort(chi2, kind="stable")[:N_STARTS] if np.isfinite(chi2[i])]
     if not starts:
         raise ArmidError(f"each of {N_SPREAD} candidates spread over the box diverged: other bounds are expected")
-    fits = [fit(records, start) for start in starts]
-    return records.values(fits[int(np.argmin([records.chi2(z)[0] for z in fits]))])
+    return starts
 
 
 MOST_STEPS = 50
@@ -258,11 +240,12 @@ class Descent:
         return float(self.residual @ self.residual)
 
 
-def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: float) -> Array:
-    """Return the best of the least-squares estimates in the box from some starts that hold, (n_free,).
+def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: float, central: bool = False) -> Array:
+    """Return the best of the least-squares estimates in the box from some starts that do not diverge, (n_free,).
 
     Levenberg-Marquardt with steps cut at the box, which hold what the box holds (More 1978, doi:10.1007/BFb0067700).
-    starts: shares of the range. tolerance: relative fall of chi2 in one step at which a start has arrived.
+    starts: shares of the range. tolerance: relative fall of chi2 in one step at which a start has arrived. central:
+    take slopes from central differences, at twice the price, for an estimate to the last digits.
     """
     first = np.clip(np.array(starts), 0.0, 1.0)
     paths = [Descent(z, r) for z, r in zip(first, records.residuals(first), strict=True)]
@@ -270,7 +253,7 @@ def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: fl
         moving = [p for p in paths if not p.done]
         if not moving:
             break
-        advance(records, moving, tolerance)
+        advance(records, moving, tolerance, central)
         apart: list[Descent] = []
         for path in sorted(paths, key=lambda p: p.chi2):
             if all(np.max(np.abs(path.z - better.z), initial=0.0) > SAME for better in apart):
@@ -279,9 +262,9 @@ def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: fl
     return min(paths, key=lambda p: p.chi2).z
 
 
-def advance(records: LeastSquaresProblem, paths: Sequence[Descent], tolerance: float) -> None:
+def advance(records: LeastSquaresProblem, paths: Sequence[Descent], tolerance: float, central: bool) -> None:
     """Take one step on every path: to the best of the trials, their dampings raised until one is better."""
-    slopes = forward_slopes(records, paths)
+    slopes = [records.residual_and_slopes(p.z)[1] for p in paths] if central else forward_slopes(records, paths)
     left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
     while left:
         dampings = [[max(f * p.damping, LEAST) for f in LADDER] for p, *_ in left]

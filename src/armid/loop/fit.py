@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from armid.engine import probes
 from armid.errors import ArmidError
-from armid.estimation.least_squares import descend
+from armid.estimation.least_squares import descend, spread_starts
 from armid.loop.candidates import Active, EffectKey
 from armid.loop.whitening import WhiteRecords
 from armid.model import Model
@@ -18,7 +17,6 @@ from armid.model import Model
 Array = NDArray[np.float64]
 # Relative change of the sum of squares at which a fit stops: far below the 1 that means anything in 10,000 samples.
 TOLERANCE = 1e-7
-N_SPREAD, N_STARTS = 512, 4
 ONLY_NOISE = 0.01
 
 
@@ -134,15 +132,8 @@ def fit_from(records: WhiteRecords, active: Active, starts: Sequence[Array]) -> 
 
 
 def fit_globally(records: WhiteRecords, active: Active) -> Fit:
-    """Return the least-squares estimate without a start.
-
-    Deterministic: 512 candidates of a Kronecker sequence over the box, fits from the four best of them.
+    """Return the least-squares estimate without a start, see `spread_starts`.
 
     Raises ArmidError when every candidate diverges.
     """
-    n = int(records.space.free.sum())
-    if n == 0:
-        return fit_from(records, active, ())
-    spread = probes(np.zeros(n), np.ones(n), N_SPREAD)
-    order = np.argsort(records.chi2(spread), kind="stable")[:N_STARTS]
-    return fit_from(records, active, [spread[i] for i in order])
+    return fit_from(records, active, spread_starts(records) if records.space.free.any() else ())
