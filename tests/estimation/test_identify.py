@@ -219,7 +219,7 @@ def test_seed_1_finds_what_it_found(paper_arm):
 
 @pytest.mark.slow
 # Other swarms may stop where Coulomb friction is at its bound 0 (3 of the first 15 seeds), and say so.
-@pytest.mark.parametrize("seed", (1, 3))
+@pytest.mark.parametrize("seed", [1, 3])
 def test_emps_is_fitted_on_one_record_and_judged_on_another(measured, tmp_path, seed):
     emps = tmp_path / "campaign"
     with pytest.raises(SystemExit) as left:
@@ -238,6 +238,5 @@ def test_emps_is_fitted_on_one_record_and_judged_on_another(measured, tmp_path, 
 
 if __name__ == "__main__":
     read = read_campaign(ROOT / "studies" / "campaigns" / "paper_arm")
-    GOLDEN.write_text(
-        json.dumps({name: golden_numbers(read, name) for name in ("similarity", "rmse")}, indent=2) + "\n"
-    )
+    numbers = {name: golden_numbers(read, name) for name in ("similarity", "rmse")}
+    GOLDEN.write_text(json.dumps(numbers, indent=2) + "\n")
