@@ -1,13 +1,13 @@
 """How well records pin down parameters: sensitivities, Fisher information, intervals, correlations."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine import simulate
-from armid.estimation.least_squares import WeightedRecords
+from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
 from armid.problem.replay import Replay
 from armid.problem.space import Space
 from armid.record.noise import correlation_sum
@@ -72,7 +72,7 @@ def information_at(
     Fisher information F = sum over records of f J^T J / level^2 with f the share of samples that are independent;
     covariance = F^-1 (the Cramer-Rao bound of an unbiased estimate). The level is the noise, or the residual where that
     is far above it. A record without noise and without residual gives an interval of width 0. Where records start from
-    a measured state, what its noise does to the estimate is added (see `start_scatter`).
+    a measured state, what its noise does to the estimate is added (see `start_changes`).
 
     Parameters
     ----------
@@ -83,29 +83,36 @@ def information_at(
     levels : tuple of Level
         One for each record; None: as measured, see `level_of`.
     """
-    span = space.high[space.free] - space.low[space.free]
     levels = tuple(level_of(r, space, x) for r in replays) if levels is None else levels
     noise_free = any(level.rms == 0.0 for level in levels)
-    total, started, slope = np.zeros((len(x), len(x))), np.zeros((len(x), len(x))), np.zeros(len(x))
-    for replay, level in zip(replays, levels, strict=True):
-        residual, jacobian = residual_and_sensitivities(replay, space, x)
-        weight = 1.0 if noise_free else level.effective_fraction / level.rms**2
-        total += weight * jacobian.T @ jacobian
-        slope += weight * jacobian.T @ residual
-        if not noise_free:
-            started += weight**2 * start_scatter(replay, space, x, jacobian)
+    records = WeightedRecords(replays, space, (1.0,) * len(replays) if noise_free else level_weights(levels))
+    found = replace(information_of(records, records.shares(x)), levels=levels)
+    if not noise_free:
+        return found
+    shown = np.where(np.isfinite(found.deviation), 0.0, found.deviation)
+    return replace(found, deviation=shown, step=np.zeros(len(x)))
+
+
+def information_of(records: LeastSquaresProblem, z: Array, trust: Array | None = None) -> Information:
+    """Return intervals and correlations at a candidate, in shares of the range, from the weights of a problem.
+
+    trust: 1 for each sample whose residual is noise, below it where the residual is larger, (n_samples,).
+    """
+    residual, jacobian = records.residual_and_slopes(z)
+    rows = np.ones(len(residual)) if trust is None else np.sqrt(trust)
+    residual, jacobian = rows * residual, rows[:, np.newaxis] * jacobian
+    total = jacobian.T @ jacobian
     covariance = inverse(total)
     determined = np.where(np.isfinite(covariance), covariance, 0.0)
-    z = (x - space.low[space.free]) / span
-    step = np.clip(z + determined @ slope, 0.0, 1.0) - z
-    covariance = covariance + determined @ started @ determined
+    step = np.clip(z + determined @ (jacobian.T @ residual), 0.0, 1.0) - z
+    started = np.array([jacobian.T @ (rows * change) for change in start_changes(records, z)]).reshape(-1, len(z))
+    covariance = covariance + determined @ (started.T @ started) @ determined
     deviation = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(deviation, deviation)
-        steps = np.zeros(len(x)) if noise_free else step / deviation
+        steps = step / deviation
     correlation[~np.isfinite(correlation)] = np.nan
-    shown = np.where(np.isfinite(deviation) & noise_free, 0.0, deviation * span)
-    return Information(space.free_names, shown, correlation, levels, steps, total)
+    return Information(records.space.free_names, deviation * records.span, correlation, (), steps, total)
 
 
 def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
@@ -114,38 +121,33 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
     Central differences with steps of 1e-4 of the range, moved inside the box where they would leave it; all perturbed
     candidates run as one population. x: free parameters, SI, (n_free,).
     """
-    return residual_and_sensitivities(replay, space, x)[1]
-
-
-def residual_and_sensitivities(replay: Replay, space: Space, x: Array) -> tuple[Array, Array]:
-    """Return measured minus simulated signal in the windows of a record [its unit], and its `sensitivities`."""
     records = WeightedRecords((replay,), space, (1.0,))
-    return records.residual_and_slopes(records.shares(x))
+    return records.residual_and_slopes(records.shares(x))[1]
 
 
-def start_scatter(replay: Replay, space: Space, x: Array, jacobian: Array) -> Array:
-    """Return the covariance of J^T (residual) that comes from noise in the measured starts, (n_free, n_free).
+def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
+    """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,).
 
-    sum over pieces and start constants c of var(c) g g^T with g = J^T d signal / d c (central difference); zero for a
-    machine that starts from rest. jacobian: of the whole record, shape (n_samples, n_free).
+    By central differences; nothing for a machine that starts from rest.
     """
-    scatter, row = np.zeros((len(x), len(x))), 0
-    # a speed held for a second is the size of a position
-    move = 1e-4 * replay.model.plant.scales.speed
-    for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
-        for name, deviation in piece.start_deviation.items():
-            signals = []
-            for sign in (1.0, -1.0):
-                constants = dict(piece.manoeuvre.constants)
-                constants[name] = constants.get(name, 0.0) + sign * move
-                manoeuvre = replace(piece.manoeuvre, constants=constants)
-                run = simulate(replay.model, manoeuvre, space.complete(x[np.newaxis]), calibration.schedule)
-                signals.append(run.output[0, piece.window])
-            slope = (signals[0] - signals[1]) / (2.0 * move)
-            g = jacobian[row : row + piece.n_samples].T @ slope * deviation
-            scatter += np.outer(g, g)
-        row += piece.n_samples
-    return scatter
+    candidate = records.space.complete(records.values(z)[np.newaxis])
+    for i, replay in enumerate(records.replays):
+        row = 0
+        # a speed held for a second is the size of a position
+        move = 1e-4 * replay.model.plant.scales.speed
+        for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
+            for name, deviation in piece.start_deviation.items():
+                runs = []
+                for sign in (1.0, -1.0):
+                    constants = dict(piece.manoeuvre.constants)
+                    constants[name] = constants.get(name, 0.0) + sign * move
+                    manoeuvre = replace(piece.manoeuvre, constants=constants)
+                    runs.append(simulate(replay.model, manoeuvre, candidate, calibration.schedule).output[0])
+                changes = [np.zeros(r.record.n_samples) for r in records.replays]
+                slope = (runs[0] - runs[1])[piece.window] / (2.0 * move)
+                changes[i][row : row + piece.n_samples] = deviation * slope
+                yield records.weighted(changes)
+            row += piece.n_samples
 
 
 def inverse(matrix: Array) -> Array:

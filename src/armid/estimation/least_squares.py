@@ -37,7 +37,7 @@ def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
 class LeastSquaresProblem:
     """Pose records and a model as min chi2(z), chi2 = |measured - signals(z)|^2 over the box 0 <= z <= 1.
 
-    replays: the records, ready to be simulated. space: the box, SI. A subclass says what `measured` and `signals` are.
+    replays: the records, ready to be simulated. space: the box, SI. A subclass says how signals are weighted.
     """
 
     replays: tuple[Replay, ...]
@@ -62,14 +62,19 @@ class LeastSquaresProblem:
         low, high = self.space.low[self.space.free], self.space.high[self.space.free]
         return np.clip(low + z * self.span, low, high)
 
+    def weighted(self, signals: Sequence[Array]) -> Array:
+        """Return signals of all records, (..., n_samples of the record), in units of their noise, end to end."""
+        raise NotImplementedError
+
     @cached_property
     def measured(self) -> Array:
-        """Weighted measured signals of all records, end to end, shape (n_samples,)."""
-        raise NotImplementedError
+        """Weighted measured signals, shape (n_samples,)."""
+        return self.weighted([r.measured for r in self.replays])
 
     def signals(self, Z: Array) -> Array:
         """Return weighted simulated signals of candidates in shares, shape (n_candidates, n_samples)."""
-        raise NotImplementedError
+        whole = self.space.complete(self.values(Z))
+        return self.weighted([r.signal(whole) for r in self.replays])
 
     def residuals(self, Z: Array) -> Array:
         """Return measured minus simulated of candidates, (n_candidates, n_samples); NaN where one diverges."""
@@ -117,16 +122,9 @@ class WeightedRecords(LeastSquaresProblem):
 
     weights: tuple[float, ...]
 
-    @cached_property
-    def measured(self) -> Array:
-        """Weighted measured signals of all records, end to end, shape (n_samples,)."""
-        return np.concatenate([w * r.measured for w, r in zip(self.weights, self.replays, strict=True)])
-
-    def signals(self, Z: Array) -> Array:
-        """Return weighted simulated signals of candidates in shares, shape (n_candidates, n_samples)."""
-        whole = self.space.complete(self.values(Z))
-        parts = [w * r.signal(whole) for w, r in zip(self.weights, self.replays, strict=True)]
-        return np.concatenate(parts, axis=1)
+    def weighted(self, signals: Sequence[Array]) -> Array:
+        """Return signals of all records, (..., n_samples of the record), weighted and end to end."""
+        return np.concatenate([w * s for w, s in zip(self.weights, signals, strict=True)], axis=-1)
 
 
 def weighted_records(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from armid.estimation.identify import Errors
-from armid.estimation.information import information_at
+from armid.estimation.information import information_of
 from armid.estimation.least_squares import held_by_bound
 from armid.loop.advice import Advice
 from armid.loop.candidates import Library
@@ -150,7 +150,7 @@ def estimates(fit: Fit, library: Library, discrepancy: bool, biases: Biases) -> 
     discrepancy: whether a significant one remains. biases: see `unseen_biases_of`.
     """
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
-    information = information_at(fit.records.replays, space, fit.x)
+    information = information_of(fit.records, fit.z, fit.records.data.trust(fit.residual))
     active = {key.declared for key in fit.active}
     present = {key.public for key in fit.active}
     others = np.abs(information.correlation - np.diag(np.diag(information.correlation)))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
+from armid.estimation.information import MISFIT
 from armid.estimation.least_squares import LeastSquaresProblem
 from armid.model import Plant
 from armid.record import Record
@@ -207,6 +208,20 @@ class WhitenedData:
         parts = [x - np.mean(x) for x in self.by_record(residual)]
         return float(sum(len(x) / (1.0 + 2.0 * correlation_sum(x)) for x in parts))
 
+    def trust(self, residual: Array) -> Array:
+        """Return the weight of each sample in intervals: 1, or n_eff/chi2 in records whose residual is no noise.
+
+        There the residual itself, with its correlation in time, is what scatters (as in `information.level_of`).
+        """
+        found = []
+        for level, part in zip(self.levels, self.by_record(residual), strict=True):
+            # How well the noise itself is known: its mean square scatters by 2/n.
+            doubt = 1.0 + 3.0 * np.sqrt(2.0 / (level.n_slow if level.known else len(part)))
+            square = float(np.mean(part**2))
+            misfit = square > MISFIT * doubt
+            found.append(np.full(len(part), 1.0 / square / (1.0 + 2.0 * correlation_sum(part)) if misfit else 1.0))
+        return np.concatenate(found)
+
 
 def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
     """Return records with their noise; others: records of the same sensor whose rests tell of its noise too."""
@@ -220,14 +235,9 @@ class WhiteRecords(LeastSquaresProblem):
 
     data: WhitenedData
 
-    @cached_property
-    def measured(self) -> Array:
-        """Whitened measured signals of the kept samples, (n_kept,)."""
-        return self.data.white([r.measured for r in self.replays])[self.data.kept]
-
-    def signals(self, Z: Array) -> Array:
-        """Return whitened simulated signals of candidates in shares, (n_candidates, n_kept)."""
-        return self.whole_signals(self.space.complete(self.values(Z)))[:, self.data.kept]
+    def weighted(self, signals: Sequence[Array]) -> Array:
+        """Return signals of all records, whitened, the kept samples end to end, (..., n_kept)."""
+        return self.data.white(signals)[..., self.data.kept]
 
     def whole_signals(self, candidates: Array) -> Array:
         """Return whitened simulated signals of whole candidates, SI, on all samples, (n_candidates, n_samples)."""
