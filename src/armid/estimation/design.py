@@ -135,13 +135,11 @@ def manoeuvre_grid(model: Model, records: Sequence[Record]) -> tuple[Feasible, .
 
 
 def identity(manoeuvre: Manoeuvre) -> object:
-    """Return what tells two manoeuvres apart."""
     constants = tuple(sorted((name, round(value, 9)) for name, value in manoeuvre.constants.items()))
     return constants, manoeuvre.n_samples, tuple(v.tobytes() for v in manoeuvre.inputs.values())
 
 
 def as_recorded(plant: Plant, record: Record) -> Feasible:
-    """Return a record's manoeuvre once more."""
     piece = record.pieces[0].until_window_end()
     constants = piece.manoeuvre.constants
     keys: dict[str, Key] = {
@@ -252,7 +250,6 @@ def words(keys: Mapping[str, Key], repeats: str) -> str:
 
 
 def key_words(key: str, value: Key) -> str:
-    """Return the words for one key: its unit behind the value where its name ends in one."""
     if isinstance(value, bool):
         if key == "shell":
             return "with shell" if value else "empty"

@@ -192,7 +192,6 @@ def search(
 def run_by_pymoo(
     algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
 ) -> None:
-    """Run an algorithm in pymoo's loop until it is over, which is asked after each generation."""
 
     def after_generation(running: Algorithm) -> None:
         if is_over():
@@ -204,7 +203,6 @@ def run_by_pymoo(
 
 
 def versions_of(packages: Sequence[str]) -> dict[str, str]:
-    """Return package -> version, of Python too."""
     return {"python": platform.python_version(), **{p: version(p) for p in packages}}
 
 

@@ -45,7 +45,6 @@ class LeastSquaresProblem:
 
     @property
     def model(self) -> Model:
-        """The model that is simulated."""
         return self.replays[0].model
 
     @property

@@ -67,7 +67,6 @@ class Rival:
 
     @property
     def candidate(self) -> Array:
-        """The estimate as a whole candidate, SI."""
         return np.asarray(self.whole(self.z[np.newaxis])[0])
 
     def whole(self, Z: Array) -> Array:

@@ -53,12 +53,10 @@ class EffectKey:
 
     @property
     def declared(self) -> "EffectKey":
-        """The key with shapes as declared."""
         return replace(self, free_shape=False)
 
     @property
     def is_empirical(self) -> bool:
-        """Whether it is an empirical term, which claims no physical effect."""
         return self.name.startswith(UNNAMED)
 
     @property
@@ -71,7 +69,6 @@ class EffectKey:
         return self.name.replace(UNNAMED, SHOWN_AS, 1) if self.is_empirical else self.name
 
     def owns(self, parameter: str) -> bool:
-        """Tell whether a parameter of the compiled model belongs to the effect."""
         return parameter.startswith(f"{self.compiled}.")
 
 
@@ -144,7 +141,6 @@ class Library:
         return self._problems[key]
 
     def calibrated(self, model: Model, space: Space, near: Mapping[str, float]) -> WhiteRecords:
-        """Return a problem with the engine calibrated about some values."""
         return WhiteRecords(calibrated_replays(self.data.records, model, space, near), space, self.data)
 
     def recalibrated(self, active: Active, values: Mapping[str, float]) -> WhiteRecords | None:
@@ -173,7 +169,6 @@ class Library:
         return self._models[keys]
 
     def composed(self, keys: Active) -> Model:
-        """Return the declared model with candidates under their compiled names."""
         return Model(self.declared.plant, (*self.declared.effects, *(self.candidates[k] for k in keys)))
 
     def space(self, model: Model, active: Active) -> Space:
@@ -199,7 +194,6 @@ class Library:
         return tuple(n for n in (f"{key.compiled}.{shape}" for shape in shapes) if n not in given)
 
     def each(self, work: Callable[[S], T], items: Iterable[S]) -> list[T]:
-        """Return the work of each item, in order, the items shared among the threads."""
         return side_by_side(work, items, self.threads)
 
 
@@ -255,7 +249,6 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
 
 
 def applies(model: Model, effect: Effect) -> bool:
-    """Tell whether an effect can be added to a model."""
     try:
         return bool(model + effect)
     except ArmidError:
@@ -314,7 +307,6 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array) -> Cal
 
 
 def with_finest(replays: Sequence[Replay]) -> Replay:
-    """Return a record with the finest of the schedules of each piece."""
     each = zip(*(r.calibrations for r in replays), strict=True)
     return replace(replays[0], calibrations=tuple(max(c, key=lambda one: one.schedule.substeps) for c in each))
 
@@ -335,7 +327,6 @@ class Activation:
     share: float
 
     def at(self, share: float) -> dict[str, float]:
-        """Return the parameters of the effect at a share of its full strength."""
         return {n: self.null[n] + share * (v - self.null[n]) if n in self.null else v for n, v in self.full.items()}
 
 

@@ -168,7 +168,6 @@ def contest_of_models(named: Fit, rivals: Sequence[RivalModel]) -> list[Rival]:
 
 
 def rival(name: str, fit: Fit, best: Fit) -> Rival:
-    """Return a model as the advice takes it."""
     return Rival(name, fit.records, fit.z, criterion(fit, best.independent))
 
 

@@ -45,7 +45,6 @@ class Residuals:
 
     @property
     def model(self) -> Model:
-        """The model that was simulated."""
         return self.replays[0].model
 
     @property
@@ -98,7 +97,6 @@ def variable_names(model: Model) -> list[str]:
 
 
 def train_residuals(fit: Fit) -> Residuals:
-    """Return what a fit leaves on the records that it has seen."""
     return Residuals(fit.records.data, fit.records.replays, fit.candidate, fit.residual, fit.basis)
 
 

@@ -201,7 +201,6 @@ def usable_variables(model: Model, port: str) -> list[str]:
 
 
 def composes(model: Model, port: str, variable: str) -> bool:
-    """Tell whether a term at a port may use a variable."""
     one = Parameter("one", "1", 0.0, 1.0, null=0.0)
     trial = Effect("trial", (one,), {port: product}, binds={"variable": variable})
     return knows(model, variable) and applies(model, trial)

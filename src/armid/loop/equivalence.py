@@ -111,7 +111,6 @@ def sensitivity_of(fit: Fit, key: EffectKey) -> Array:
 
 
 def change_by(fit: Fit, key: EffectKey) -> Array:
-    """Return the change of the whitened signal by an effect of a fit, (n_samples,)."""
     signals = fit.records.whole_signals(np.array([fit.candidate, at_null(fit.records, fit.candidate, key)]))
     return np.asarray(signals[0] - signals[1])
 

@@ -42,7 +42,6 @@ class Fit:
 
     @property
     def n_free(self) -> int:
-        """Number of parameters that were fitted."""
         return len(self.z)
 
     @property
@@ -52,17 +51,14 @@ class Fit:
 
     @property
     def x(self) -> Array:
-        """Free parameters, SI, (n_free,)."""
         return self.records.values(self.z)
 
     @property
     def candidate(self) -> Array:
-        """The whole candidate of the compiled model, SI."""
         return np.asarray(self.records.space.complete(self.x[np.newaxis])[0])
 
     @property
     def values(self) -> dict[str, float]:
-        """Name -> value of the free parameters, SI."""
         return dict(zip(self.records.space.free_names, map(float, self.x), strict=True))
 
     @cached_property
@@ -91,7 +87,6 @@ class Fit:
         return decomposed(self.jacobian)
 
     def owned_by(self, key: EffectKey) -> NDArray[np.bool_]:
-        """Return which free parameters belong to an effect, (n_free,)."""
         return np.array([key.owns(name) for name in self.values], dtype=np.bool_)
 
 

@@ -107,7 +107,6 @@ class Missing:
     dependences: tuple[Dependence, ...]
 
     def signal_at(self, port: str) -> MissingSignal | None:
-        """Return the signal at a port, None where no signal there moves the output."""
         return next((s for s in self.signals if s.port == port), None)
 
 
@@ -168,7 +167,6 @@ def segments(
 
 
 def segment_of(replay: Replay, level: float, group: int, index: int, space: Space, x: Array) -> Segment:
-    """Return one piece without gains yet."""
     one = slice(index, index + 1)
     alone = replace(replay, pieces=replay.pieces[one], calibrations=replay.calibrations[one])
     records = WeightedRecords((alone,), space, (1.0,))
@@ -335,7 +333,6 @@ RIDGE, STRAIGHT = 1e-9, 1e-4
 
 
 def dependences(moved: Sequence[SegmentMotion]) -> list[Dependence]:
-    """Return every port, variable and factor, the one that removes most first."""
     ports, pairs = moved[0].segment.gains, [(v, f) for v in moved[0].variables for f in moved[0].factors if v != f]
     found = [dependence(moved, port, variable, factor) for port in ports for variable, factor in pairs]
     return sorted(found, key=lambda d: -d.removed)
@@ -385,18 +382,15 @@ class NormalEquations:
 
     @staticmethod
     def of(design: Array, residual: Array, n_free: int) -> "NormalEquations":
-        """Return the sums over samples; design: (n_samples, n_columns), residual: (n_samples,)."""
         return NormalEquations(design.T @ design, design.T @ residual, float(residual @ residual), n_free)
 
     @staticmethod
     def total(parts: Sequence["NormalEquations"]) -> "NormalEquations":
-        """Return the sums over several sets of samples."""
         return NormalEquations(sum((p.gram for p in parts), np.zeros(1)), sum((p.slope for p in parts), np.zeros(1)),
                                sum(p.square for p in parts), parts[0].n_free)  # fmt: skip
 
     @property
     def without_curve(self) -> "NormalEquations":
-        """The sums of the free parameters alone."""
         n = self.n_free
         return NormalEquations(self.gram[:n, :n], self.slope[:n], self.square, n)
 

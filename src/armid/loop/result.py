@@ -209,17 +209,14 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
 
 
 def errors_of(judged: Judgement) -> dict[str, dict[str, float | None] | None]:
-    """Return errors on train and holdout, null for what is not finite."""
     return {"train": error_entry(judged.train_error), "holdout": error_entry(judged.holdout_error)}
 
 
 def error_entry(errors: Errors | None) -> dict[str, float | None] | None:
-    """Return the errors of some records."""
     return None if errors is None else {k: finite(v) for k, v in asdict(errors).items()}
 
 
 def entries(judged: Judgement) -> dict[str, dict[str, Any]]:
-    """Return name -> value, unit, interval and whether to trust it."""
     return {
         e.name: {"value": e.value, "unit": e.unit, "low": finite(e.low), "high": finite(e.high), "trusted": e.trusted}
         for e in judged.estimates

@@ -38,7 +38,6 @@ class Score:
 
 
 def scores(current: Fit, library: Library) -> list[Score]:
-    """Return the scores of all candidates that are not in a fit, best first."""
     found = library.each(lambda key: score(current, key, library), library.joinable(current.active))
     return sorted((s for s in found if s is not None), key=lambda s: -s.drop)
 
@@ -134,7 +133,6 @@ def free_values(records: WhiteRecords, values: Mapping[str, float]) -> Array:
 
 
 def at_null(records: WhiteRecords, candidate: Array, key: EffectKey) -> Array:
-    """Return a whole candidate with one effect at its null, shapes as they are."""
     model, changed = records.model, candidate.copy()
     for i, name in enumerate(records.space.names):
         if key.owns(name) and model.parameters[name].null is not None:

@@ -55,7 +55,6 @@ class SearchLevel:
 
     @property
     def best(self) -> Fit:
-        """The model with the lowest criterion."""
         return self.fits[0]
 
 
@@ -129,7 +128,6 @@ class Search:
         self.add_each(parent, [s for s in leading[SURE:] if parent.chi2 - REACH * s.drop <= limit])
 
     def add_each(self, parent: Fit, found: Iterable[Score]) -> None:
-        """Fit a model with each of some candidates added."""
         self.fit_each({frozenset((*parent.active, s.key)): partial(refitted, parent, s, self.library) for s in found})
 
     def exchange_substitutes(self, best: Fit) -> None:
@@ -200,7 +198,6 @@ def shown(active: Iterable[EffectKey]) -> str:
 
 
 def promising(smaller: Fit, larger: Fit) -> bool:
-    """Tell whether an addition may come to be significant."""
     n_eff = max(smaller.independent, larger.independent)
     return bool(n_eff * np.log(smaller.chi2 / larger.chi2) > PROMISING)
 
@@ -216,7 +213,6 @@ def refitted(current: Fit, found: Score, library: Library) -> Fit:
 
 
 def fit_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
-    """Fit a model fully from some values."""
     records = library.problem(active, values)
     return accurate(fit_from(records, active, [start_of(records, values)]), library)
 
@@ -238,7 +234,6 @@ STARTS, N_PLACES = (0.03, 0.5), 384
 
 
 def freed(active: Active, key: EffectKey) -> Active:
-    """Return the effects of a model, the shapes of one of them set free."""
     return tuple(replace(k, free_shape=True) if k == key else k for k in active)
 
 

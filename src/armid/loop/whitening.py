@@ -89,7 +89,6 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseLevel:
-    """Return the common noise of records of one sampling interval."""
     rested = [r for r in records if r.noise.source == "rest"]
     if not rested:
         return white_level(max(float(np.median([r.noise.rms for r in records])), floor), 0)
@@ -101,7 +100,6 @@ def pooled_level(records: Sequence[Record], floor: float) -> NoiseLevel:
 
 
 def white_level(rms: float, n_samples: int) -> NoiseLevel:
-    """Return the level of white noise."""
     return NoiseLevel(float(rms), np.empty(0), float(rms), np.empty((0, 0)), n_samples, n_samples, n_samples)
 
 
@@ -175,7 +173,6 @@ class WhitenedData:
         return float(min((level.n_slow for level in self.levels if level.known), default=otherwise))
 
     def by_record(self, values: Array) -> list[Array]:
-        """Return the part of each record of a vector of all samples."""
         return [values[..., a:b] for a, b in pairwise(self.edges)]
 
     def white(self, signals: Sequence[Array]) -> Array:
@@ -244,7 +241,6 @@ class WhiteRecords(LeastSquaresProblem):
         return self.data.white([r.signal(candidates) for r in self.replays])
 
     def with_all_samples(self) -> "WhiteRecords":
-        """Return the problem that sees every sample."""
         if self.data.kept.all():
             return self
         return replace(self, data=replace(self.data, kept=np.ones_like(self.data.kept)))
