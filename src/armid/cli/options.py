@@ -153,9 +153,8 @@ def accuracy_of(text: str) -> str | None:
 
 def model_of(campaign: "Campaign", effects: str, registry: Registry) -> Model:
     """Return the campaign's model with further effects added."""
-    model = Model(campaign.plant)
-    wanted = [*campaign.effects, *(name.strip() for name in effects.split(",") if name.strip())]
-    for text in wanted:
+    model = campaign.model(registry.effects)
+    for text in (name.strip() for name in effects.split(",") if name.strip()):
         name, _, form = text.partition(":")
         effect = registry.effects.get(name)
         if effect is None:

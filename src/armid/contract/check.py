@@ -49,9 +49,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> list[Findi
         text = f"{n} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
         found.append(Finding(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})"))
     try:
-        model = Model(campaign.plant)
-        for name in campaign.effects:
-            model = model + effects[name]
+        model = campaign.model(effects)
         space = space_of(model, campaign.parameters)
         free = ", ".join(space.free_names) or "nothing"
         moves = [Finding("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")]

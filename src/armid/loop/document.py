@@ -9,7 +9,7 @@ from armid.estimation.identify import record_errors
 from armid.estimation.identify_document import MOST_RECORDS, curve_entry, versions
 from armid.loop.advice import Advice
 from armid.loop.candidates import SHOWN_AS
-from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, View
+from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, Residuals
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
     EXPLAINED,
@@ -307,8 +307,8 @@ def error_rows(found: ClosedLoop) -> list[list[str]]:
 
 def score_rows(found: ClosedLoop, most: int = 10) -> list[list[str]]:
     """Return the candidates that scored best at the declared model."""
-    scores = found.search.trace(found.before.fit)[:most]
-    return [[found.library.public(s.name), f"{s.drop:.4g}", f"{s.p:.2g}"] for s in scores]
+    scores = found.search.scores_at(found.before.fit)[:most]
+    return [[s.key.public, f"{s.drop:.4g}", f"{s.p:.2g}"] for s in scores]
 
 
 # Candidates whose predicted change of the residual is drawn.
@@ -348,7 +348,7 @@ def finding_entry(judged: Judgement) -> dict[str, list[str] | None]:
             "holdout": None if unseen is None else diagnosis_sentences(unseen)}  # fmt: skip
 
 
-def records_of(before: View | None, after: View | None) -> list[dict[str, Any]]:
+def records_of(before: Residuals | None, after: Residuals | None) -> list[dict[str, Any]]:
     """Return each record with its errors and residuals before and after."""
     if before is None or after is None:
         return []
@@ -374,14 +374,14 @@ def candidates_of(found: ClosedLoop) -> dict[str, Any]:
     start = found.before.fit
     reached: dict[str, float] = {}
     for fit in found.search.of_size(1):
-        name = found.library.public(fit.active[0])
+        name = fit.active[0].public
         reached[name] = max(reached.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
     listed: list[dict[str, Any]] = []
-    for score in found.search.trace(start):
-        name = found.library.public(score.name)
+    for score in found.search.scores_at(start):
+        name = score.key.public
         if any(entry["effect"] == name for entry in listed):
             continue
-        behind = projected(start, score.name, found.library)
+        behind = projected(start, score.key, found.library)
         drawn = len(listed) < MOST_DRAWN
         listed.append({
             "effect": name, "drop": finite(score.drop / start.chi2), "p": finite(score.p),
@@ -389,7 +389,7 @@ def candidates_of(found: ClosedLoop) -> dict[str, Any]:
             "curve": curve_entry(np.arange(len(behind.change), dtype=float), behind.change) if drawn else None,
         })  # fmt: skip
     rest = rest_of(start)
-    edges = found.before.train.evidence.edges
+    edges = found.before.train.data.edges
     return {
         "listed": listed,
         "residual": curve_entry(np.arange(len(rest), dtype=float), rest),

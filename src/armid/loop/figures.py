@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.loop.diagnose import Diagnosis, View
+from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop, Estimate
 from armid.report.style import GREY, OKABE_ITO, style
@@ -49,7 +49,7 @@ def residual_figure(found: ClosedLoop, path: Path) -> None:
     save(plt, figure, path)
 
 
-def pairs(before: View | None, after: View | None) -> list[tuple[Any, ...]]:
+def pairs(before: Residuals | None, after: Residuals | None) -> list[tuple[Any, ...]]:
     """Return record, times and residuals before and after, of each record."""
     if before is None or after is None:
         return []
@@ -116,13 +116,13 @@ def ranking_figure(found: ClosedLoop, path: Path) -> None:
     plt = style()
     start = found.before.fit
     best: dict[str, float] = {}
-    for s in found.search.trace(start):
-        name = found.library.public(s.name)
+    for s in found.search.scores_at(start):
+        name = s.key.public
         best[name] = max(best.get(name, 0.0), s.drop / start.chi2)
     names = sorted(best, key=lambda n: -best[n])[:MOST_SHOWN]
     fitted: dict[str, float] = {}
     for fit in found.search.of_size(1):
-        name = found.library.public(fit.active[0])
+        name = fit.active[0].public
         fitted[name] = max(fitted.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
     figure, axis = plt.subplots(figsize=(6.8, 0.34 * len(names) + 1.6), layout="constrained")
     places = np.arange(len(names))
@@ -192,9 +192,9 @@ def autocorrelation_figure(found: ClosedLoop, path: Path) -> None:
     save(plt, figure, path)
 
 
-def correlation(view: View) -> Array:
+def correlation(view: Residuals) -> Array:
     """Return the autocorrelation at lags from 0 on, pooled over records, (n_lags,)."""
-    parts = view.evidence.by_record(view.residual)
+    parts = view.data.by_record(view.residual)
     lags = min(MOST_LAGS, *(len(p) - 1 for p in parts))
     table = [[float(p[: len(p) - k] @ p[k:]) for k in range(lags)] for p in parts]
     total = np.sum(table, axis=0)
@@ -245,7 +245,7 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
     if signal is not None:
         for motion, values in zip(missing.moved, signal.signals, strict=True):
             place = shown_values(motion.variables[variable], unit_of(variable, model))
-            axis.plot(place, values, ".", ms=3, color=colours[motion.stretch.group % len(colours)])
+            axis.plot(place, values, ".", ms=3, color=colours[motion.segment.group % len(colours)])
     if signal is not None and variable == best.variable and best.factor == "1":
         knots = np.linspace(best.first, best.last, len(best.heights))
         seen = np.concatenate([m.variables[variable] for m in missing.moved])
