@@ -8,8 +8,7 @@ from armid.errors import ArmidError
 from armid.study.blind.report import advice_parts
 from armid.study.blind.scores import Claim, advice_targets, rates, separations, sign_test
 from armid.study.blind.scores import advice_answer as answer_of
-from armid.study.loops import planned_loops
-from armid.study.study import read_study
+from armid.study.tasks import read_study
 
 PAIR = ["coulomb", "brush_drop"]
 
@@ -94,4 +93,4 @@ def test_rivals_are_looked_for_in_their_campaigns_alone(tmp_path):
     study = read_study(tmp_path / "blind.toml")
     assert study.candidates_for("a01") == ("tilt",)
     assert study.candidates_for("b01") == study.candidates
-    assert ['"candidates":["tilt"]' in p.settings for p in planned_loops(study)] == [True, False]
+    assert ['"candidates":["tilt"]' in p.settings for p in study.plan()] == [True, False]
