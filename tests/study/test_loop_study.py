@@ -58,6 +58,13 @@ def test_a_key_is_told_as_seen_from_the_store(write, tmp_path):
     assert json.loads(json.dumps(told)) == told
 
 
+def test_rivals_are_looked_for_in_their_campaigns_alone(write):
+    study = read_study(write('[rivals]\n"*0" = ["tilt"]\n'))
+    assert study.candidates_for("c000") == ("tilt",)
+    assert study.candidates_for("c001") == study.candidates
+    assert ['"candidates":["tilt"]' in p.settings for p in study.plan()] == [True, False]
+
+
 def test_some_campaigns_only(write):
     assert read_study(write('only = ["*1"]\n')).case_names == ["c001"]
 
