@@ -2,7 +2,7 @@
 
 import hashlib
 import os.path
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
@@ -31,15 +31,6 @@ FINER = 8
 
 
 @dataclass(frozen=True)
-class Stroke:
-    """Hold a manoeuvre that is simulated: its constants (SI), length [s] and role."""
-
-    constants: Mapping[str, float]
-    duration_s: float
-    role: str
-
-
-@dataclass(frozen=True)
 class Source:
     """Hold a campaign that is read.
 
@@ -58,7 +49,7 @@ class Case:
 
     truth: parameter -> true value, SI, empty where not known; all parameters of the model where the records are
     simulated. published: values of others to stand beside. space: bounds and fixed values.
-    strokes: manoeuvres to simulate, or source: the campaign to read.
+    strokes: manoeuvres to simulate, each with its constants (SI), duration_s and role; or source: the campaign to read.
     """
 
     name: str
@@ -66,7 +57,7 @@ class Case:
     space: Space
     truth: Mapping[str, float] = field(default_factory=dict)
     published: Mapping[str, float] = field(default_factory=dict)
-    strokes: tuple[Stroke, ...] = ()
+    strokes: tuple[dict[str, Any], ...] = ()
     source: Source | None = None
 
     @property
@@ -153,7 +144,7 @@ def _campaign_case(
             for record in campaign.records:
                 with_window(record, window, f"{where}, windows_s")
     files = tuple(r.file for r in campaign.records)
-    source = Source(folder_name, files, digest_of(path, files))
+    source = Source(folder_name, files, digest_of(path, ("campaign.toml", *files)))
     return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source)
 
 
@@ -190,10 +181,10 @@ def _with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -
     return some
 
 
-def digest_of(folder: Path, files: Sequence[str]) -> str:
-    """Return a hash of campaign.toml and some CSV files of a campaign."""
+def digest_of(folder: Path, files: Iterable[str]) -> str:
+    """Return a hash of some files of a campaign."""
     digest = hashlib.sha256()
-    for name in ("campaign.toml", *files):
+    for name in files:
         content = (folder / name).read_bytes()
         digest.update(f"{name}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
@@ -214,7 +205,7 @@ def _simulated_case(
         raise ArmidError(f"{where}: plant '{model.plant.name}' is driven by {model.plant.inputs[0].name}, which no "
                          "manoeuvre tells: a campaign is expected")  # fmt: skip
     strokes = tuple(_stroke(m, spec, model.plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
-    if not any(s.role == "train" for s in strokes):
+    if not any(s["role"] == "train" for s in strokes):
         raise ArmidError(f"{where}: no manoeuvre has the role 'train', at least one is expected")
     case = Case(name, model, space, _completed(truth, model, where), dict(published), strokes)
     _check_truth(case, where)
@@ -222,7 +213,7 @@ def _simulated_case(
     return case
 
 
-def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, where: str) -> Stroke:
+def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, where: str) -> dict[str, Any]:
     """Return one manoeuvre, its constants laid over those of the study."""
     manoeuvre = validated(ManoeuvreSpec, table, where, [key.key for key in plant.keys])
     record = RecordSheet(file="", role=manoeuvre.role, constants=manoeuvre.constants, keys=manoeuvre.keys)
@@ -230,7 +221,7 @@ def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, where: str)
     if not FEWEST_SAMPLES - 1 <= manoeuvre.duration_s / spec.interval_s <= MOST_SAMPLES:
         raise ArmidError(f"{where}: duration_s is {manoeuvre.duration_s:g}, {FEWEST_SAMPLES} to {MOST_SAMPLES} samples "
                          f"of {spec.interval_s:g} s are expected")  # fmt: skip
-    return Stroke(constants, manoeuvre.duration_s, manoeuvre.role)
+    return {"constants": constants, "duration_s": manoeuvre.duration_s, "role": manoeuvre.role}
 
 
 def _completed(truth: Mapping[str, float], model: Model, where: str) -> dict[str, float]:
@@ -265,12 +256,12 @@ def _check_windows(case: Case, spec: StudySpec, where: str) -> None:
             continue
         begin, end = (float(t) for t in window)
         for stroke in case.strokes:
-            last = round(stroke.duration_s / spec.interval_s)
+            last = round(stroke["duration_s"] / spec.interval_s)
             first = max(int(np.ceil(begin / spec.interval_s - SLACK)), 0)
             held = min(int(np.floor(end / spec.interval_s + SLACK)), last) - first + 1
             if not begin < end or held < FEWEST_SAMPLES:
                 raise ArmidError(f"{where}: window [{begin:g}, {end:g}] holds {max(held, 0)} samples of a manoeuvre of "
-                                 f"{stroke.duration_s:g} s, at least {FEWEST_SAMPLES} are expected")  # fmt: skip
+                                 f"{stroke['duration_s']:g} s, at least {FEWEST_SAMPLES} are expected")  # fmt: skip
 
 
 def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:

@@ -1,6 +1,5 @@
 """The kind of study that closes the loop on every campaign of a folder."""
 
-import hashlib
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -18,6 +17,7 @@ from armid.model import Model
 from armid.record import read_campaign
 from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import unknown_name, validated
+from armid.study.cases import digest_of
 from armid.study.outcome import Performed, Planned, planned
 from armid.study.run_cache import RunCache
 from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE, LoopSpec, StudyRegistry, lookup
@@ -156,8 +156,4 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> tuple[LoopCase, ...]
 
 def _digest(folder: Path) -> str:
     """Return a hash of campaign.toml and all records of a campaign, so that runs on other records are other runs."""
-    digest = hashlib.sha256()
-    for name in sorted(name for name in os.listdir(folder) if name == NAME or name.endswith(SUFFIX)):
-        content = (folder / name).read_bytes()
-        digest.update(f"{name}\0{len(content)}\0".encode() + content)
-    return digest.hexdigest()
+    return digest_of(folder, sorted(name for name in os.listdir(folder) if name == NAME or name.endswith(SUFFIX)))

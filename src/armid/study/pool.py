@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Protocol
 
 from armid.errors import ArmidError
 from armid.study.outcome import FAILED, ClaimedRun, Outcome
@@ -43,31 +42,6 @@ class WorkerSetup:
     time_limit: float
 
 
-class Pool(Protocol):
-    """Perform runs: given at any time, they come back one by one in any order."""
-
-    @property
-    def held(self) -> int:
-        """Number of runs that were given and have not come back."""
-        ...
-
-    def wanted(self) -> int:
-        """Return how many further runs to give now."""
-        ...
-
-    def give(self, runs: Sequence[ClaimedRun]) -> None:
-        """Add runs."""
-        ...
-
-    def wait(self, seconds: float) -> list[Outcome]:
-        """Return what is finished, at the latest after so many seconds."""
-        ...
-
-    def close(self) -> None:
-        """End at once; what is not finished is lost."""
-        ...
-
-
 class BatchSize:
     """Follow how long runs take lately, and tell how many of them take about as long as a batch should."""
 
@@ -86,7 +60,7 @@ class BatchSize:
 
 
 class LocalPool:
-    """A pool of worker processes on this machine."""
+    """Perform runs in worker processes on this machine; given at any time, they come back one by one in any order."""
 
     def __init__(self, jobs: int, setup: WorkerSetup) -> None:
         self.workers = [WorkerProcess(setup) for _ in range(jobs)]

@@ -83,7 +83,7 @@ class RunCache:
 
     def _campaign(self, source: Mapping[str, Any]) -> Any:
         path = campaign_folder(self.folder, source["campaign"], "settings")
-        if digest_of(path, source["records"]) != source["digest"]:
+        if digest_of(path, ("campaign.toml", *source["records"])) != source["digest"]:
             raise ArmidError(f"campaign {source['campaign']} has changed since the study was started: start it again")
         return read_campaign(path, self.registry.plants, self.registry.effects)
 

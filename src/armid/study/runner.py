@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from armid.errors import ArmidError, nearest
 from armid.estimation.identify import ctrl_c_waits
 from armid.study.outcome import Outcome
-from armid.study.pool import LocalPool, Pool, WorkerSetup
+from armid.study.pool import LocalPool, WorkerSetup
 from armid.study.store import Counts, Store
 from armid.study.tasks import Task, read_study
 
 if TYPE_CHECKING:
+    from armid.study.dask_pool import DaskPool
     from armid.study.results import StudyResults
 
 TIME_LIMIT_S = 600.0
@@ -140,7 +141,7 @@ def run(
         )  # fmt: skip
 
 
-def _performed(store: Store, pool: Pool, interrupted: Callable[[], bool]) -> Iterable[Outcome]:
+def _performed(store: Store, pool: "LocalPool | DaskPool", interrupted: Callable[[], bool]) -> Iterable[Outcome]:
     """Let the pool perform what is missing and keep each run as it comes; yield those that were new."""
     is_all_given = False
     while not interrupted():
@@ -161,7 +162,7 @@ def _performed(store: Store, pool: Pool, interrupted: Callable[[], bool]) -> Ite
                 yield outcome
 
 
-def _pool(jobs: int | None, dask: str | None, setup: WorkerSetup, n_runs: int) -> Pool:
+def _pool(jobs: int | None, dask: str | None, setup: WorkerSetup, n_runs: int) -> "LocalPool | DaskPool":
     if dask is not None:
         from armid.study.dask_pool import DaskPool
 

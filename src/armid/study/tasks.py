@@ -1,6 +1,12 @@
 """What a study can be: a task that plans its runs and performs one of them.
 
-There are two: `Study` identifies parameters, here below, and `LoopStudy` (see loops) closes the loop on campaigns.
+There are two: `Study` identifies parameters, here below, and `LoopStudy` (see loops) closes the loop on campaigns. Both
+have name, kind, folder of their file, registry, case_names (what they are tried on) and labels (who tries), and
+
+- check(): refuse what cannot be run, before anything is written
+- description(out): what a report needs to know, as JSON can hold it; out: folder of the store
+- plan(): every run, in the order in which they are performed
+- perform(settings, cache): perform one, in a worker; what it raises is kept as the run's error
 """
 
 import json
@@ -10,7 +16,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -43,58 +49,13 @@ from armid.study.spec import (
 if TYPE_CHECKING:
     from armid.study.loops import LoopStudy
 
+Task: TypeAlias = "Study | LoopStudy"
 SUFFIX = ".toml"
 LONGEST_ERROR = 2000
 PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 
 
-class Task(Protocol):
-    """A study that was read, whatever its kind.
-
-    Attributes
-    ----------
-    name : of the study and of its folder of results
-    kind : as the TOML file says it
-    folder : where the file lies
-    registry : what it may name
-    case_names, labels : what it is tried on, and who tries, each as often as it is there
-    """
-
-    kind: ClassVar[str]
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def folder(self) -> Path: ...
-
-    @property
-    def registry(self) -> StudyRegistry: ...
-
-    @property
-    def case_names(self) -> Sequence[str]: ...
-
-    @property
-    def labels(self) -> Sequence[str]: ...
-
-    def check(self) -> None:
-        """Refuse what cannot be run, before anything is written."""
-
-    def description(self, out: Path) -> dict[str, Any]:
-        """Return what a report needs to know, as JSON can hold it. out: folder of the store."""
-        ...
-
-    def plan(self) -> Iterator[Planned]:
-        """Yield every run, in the order in which they are performed."""
-        ...
-
-    @staticmethod
-    def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
-        """Perform a run; what it raises is kept as the run's error."""
-        ...
-
-
-def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> Task:
+def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
     """Read a study's TOML file; nothing is simulated.
 
     Parameters
@@ -124,7 +85,7 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> Task:
     return task_type(kind).read(table, text, file.resolve().parent, file.name, study_registry(plugins))
 
 
-def task_type(kind: str) -> "type[Study] | type[LoopStudy]":
+def task_type(kind: str) -> "type[Task]":
     """Return the task of a kind; the closed loop is imported for its own studies alone."""
     if kind == CLOSES_LOOP:
         from armid.study.loops import LoopStudy
@@ -291,9 +252,8 @@ class Study:
         }  # fmt: skip
         if case.source is not None:
             return settings | {"campaign": asdict(case.source)}
-        strokes = [{"constants": s.constants, "duration_s": s.duration_s, "role": s.role} for s in case.strokes]
         return settings | {
-            "truth": case.truth, "strokes": strokes, "interval_s": self.spec.interval_s,
+            "truth": case.truth, "strokes": case.strokes, "interval_s": self.spec.interval_s,
             "noise_seed": self.spec.noise_seed,
         }  # fmt: skip
 
