@@ -33,10 +33,13 @@ ACCEPTS: dict[str, Callable[[Any], bool]] = {
     "plants": lambda thing: isinstance(thing, Plant),
     "effects": lambda thing: isinstance(thing, Effect),
     "fitness": is_fitness,
+    "analyses": lambda thing: inspect.isfunction(thing) and "runs" in inspect.signature(thing).parameters,
     "identifiers": is_identifier,
 }
 KINDS = tuple(ACCEPTS)
-EXPECTED = "a Plant, an Effect, a fitness function (measured, simulated) or an algorithm of pymoo is expected"
+EXPECTED = (
+    "a Plant, an Effect, a fitness function (measured, simulated), an analysis (runs) or an algorithm of pymoo is expected"
+)
 
 
 @dataclass
@@ -63,6 +66,11 @@ class Registry:
         from armid.identifiers import IDENTIFIERS, as_identifier
 
         return IDENTIFIERS | {name: as_identifier(name, own) for name, own in self.own["identifiers"].items()}
+
+    @property
+    def analyses(self) -> dict[str, Any]:
+        """Name -> function of the runs of a study, of users alone: ours stand in armid.study.analyses."""
+        return self.own["analyses"]
 
     def identifier_of(self, name: str) -> Any:
         """Return the Identifier of a name, a chain such as `pso+bobyqa` or `multistart:bobyqa`; errors in words."""

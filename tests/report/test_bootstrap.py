@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom
-
 from armid.study.analyses.histories import median_interval
+from scipy.stats import binom
 
 
 def exact_interval(sample, confidence=0.95):

@@ -3,7 +3,6 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-
 from armid.study.analyses.ecdf import data_profile_figure
 from armid.study.analyses.histories import data_profile, remaining_share
 

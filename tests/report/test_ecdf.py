@@ -2,10 +2,9 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+from armid.study.analyses.ecdf import ecdf_figure, share_hit
 from hypothesis import given
 from hypothesis import strategies as st
-
-from armid.study.analyses.ecdf import ecdf_figure, share_hit
 
 HIT = st.one_of(st.integers(1, 100).map(float), st.just(np.inf))
 HITS = st.lists(st.lists(HIT, min_size=3, max_size=3), min_size=1)

@@ -3,9 +3,9 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from armid.study.analyses.outcomes import outcomes
 
 from armid.study.analyses.errors import brief, error_map, error_map_figure
-from armid.study.analyses.outcomes import outcomes
 
 
 def test_medians_in_the_orders_given(made):

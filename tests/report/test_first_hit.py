@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from armid.study.analyses.histories import ERROR_TARGETS, first_hits, held
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armid.study.analyses.histories import ERROR_TARGETS, first_hits, held
 from armid.study.analyses.success import TOLERANCES
 
 POINT = st.tuples(st.integers(1, 500), st.floats(0.0, 2.0))

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from armid.study.analyses.histories import ERROR_TARGETS, histories
 from armid.study.analyses.outcomes import outcomes, truths_of
 

@@ -1,7 +1,6 @@
 """Names under which runs are compared, and their largest error."""
 
 import numpy as np
-
 from armid.study.analyses.outcomes import outcomes
 
 

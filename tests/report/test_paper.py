@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-
 from armid.study.analyses.outcomes import published_values
+
 from armid.study.analyses.overview import overview
 from armid.study.analyses.table1 import percentile_among
 from armid.study.analyses.table2 import spread

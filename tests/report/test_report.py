@@ -12,10 +12,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from armid.study.markdown import page, write_report
 
 from armid.errors import ArmidError
 from armid.study.document import report_of
-from armid.study.markdown import page, write_report
 from armid.study.report import Evidence
 
 

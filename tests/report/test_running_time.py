@@ -4,8 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-
 from armid.study.analyses.histories import ERROR_TARGETS
+
 from armid.study.analyses.running_time import expected_running_time, running_time, running_time_figure
 
 

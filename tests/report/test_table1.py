@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-
 from armid.study.analyses.histories import median_interval
 from armid.study.analyses.outcomes import by_parameter, outcomes, published_values
+
 from armid.study.analyses.table1 import table1, table1_rows
 
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]

@@ -3,7 +3,6 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-
 from armid.study.analyses.outcomes import by_parameter, outcomes
 from armid.study.analyses.valley import MOST_POINTS, end_points, thinned, valley_figure
 

@@ -52,13 +52,13 @@ def study_command(
     with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
     from armid.study.runner import (
-        Watch,
+        ProgressBar,
         absolute,
         run,
     )
-    from armid.study.study import read_study
+    from armid.study.tasks import read_study
 
-    with Watch() as watch:
+    with ProgressBar() as watch:
         known = read_study(study, absolute(plugins))
         ending = run(known, study, jobs, dask, out, time_limit, only, retry, watch.update)
     for line in words(ending):
@@ -71,7 +71,7 @@ def study_command(
 
 def show_table(folder: Path) -> None:
     """Print the main table of the report, the rest of which takes longer."""
-    from armid.cli.report import show
+    from armid.report.terminal import show
     from armid.study.document import summary_of
     from armid.study.results import load_study
 

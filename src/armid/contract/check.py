@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.contract.analysis import check_analysis
 from armid.contract.equations import check_effect, check_plant
 from armid.contract.identifier import check_identifier
 from armid.contract.trials import Finding
 from armid.errors import ArmidError
 from armid.identifiers import as_identifier
-from armid.model import PLANTS, Effect, Model, Plant
+from armid.model import PLANTS, Effect, Plant
 from armid.problem.fitness import Fitness, as_fitness
 from armid.problem.replay import replays
 from armid.problem.space import space_of
@@ -22,9 +23,9 @@ INTERVAL, NOISE = 1e-3, 0.01
 
 
 def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> list[Finding]:
-    """Run the contract of a plant, an effect, a fitness or an identifier.
+    """Run the contract of a plant, an effect, a fitness, an identifier or an analysis.
 
-    kind: "plants", "effects", "fitness" or "identifiers". plants: those on which an effect is tried.
+    kind: "plants", "effects", "fitness", "identifiers" or "analyses". plants: those on which an effect is tried.
     Raises ArmidError for an object that does not even have the form of its kind.
     """
     if kind == "plants":
@@ -33,6 +34,8 @@ def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = 
         return check_effect(thing, plants)
     if kind == "fitness":
         return check_fitness(as_fitness(name, thing))
+    if kind == "analyses":
+        return check_analysis(name, thing)
     return check_identifier(as_identifier(name, thing))
 
 

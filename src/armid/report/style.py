@@ -1,21 +1,33 @@
-"""The style of every figure."""
+"""The style of every figure, and how figures are written."""
 
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
 # Okabe-Ito: told apart by colour-blind readers.
 OKABE_ITO = {
     "black": "#000000", "orange": "#E69F00", "sky": "#56B4E9", "green": "#009E73", "yellow": "#F0E442",
     "blue": "#0072B2", "vermilion": "#D55E00", "purple": "#CC79A7",
 }  # fmt: skip
-GREY = "0.6"
+COLOURS = tuple(OKABE_ITO[c] for c in ("blue", "vermilion", "green", "purple", "orange", "sky", "black"))
+DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)))
+MARKERS = "osD^vPX"
+INK, PALE, GREY = "#222222", "0.75", "0.6"
+DPI = 130
+MANY_MARKS = 1_000
+MOST_POINTS = 1_000
+# Ids of an SVG come out of a hash; letters are drawn, so that no font is needed to read the file.
+SETTINGS: Any = {"svg.hashsalt": "armid", "svg.fonttype": "path"}
+# On a page letters stay text: smaller, and found by the search of a browser.
+PAGE_SETTINGS: Any = SETTINGS | {"svg.fonttype": "none", "font.family": "sans-serif"}
 
 
-def style() -> Any:
-    """Return pyplot on a backend without a screen, in the house style."""
+def pyplot() -> Any:
+    """Return pyplot on a backend without a screen, in the house style, without the upper and right frame."""
     import matplotlib as mpl
     import seaborn as sns
 
@@ -23,26 +35,62 @@ def style() -> Any:
     import matplotlib.pyplot as plt
 
     sns.set_theme(context="notebook", style="ticks", font_scale=1.0)
+    plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False} | SETTINGS)
     return plt
 
 
-DPI = 130
-# Ids of an SVG come out of a hash; without dates the same figure gives the same bytes.
-SETTINGS: Any = {"svg.hashsalt": "armid"}
+def look(i: int) -> dict[str, Any]:
+    """Return colour and dashes of the i-th of up to 21 lines."""
+    return {"color": COLOURS[i % len(COLOURS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)]}
 
 
-def save(figure: Any, path: Path) -> None:
-    """Write a figure as PNG or SVG, as the name says, and close it."""
+def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list[Any]]:
+    """Return a figure and n axes in rows of so many columns, each of this size [inch]."""
+    plt = pyplot()
+    columns = max(1, min(columns, n))
+    rows = -(-n // columns)
+    size = (width * columns, height * rows)
+    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
+    flat = list(axes.ravel())
+    for unused in flat[n:]:
+        unused.remove()
+    return figure, flat[:n]
+
+
+def save(figure: Any, *paths: Path) -> None:
+    """Write a figure as PNG or SVG, as each name says, and close it; the same figure gives the same bytes."""
+    import matplotlib as mpl
+
+    # The layout takes longer than the drawing, and need not be found twice for each file.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axis in figure.axes:
+        flatten_marks(axis)
+    with mpl.rc_context(SETTINGS):
+        for path in paths:
+            without = ("Date", "Creator") if path.suffix == ".svg" else ("Software",)
+            figure.savefig(path, dpi=DPI, metadata=dict.fromkeys(without))
+    pyplot().close(figure)
+
+
+def flatten_marks(axis: Any) -> None:
+    """Turn the marks of an axis into one picture inside the SVG where there are many: each would be an element."""
+    marks = [line for line in axis.lines if line.get_linestyle() == "None"]
+    if sum(len(line.get_xdata()) for line in marks) > MANY_MARKS:
+        for line in marks:
+            line.set_rasterized(True)
+
+
+def svg_text(figure: Any) -> str:
+    """Return a figure as SVG for a page and close it; the same figure gives the same text."""
     import matplotlib as mpl
     import matplotlib.pyplot as plt
 
-    with mpl.rc_context(SETTINGS):
-        figure.savefig(path, dpi=DPI, metadata={"Date": None} if path.suffix == ".svg" else {})
+    text = StringIO()
+    with mpl.rc_context(PAGE_SETTINGS):
+        figure.savefig(text, format="svg", metadata={"Date": None})
     plt.close(figure)
-
-
-Array = NDArray[np.float64]
-MOST_POINTS = 1000
+    return text.getvalue()
 
 
 def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
@@ -64,3 +112,7 @@ def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
         # the first sample of each interval that is its extreme
         chosen += list(equal[np.unique(np.searchsorted(edges, equal, side="right"), return_index=True)[1]])
     return np.unique(np.array(chosen, dtype=np.intp))
+
+
+# Interim names, until every figure uses `pyplot`.
+style = pyplot

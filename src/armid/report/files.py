@@ -1,0 +1,49 @@
+"""Write the tables and figures of a document to files: CSV with every digit, LaTeX, PNG and SVG."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from armid.report.document import Document, Table
+from armid.report.style import save
+
+
+def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
+    """Write each named table as CSV and LaTeX and each figure as PNG and SVG.
+
+    path_of: file name -> where to write it. The bytes depend on the document and the versions of the packages only: no
+    date, no place.
+    """
+    for table in document.tables:
+        path_of(f"{table.name}.csv").write_text(csv(table), encoding="utf-8")
+        if table.most:
+            path_of(f"{table.name}.tex").write_text(latex(table), encoding="utf-8")
+    for figure in document.figures:
+        if figure.draw is not None:
+            save(figure.draw(), path_of(f"{figure.name}.png"), path_of(f"{figure.name}.svg"))
+
+
+def csv(table: Table) -> str:
+    """Return every row and number of the table, SI, as CSV; its header holds the keys of the columns."""
+    from pandas import DataFrame
+
+    frame = table.frame
+    if not isinstance(frame, DataFrame):
+        frame = DataFrame([list(row) for row in frame], columns=[c.key for c in table.columns])
+    return str(frame.to_csv(index=False, lineterminator="\n"))
+
+
+def latex(table: Table) -> str:
+    """Return the rows that are shown as a LaTeX float with booktabs rules."""
+    from pandas import DataFrame
+
+    frame = DataFrame([[c.text for c in row] for row in table.cells()], columns=[c.header for c in table.columns])
+    align = "".join("r" if c.digits else "l" for c in table.columns)
+    return frame.to_latex(index=False, escape=True, column_format=align, caption=latex_text(table.title),
+                          label=f"tab:{table.name}", position="htbp")  # fmt: skip
+
+
+def latex_text(text: str) -> str:
+    """Return text in which LaTeX reads no command."""
+    special = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": "\\textasciitilde{}", "^": "\\textasciicircum{}"}
+    special["\\"] = "\\textbackslash{}"
+    return "".join(special.get(letter, letter) for letter in text)

@@ -1,0 +1,75 @@
+"""Write a document as Markdown; figures are the PNG files beside it."""
+
+import re
+from collections.abc import Iterator
+
+from armid.report.document import Document, Figure, Gallery, Listing, Part, Section, Sentences, Table, Text
+
+
+def markdown(document: Document, made_by: str = "") -> str:
+    """Return the page; made_by: a last sentence of its head, which may hold `code`."""
+    head = [f"# {escaped(document.title)}", escaped(document.question)]
+    head += [f"**{escaped(sentence)}**" for sentence in (document.warning, *document.answer[:1]) if sentence]
+    head += [escaped(" ".join(document.answer[1:])), bullets(document.facts), made_by]
+    parts = [*head, *(text for section in document.sections for text in section_texts(section))]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def section_texts(section: Section) -> Iterator[str]:
+    """Yield heading, text and parts of a section."""
+    yield f"## {escaped(section.title)}"
+    yield escaped(section.text)
+    for part in section.parts:
+        yield from part_texts(part)
+
+
+def part_texts(part: Part) -> Iterator[str]:
+    """Yield a part under its title."""
+    if isinstance(part, Text):
+        yield escaped(part.text)
+        return
+    if isinstance(part, Gallery):
+        yield f"![{escaped(part.slider or part.name)}]({part.name}.png)" if part.name else ""
+        return
+    if isinstance(part, Table) and not part.most:
+        return
+    yield f"### {escaped(part.title)}" if part.title else ""
+    if isinstance(part, Table):
+        yield table_text(part)
+        yield escaped(part.note)
+    elif isinstance(part, Figure):
+        yield f"![{escaped(part.title)}]({part.name}.png)"
+        yield escaped(part.caption)
+    elif isinstance(part, Sentences):
+        yield bullets(part.sentences)
+    elif isinstance(part, Listing):
+        yield code(part)
+
+
+def table_text(table: Table) -> str:
+    """Return a table, numbers to the right."""
+    header = [escaped(c.header) for c in table.columns]
+    rule = ["---:" if c.digits else "---" for c in table.columns]
+    rows = [[escaped(c.text) for c in row] for row in table.cells()]
+    return "\n".join(f"| {' | '.join(line)} |" for line in (header, rule, *rows))
+
+
+def bullets(sentences: tuple[str, ...]) -> str:
+    """Return sentences as a list."""
+    return "\n".join(f"- {escaped(sentence)}" for sentence in sentences)
+
+
+def code(listing: Listing) -> str:
+    """Return lines as they are, in a fence that none of them closes."""
+    marked = any(line.mark for line in listing.lines)
+    lines = [f"{line.mark or ' '} {line.text}" if marked else line.text for line in listing.lines]
+    fence = "`" * max(3, *(1 + len(run) for run in re.findall("`+", "\n".join(lines))), 3)
+    return "\n".join([fence + ("diff" if marked else "text"), *lines, fence])
+
+
+def escaped(text: str) -> str:
+    """Return text that stays in its place: one cell, no HTML, no link, no image."""
+    for plain, safe in (("\\", "\\\\"), ("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "\\|"), ("\n", " ")):
+        text = text.replace(plain, safe)
+    # every kind of link and image has a closing bracket before one of these
+    return re.sub(r"\](?=\s*[(\[:])", r"\\]", text)

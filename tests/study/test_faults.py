@@ -1,0 +1,168 @@
+"""Full disks, folders that cannot be written, and identifiers that take their worker with them."""
+
+import os
+import resource
+import shutil
+import subprocess
+import sys
+
+import pytest
+from small_study import RUNS_A_SEED, same_results
+
+from armid.errors import ArmidError
+from armid.study.results import load_study
+from armid.study.runner import run_study
+from armid.study.store import FILE_NAME
+
+SEEDS = 6
+READER = """
+import sqlite3, sys, time
+store = sqlite3.connect(sys.argv[1])
+store.execute("pragma journal_mode = wal").fetchone()
+store.execute("select count(*) from sqlite_master").fetchone()
+print("open", flush=True)
+time.sleep(600)
+"""
+CHAIN = 'name = "pso+least_squares"'
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of its own with little room, which only root may make."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(folder)]
+    if shutil.which("mount") is None or subprocess.run(command, check=False, capture_output=True).returncode:
+        pytest.skip("a small file system cannot be mounted here")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def ended_with_one_sentence(process):
+    out, err = process.communicate(timeout=600)
+    assert (process.returncode, out) == (2, "")
+    assert err.startswith("armid: ")
+    assert err.count("\n") == 1
+    return err
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, small_disk, undisturbed):
+    file, out = write_study(SEEDS), small_disk / "out"
+    err = ended_with_one_sentence(start(file, "--out", out, "--jobs", 1))
+    assert "database or disk is full; what was finished before is kept" in err
+    kept = load_study(out)
+    assert 0 < len(kept.runs) < SEEDS * RUNS_A_SEED
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    assert start(file, "--out", out, "--jobs", 1).wait() == 0
+    assert same_results(load_study(out), undisturbed)
+
+
+@pytest.mark.slow
+def test_a_file_that_may_not_grow_is_told_and_harms_nothing(start, write_study, tmp_path, undisturbed):
+    file, out = write_study(SEEDS), tmp_path / "out"
+
+    def at_most():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+
+    err = ended_with_one_sentence(start(file, "--out", out, "--jobs", 1, preexec_fn=at_most))
+    assert "what was finished before is kept" in err
+    assert 0 < len(load_study(out).runs) < SEEDS * RUNS_A_SEED
+    assert start(file, "--out", out, "--jobs", 1).wait() == 0
+    assert same_results(load_study(out), undisturbed)
+
+
+@pytest.mark.skipif(not os.path.isdir("/sys/kernel"), reason="/sys is a folder in which nobody can write")
+def test_a_folder_that_cannot_be_written_is_told(start, write_study):
+    err = ended_with_one_sentence(start(write_study(), "--out", "/sys/kernel/armid"))
+    assert "/sys/kernel/armid cannot be used" in err
+
+
+def test_a_read_only_folder_can_be_read_and_is_told_when_written(start, write_study, small_disk, undisturbed):
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    shutil.copytree(undisturbed.path.parent, small_disk / "out")
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    try:
+        assert same_results(load_study(small_disk / "out"), undisturbed)
+        err = ended_with_one_sentence(start(write_study(7), "--out", small_disk / "out"))
+        assert FILE_NAME in err
+        assert "readonly" in err or "read-only" in err
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+
+
+@pytest.mark.slow
+def test_a_log_left_in_a_read_only_folder_is_read(start, write_study, small_disk):
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    out = small_disk / "out"
+    file = write_study(2)
+    assert start(file, "--out", out, "--jobs", 1, "--only", "row 1/random").wait() == 0
+    # Who has the store open when the runner ends, and is killed then, leaves the log behind.
+    reader = subprocess.Popen([sys.executable, "-c", READER, str(out / FILE_NAME)], stdout=subprocess.PIPE, text=True)
+    assert reader.stdout.readline() == "open\n"
+    assert start(file, "--out", out, "--jobs", 1, "--only", "row 1").wait() == 0
+    reader.kill()
+    reader.communicate()
+    n = len(load_study(out).runs)
+    assert any(p.name.endswith("-wal") for p in out.iterdir())
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    try:
+        assert len(load_study(out).runs) == n > 0
+    finally:
+        subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+
+
+def fail_alone(write_study, out, plugins, undisturbed, errors, **more):
+    """Check that identifiers that misbehave fail, each with its error, and the other runs are what they were."""
+    bad = "\n[[identifiers]]\n".join(f'name = "{name}"\nnoise_deg_s = 0.3' for name in errors)
+    told = {"jobs": 2, "out": out, "plugins": [f"{plugins}:{name}" for name in errors], "only": "row 1", **more}
+    found = run_study(write_study(1, change=(CHAIN, bad)), **told)
+    failed = found.runs[found.runs["status"] == "failed"].set_index("identifier")["error"]
+    assert {name: words for name, words in errors.items() if words in failed[name]} == errors
+    done = found.runs[found.runs["status"] == "done"]["run"]
+    assert len(done) == RUNS_A_SEED / 2 - 2
+    assert set(done) < set(undisturbed.runs["run"])
+    assert found.study["n_failed"] == len(errors)
+    # they have failed, and are not tried again unless someone asks for it
+    assert run_study(write_study(1, change=(CHAIN, bad)), **told).runs.equals(found.runs)
+
+
+def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identifiers, undisturbed):
+    errors = {
+        "raises": "ZeroDivisionError: nothing to divide by",
+        "leaves": "SystemExit: 3",
+        "segfaults": "the worker process ended by SIGSEGV, 2 times",
+    }
+    fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors)
+
+
+def test_an_identifier_that_hangs_is_stopped(write_study, tmp_path, bad_identifiers, undisturbed):
+    errors = {"hangs": "stopped at the time limit of 10 s"}
+    fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors, time_limit=10.0)
+
+
+def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(write_study, tmp_path, bad_identifiers):
+    mine = tmp_path / "mine.py"
+    shutil.copy(bad_identifiers, mine)
+    file = write_study(1, change=(CHAIN, 'name = "raises"'))
+    told = {"jobs": 1, "out": tmp_path / "out", "plugins": [f"{mine}:raises"], "only": "row 1/ra*"}
+    first = run_study(file, **told)
+    retried = run_study(file, **told, retry=True)
+    assert list(retried.runs["run"]) == list(first.runs["run"])
+    kept = first.runs["status"] == "done"
+    assert retried.runs[kept].equals(first.runs[kept])
+    assert not retried.runs["started_at"].equals(first.runs["started_at"]) or retried.runs["seconds"].iloc[-1] > 0
+    with open(mine, "a", encoding="utf-8") as text:
+        text.write("\n# mended\n")
+    from armid.study.spec import study_registry
+
+    assert study_registry(told["plugins"]).own("identifiers", "raises+bobyqa") != {}
+    changed = run_study(file, **told)
+    same = set(changed.runs["run"]) & set(first.runs["run"])
+    assert same == set(first.runs[kept]["run"])
+
+
+def test_a_worker_that_cannot_start_is_told(write_study, tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    with pytest.raises(ArmidError, match="a worker process cannot start: it ends with code 1"):
+        run_study(write_study(), jobs=1, out=tmp_path / "out")

@@ -1,0 +1,149 @@
+"""Whatever ends a runner or a worker: no finished run is lost, none is there twice, and the rest is made as if nothing
+had been; runners share the work; and the clock may jump."""
+
+import os
+import random
+import re
+import signal
+import sqlite3
+import time
+from contextlib import closing
+
+import pytest
+from small_study import RUNS_A_SEED, same_results
+
+from armid.study.results import load_study
+from armid.study.runner import run_study
+from armid.study.store import FILE_NAME
+
+SEEDS = 6
+N_RUNS = SEEDS * RUNS_A_SEED
+# What a process has of the wall clock goes back by an hour at every look.
+BACKWARD = """\
+import itertools
+import time
+
+now, steps = time.time(), itertools.count(1)
+time.time = lambda: now - 3600.0 * next(steps)
+time.time_ns = lambda: int(time.time() * 1e9)
+"""
+
+
+def kept(out):
+    """Run -> everything that the store holds of it."""
+    try:
+        with closing(sqlite3.connect(f"file:{out / FILE_NAME}?mode=ro", uri=True)) as connection:
+            rows = connection.execute("SELECT r.*, t.trace FROM runs r JOIN traces t USING (run)").fetchall()
+            return {row[0]: row for row in rows}
+    except sqlite3.OperationalError:
+        # neither file nor tables may be made yet
+        return {}
+
+
+def wait_for(process, out, more_than, seconds=600.0):
+    """Wait until a store holds more runs, or the process has ended."""
+    end = time.monotonic() + seconds
+    while len(kept(out)) <= more_than and process.poll() is None:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def ended_well(process):
+    """Return what a runner prints that ends without an error."""
+    out, err = process.communicate(timeout=600)
+    assert (process.returncode, err) == (0, "")
+    return out
+
+
+def killed_again_and_again(start, file, out, moments, rng):
+    """Kill a runner at random moments, then let it end; return how often it was really killed in the middle."""
+    cut = 0
+    for _ in range(moments):
+        before = kept(out)
+        process = start(file, "--out", out, "--jobs", 2)
+        if rng.random() < 0.8:
+            wait_for(process, out, len(before))
+            # a store can be read while it is written
+            assert len(before) <= len(load_study(out).runs) <= N_RUNS
+            time.sleep(rng.uniform(0.0, 0.05))
+        else:
+            time.sleep(rng.uniform(0.0, 2.0))
+        process.kill()
+        cut += process.wait() == -signal.SIGKILL
+        after = kept(out)
+        assert {run: after[run] for run in before} == before
+    assert f"{N_RUNS} of {N_RUNS} are in" in ended_well(start(file, "--out", out, "--jobs", 2))
+    return cut
+
+
+def test_a_runner_killed_at_random_moments(start, write_study, tmp_path, undisturbed):
+    cut = killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 2, random.Random(1))
+    assert cut == 2
+    assert same_results(load_study(tmp_path / "out"), undisturbed)
+
+
+@pytest.mark.slow
+def test_a_runner_killed_fifty_times(start, write_study, tmp_path, undisturbed):
+    killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 50, random.Random(2))
+    assert same_results(load_study(tmp_path / "out"), undisturbed)
+
+
+def stat_of(pid):
+    """Fields of /proc/PID/stat behind the name of the program, none where the process is not there."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+            return file.read().rpartition(")")[2].split()
+    except OSError:
+        return []
+
+
+def children_of(pid):
+    return [int(entry) for entry in filter(str.isdigit, os.listdir("/proc")) if stat_of(entry)[1:2] == [str(pid)]]
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="looks for processes in /proc")
+def test_workers_may_be_killed_and_end_with_their_runner(start, write_study, tmp_path, undisturbed):
+    process = start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2)
+    wait_for(process, tmp_path / "out", 2)
+    os.kill(children_of(process.pid)[0], signal.SIGKILL)
+    wait_for(process, tmp_path / "out", len(kept(tmp_path / "out")) + 2)
+    workers = children_of(process.pid)
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 120.0
+    while any(stat_of(worker)[:1] not in ([], ["Z"], ["X"]) for worker in workers):
+        assert time.monotonic() < end, "workers outlive their runner"
+        time.sleep(0.05)
+    # two processes give what one gives, also after this
+    assert same_results(run_study(write_study(SEEDS), jobs=2, out=tmp_path / "out"), undisturbed)
+
+
+def test_two_runners_share_the_work(start, write_study, tmp_path, undisturbed):
+    file = write_study(SEEDS)
+    both = [start(file, "--out", tmp_path / "out", "--jobs", 1) for _ in range(2)]
+    made = [int(re.search(r"small: (\d+) runs made", ended_well(process))[1]) for process in both]
+    assert sum(made) == N_RUNS
+    assert same_results(load_study(tmp_path / "out"), undisturbed)
+
+
+def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(start, write_study, tmp_path):
+    process = start(write_study(500), "--out", tmp_path / "out", "--jobs", 2)
+    wait_for(process, tmp_path / "out", 3)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=600)
+    assert (process.returncode, err) == (130, "")
+    assert "interrupted: every finished run is kept, the same command goes on" in out
+    n = int(re.search(r"(\d+) of 8000 are in", out)[1])
+    assert n == len(load_study(tmp_path / "out").runs) > 3
+    assert [p.name for p in (tmp_path / "out").iterdir()] == [FILE_NAME]
+
+
+@pytest.mark.slow
+def test_a_clock_that_runs_backward_changes_nothing(start, write_study, tmp_path, undisturbed):
+    (tmp_path / "clock").mkdir()
+    (tmp_path / "clock" / "sitecustomize.py").write_text(BACKWARD)
+    path = os.pathsep.join(filter(None, [str(tmp_path / "clock"), os.environ.get("PYTHONPATH")]))
+    told = {"env": os.environ | {"PYTHONPATH": path}}
+    out = ended_well(start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2, "--time-limit", 60, **told))
+    assert f"{N_RUNS} of {N_RUNS} are in" in out
+    assert same_results(load_study(tmp_path / "out"), undisturbed)

@@ -1,0 +1,169 @@
+"""The store: claims of other runners, files that are no store, and damaged ones."""
+
+import shutil
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+
+import pytest
+
+from armid.cli.main import main
+from armid.errors import ArmidError
+from armid.study.outcome import DONE, Outcome, Planned
+from armid.study.results import load_study
+from armid.study.store import FILE_NAME, ProcessIdentity, Store, is_gone, start_of, this_place, this_process
+
+DESCRIPTION = {"name": "made", "cases": []}
+
+
+def planned(n, case="a"):
+    return [Planned(f"{case}{i}", "{}", case, "pso", "rmse", 0.0, "whole", i, 10) for i in range(n)]
+
+
+def claims_of_another(folder, *process):
+    with closing(sqlite3.connect(folder / FILE_NAME)) as connection, connection:
+        connection.execute("UPDATE claims SET place = ?, pid = ?, start = ?", process)
+
+
+@pytest.fixture
+def store(tmp_path):
+    with Store(tmp_path) as store:
+        store.plan(DESCRIPTION, planned(4))
+        yield store
+
+
+def runs(tasks):
+    return [task.run for task in tasks]
+
+
+def test_runs_are_claimed_in_order_and_once(store, tmp_path):
+    with Store(tmp_path) as other:
+        other.plan(DESCRIPTION, planned(4))
+        assert runs(store.claim(2)) == ["a0", "a1"]
+        assert runs(other.claim(3)) == ["a2", "a3"]
+        assert store.claim(1) == other.claim(1) == []
+
+
+def test_the_claim_of_a_process_that_has_ended_is_void(store, tmp_path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    assert len(store.claim(4)) == 4
+    claims_of_another(tmp_path, this_place(), ended.pid, "1")
+    assert runs(store.claim(4)) == ["a0", "a1", "a2", "a3"]
+
+
+def test_the_number_of_a_process_may_be_used_again(store, tmp_path):
+    if not this_process().start:
+        pytest.skip("the system does not tell when a process started")
+    store.claim(4)
+    claims_of_another(tmp_path, this_place(), this_process().pid, "1")
+    assert len(store.claim(4)) == 4
+
+
+def test_the_claim_of_a_living_process_is_respected(store, tmp_path):
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as living:
+        identity = ProcessIdentity(this_place(), living.pid, start_of(living.pid))
+        assert not is_gone(identity)
+        assert len(store.claim(3)) == 3
+        claims_of_another(tmp_path, *identity)
+        assert runs(store.claim(4)) == ["a3"]
+        assert store.claim(1) == []
+        assert store.others() == [living.pid]
+        living.communicate(b"\n")
+    assert is_gone(identity)
+    assert len(store.claim(4)) == 3
+
+
+def test_the_claim_of_another_machine_is_void_for_who_has_nothing_else(store, tmp_path):
+    store.claim(2)
+    claims_of_another(tmp_path, "elsewhere", 1, "1")
+    assert runs(store.claim(4)) == ["a2", "a3"]
+    assert runs(store.claim(4)) == ["a0", "a1"]
+
+
+def test_a_run_is_kept_once(store):
+    first, second = Outcome("a0", DONE, seconds=1.0), Outcome("a0", DONE, seconds=2.0)
+    assert store.save(first)
+    assert not store.save(second)
+    assert store.counts()[:3] == (4, 1, 0)
+    assert store.counts().simulations_left == 30
+    assert load_study(store.path).runs["seconds"].tolist() == [1.0]
+
+
+def test_a_plan_that_another_runner_has_changed_is_told(store, tmp_path):
+    with Store(tmp_path) as other:
+        other.plan(DESCRIPTION, planned(5))
+        with pytest.raises(ArmidError, match="was given another plan by another runner"):
+            store.claim(1)
+
+
+def test_another_study_in_the_same_folder_is_refused(store, tmp_path):
+    words = "holds the study 'made', another folder is expected"
+    with Store(tmp_path) as other, pytest.raises(ArmidError, match=words):
+        other.plan({"name": "other", "cases": []}, planned(1, "b"))
+    assert runs(store.claim(9)) == ["a0", "a1", "a2", "a3"]
+
+
+@pytest.mark.parametrize("content", [b"no database at all, but long enough to look like one" * 99, None])
+def test_a_file_of_another_program_is_left_alone(tmp_path, content):
+    file = tmp_path / FILE_NAME
+    if content is None:
+        with closing(sqlite3.connect(file)) as connection, connection:
+            connection.execute("CREATE TABLE theirs (a)")
+    else:
+        file.write_bytes(content)
+    before = file.read_bytes()
+    for use in (Store, load_study):
+        with pytest.raises(ArmidError, match="is no store of a study"):
+            use(tmp_path)
+    assert file.read_bytes() == before
+
+
+def test_a_folder_without_a_store_is_told(tmp_path):
+    with pytest.raises(ArmidError, match="there is no store"):
+        load_study(tmp_path)
+
+
+def test_a_store_of_another_format_is_told(store, tmp_path):
+    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    with pytest.raises(ArmidError, match="is a store of format 99, 1 is expected"):
+        load_study(tmp_path)
+
+
+DAMAGES = {
+    "UPDATE study SET value = 'garbage' WHERE key = 'description'": "the description of the study cannot be read",
+    "UPDATE study SET value = '[]' WHERE key = 'description'": "the description of the study lacks 'name'",
+    "UPDATE study SET value = '{\"name\": \"small\"}' WHERE key = 'description'": "lacks 'cases'",
+    "UPDATE traces SET trace = x'00112233'": "the trace of run",
+    "UPDATE traces SET names = 'p0, k'": "the trace of run",
+}
+
+
+def refused(folder, capsys):
+    """Return the one sentence with which a report of a folder is refused."""
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(folder)])
+    said = capsys.readouterr().err
+    assert ended.value.code == 2, said
+    assert said.count("\n") == 1
+    return said
+
+
+def test_damage_is_one_sentence(undisturbed, tmp_path, capsys):
+    """What was tampered with or damaged is told, never with a traceback; also a page of rubbish."""
+    file = tmp_path / "out" / FILE_NAME
+    for damage, words in DAMAGES.items():
+        shutil.copytree(undisturbed.path.parent, tmp_path / "out")
+        with closing(sqlite3.connect(file)) as connection, connection:
+            connection.execute(damage)
+        said = refused(tmp_path / "out", capsys)
+        assert f"{file} is damaged: " in said
+        assert words in said
+        shutil.rmtree(tmp_path / "out")
+    shutil.copytree(undisturbed.path.parent, tmp_path / "out")
+    content = bytearray(file.read_bytes())
+    content[4096 : len(content) // 2] = b"\xa5" * (len(content) // 2 - 4096)
+    file.write_bytes(content)
+    assert str(file) in refused(tmp_path / "out", capsys)
