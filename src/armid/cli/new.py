@@ -15,7 +15,8 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.options import NewFiles, chosen, examples
+from armid.cli.options import chosen, examples
+from armid.cli.results import NewFiles
 from armid.errors import ArmidError
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
@@ -44,8 +45,6 @@ def new_command(kind: str, name: str, out: Path) -> None:
     becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and say so. Nothing
     that exists is overwritten.
     """
-    pass
-
     chosen(kind, dict.fromkeys(KINDS), "kind")
     taken = getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else {}
     check_new_name(kind, name, taken)
@@ -58,7 +57,6 @@ def new_command(kind: str, name: str, out: Path) -> None:
 
 def write(kind: str, name: str, target: Path) -> None:
     """Write the file or the folder, whole or not at all."""
-    pass
     from armid.record import write_campaign
 
     if kind not in CATALOGUES:

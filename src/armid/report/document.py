@@ -96,10 +96,10 @@ class Table:
 
 
 def table(
-    title: str, columns: Sequence[str | Column], rows: Sequence[Sequence[Any]], caption: str = "", name: str = ""
+    title: str, columns: Sequence[object], rows: Sequence[Sequence[Any]], caption: str = "", name: str = ""
 ) -> Table:
-    """Return a table of plain rows, all shown; a column may be told by its header alone, and is text then."""
-    told = tuple(c if isinstance(c, Column) else Column(c, c) for c in columns)
+    """Return a table of plain rows, all shown; a column of text may be given by its header alone."""
+    told = tuple(c if isinstance(c, Column) else Column(str(c), str(c)) for c in columns)
     return Table(name, title, caption, rows, told, max(len(rows), 1))
 
 
@@ -165,12 +165,14 @@ class Gallery:
     figures : in order.
     slider : label of one control that fades all of them between their layers "before" and "after"; "" for none.
     name : of the PNG file that shows them together, for Markdown; "" for none.
+    wide : whether each has a row of its own.
     """
 
     kind: ClassVar[str] = "gallery"
     figures: tuple["Figure | Drawing", ...]
     slider: str = ""
     name: str = ""
+    wide: bool = False
 
 
 @dataclass(frozen=True)
