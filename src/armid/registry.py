@@ -14,7 +14,7 @@ from armid.errors import ArmidError, nearest
 from armid.model import EFFECTS, PLANTS, Effect, Plant
 
 PLUGIN_PREFIX = "armid_plugin_"
-KINDS = ("plants", "effects", "fitness", "identifiers")
+KINDS = ("plants", "effects", "fitness", "identifiers", "analyses")
 
 
 @dataclass
@@ -25,6 +25,8 @@ class Registry:
     effects: dict[str, Effect] = field(default_factory=lambda: dict(EFFECTS))
     own_fitness: dict[str, Any] = field(default_factory=dict)
     own_identifiers: dict[str, Any] = field(default_factory=dict)
+    # name -> function of the runs of a study, of users alone: ours stand in armid.study.analyses.catalogue
+    analyses: dict[str, Any] = field(default_factory=dict)
 
     @property
     def fitness(self) -> dict[str, Any]:
@@ -52,7 +54,7 @@ class Registry:
         Raises ArmidError when the name is taken: a user's own must not stand silently in for ours.
         """
         known: dict[str, Any] = {"plants": self.plants, "effects": self.effects, "fitness": self.own_fitness,
-                 "identifiers": self.own_identifiers}[kind]  # type: ignore[assignment]  # fmt: skip
+                 "identifiers": self.own_identifiers, "analyses": self.analyses}[kind]  # type: ignore[assignment]  # fmt: skip
         builtin = getattr(self, kind)
         if name in builtin:
             raise ArmidError(f"{kind}: '{name}' is there already, give yours another name")
@@ -150,7 +152,7 @@ def place_in_plugin(error: BaseException) -> str | None:
 def kind_of(thing: Any, where: str) -> str:
     """Tell what a user's object is.
 
-    Raises ArmidError for an object that is neither plant, effect, fitness nor identifier.
+    Raises ArmidError for an object that is neither plant, effect, fitness, identifier nor analysis.
     """
     if isinstance(thing, Plant):
         return "plants"
@@ -160,9 +162,11 @@ def kind_of(thing: Any, where: str) -> str:
         return "fitness"
     if inspect.isfunction(thing) and {"measured", "simulated"} <= set(inspect.signature(thing).parameters):
         return "fitness"
+    if inspect.isfunction(thing) and "runs" in inspect.signature(thing).parameters:
+        return "analyses"
     if hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing):
         return "identifiers"
     raise ArmidError(
         f"{where} is of type {type(thing).__name__}: a Plant, an Effect, a fitness function "
-        "(measured, simulated) or an algorithm of pymoo is expected"
+        "(measured, simulated), an analysis (runs) or an algorithm of pymoo is expected"
     )

@@ -20,17 +20,19 @@ GLOBAL+LOCAL[+LOCAL]: a chain, each phase from the best so far; options share=0.
 
 @click.command("list", short_help="List what is registered.",
                epilog=examples("armid list plants", "armid list effects --plugin mine.py:my_drag"))  # fmt: skip
-@click.argument("what", metavar="effects|plants|fitness|identifiers")
+@click.argument("what", metavar="effects|plants|fitness|identifiers|analyses")
 @plugin_option
 def list_command(what: str, plugins: tuple[str, ...]) -> None:
     """List what is registered: names, equations, parameters, units.
 
     plants: parameters with bounds, states, quantities, ports, inputs, constants and keys of a record. effects: port,
     equation, parameters, source, the plants that take it. fitness: how records join. identifiers: what they need.
+    analyses: sections of the report of a study.
     """
     chosen(what, dict.fromkeys(KINDS), "list")
     registry = load_registry(plugins)
-    texts = {"effects": effect_texts, "plants": plant_texts, "fitness": fitness_texts, "identifiers": identifier_texts}
+    texts = {"effects": effect_texts, "plants": plant_texts, "fitness": fitness_texts, "identifiers": identifier_texts,
+             "analyses": analysis_texts}  # fmt: skip
     print("\n\n".join(texts[what](registry)))
 
 
@@ -121,3 +123,11 @@ def identifier_texts(registry: Registry) -> list[str]:
         words = ["global" if i.is_global else "local", *(word for word, on in kinds.items() if on)]
         lines.append(f"{name}: {i.note or 'no note'} ({', '.join(words)})")
     return [*lines, COMPOSED]
+
+
+def analysis_texts(registry: Registry) -> list[str]:
+    """Return one line for each analysis."""
+    from armid.study.analyses.catalogue import ANALYSES
+
+    own = [f"{name}: {(f.__doc__ or 'no note').strip().splitlines()[0]}" for name, f in registry.analyses.items()]
+    return [*(f"{a.name}: {a.note}" for a in ANALYSES), *own]

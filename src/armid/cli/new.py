@@ -22,13 +22,14 @@ from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
 from armid.registry import load_registry
 
-CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifiers", "plant": "plants"}
+CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifiers", "plant": "plants",
+              "analysis": "analyses"}  # fmt: skip
 
 
 @click.command("new", short_help="Write a starting file of your own.", epilog=examples(
     "armid new effect my_drag", "armid check my_drag.py:my_drag", "armid new campaign my_axis --out studies/campaigns",
 ))  # fmt: skip
-@click.argument("kind", metavar="effect|fitness|identifier|plant|campaign")
+@click.argument("kind", metavar="effect|fitness|identifier|plant|analysis|campaign")
 @click.argument("name", metavar="NAME")
 @click.option(
     "--out",
@@ -41,12 +42,16 @@ CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifi
 def new_command(kind: str, name: str, out: Path) -> None:
     """Write a commented starting file of your own that passes `armid check`.
 
-    An effect, a fitness, an identifier or a plant becomes FOLDER/NAME.py, a Python file that declares NAME. A campaign
-    becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and say so. Nothing
-    that exists is overwritten.
+    An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
+    NAME. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
+    say so. Nothing that exists is overwritten.
     """
     chosen(kind, dict.fromkeys(KINDS), "kind")
-    taken = getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else {}
+    taken = set(getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else ())
+    if kind == "analysis":
+        from armid.study.analyses.catalogue import ANALYSES
+
+        taken |= {a.name for a in ANALYSES}
     check_new_name(kind, name, taken)
     target = out / (f"{name}.py" if kind in CATALOGUES else name)
     if os.path.lexists(target):
@@ -67,7 +72,7 @@ def write(kind: str, name: str, target: Path) -> None:
 
 
 CAMPAIGN = "campaign"
-KINDS = ("effect", "fitness", "identifier", "plant", CAMPAIGN)
+KINDS = ("effect", "fitness", "identifier", "plant", "analysis", CAMPAIGN)
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 
 

@@ -71,7 +71,7 @@ def study_command(
 
 def show_table(folder: Path) -> None:
     """Print the main table of the report, the rest of which takes longer."""
-    from armid.cli.report import show
+    from armid.report.terminal import show
     from armid.study.document import summary_of
     from armid.study.results import load_study
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from armid.contract.analysis import check_analysis
 from armid.contract.effect import check_effect
 from armid.contract.fitness import check_fitness
 from armid.contract.identifier import check_identifier
@@ -20,9 +21,9 @@ from armid.record import Campaign, Record
 
 
 def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> list[Finding]:
-    """Run the contract of a plant, an effect, a fitness or an identifier.
+    """Run the contract of a plant, an effect, a fitness, an identifier or an analysis.
 
-    kind: "plants", "effects", "fitness" or "identifiers". plants: those on which an effect is tried.
+    kind: "plants", "effects", "fitness", "identifiers" or "analyses". plants: those on which an effect is tried.
     Raises ArmidError for an object that does not even have the form of its kind.
     """
     if kind == "plants":
@@ -31,6 +32,8 @@ def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = 
         return check_effect(thing, plants)
     if kind == "fitness":
         return check_fitness(as_fitness(name, thing))
+    if kind == "analyses":
+        return check_analysis(name, thing)
     return check_identifier(as_identifier(name, thing))
 
 

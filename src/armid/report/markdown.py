@@ -31,7 +31,7 @@ def part_texts(part: Part, section: str) -> Iterator[str]:
     if isinstance(part, Gallery):
         yield f"![{escaped(part.slider or part.name)}]({part.name}.png)" if part.name else ""
         return
-    if isinstance(part, Table) and not part.most:
+    if (isinstance(part, Table) and not part.most) or (isinstance(part, Listing) and part.folded):
         return
     yield f"### {escaped(part.title)}" if part.title not in ("", section) else ""
     if isinstance(part, Table):

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
-from armid.study.analyses.outcomes import Results, outcomes
-from armid.study.analyses.table import slug, unlike
+from armid.report.document import slug, unlike
+from armid.study.analyses.analysis import outcomes
 from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
 
@@ -44,7 +44,7 @@ class Pair:
     runs: list[dict[str, Any]] = field(default_factory=list)
 
 
-def export_ioh(results: Results, path_of: Callable[[str], Path]) -> int:
+def export_ioh(results: StudyResults, path_of: Callable[[str], Path]) -> int:
     """Write one .json and one .dat for each algorithm and function; return how many runs they hold.
 
     path_of: file name -> where to write it. No more than one trace is in memory.

@@ -1,81 +1,111 @@
-"""Convergence bands: median and quartiles over runs against simulations."""
+"""Convergence: error and fitness of the best candidate against simulations, median and quartiles over runs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.study.analyses.drawing import COLOURS, DASHES, PALE, panels
+from armid.report.document import Figure, Part, slug
+from armid.report.style import COLOURS, DASHES, PALE, panels
+from armid.study.analyses.analysis import Analysis, Evidence
+from armid.study.analyses.drawing import legend_below
 
+Array = NDArray[np.floating[Any]]
 QUARTILES = (0.25, 0.5, 0.75)
+COLUMNS = 4
+# Smaller values are drawn there.
+LEAST_PERCENT, LEAST_FITNESS = 1e-6, 1e-16
+ERROR_CAPTION = (
+    "Largest relative error of the best candidate so far against simulations, over all cases and seeds: median as a "
+    "line, quartiles as a band, a colour a noise level. The error may rise, since the fitness decides what is best. "
+    "Pale: the smallest median of all identifiers. Errors below 1e-6 % are drawn there; a run that stops early keeps "
+    "its value."
+)
+FITNESS_CAPTION = (
+    "Smallest value of the fitness {fitness} so far (of a similarity: 1 minus its degree) against simulations, over "
+    "all cases and seeds: median as a line, quartiles as a band, a colour a noise level. Pale: the smallest median of "
+    "all identifiers."
+)
 
 
-def band(held_values: NDArray[np.float32]) -> NDArray[np.float64]:
+def parts(evidence: Evidence) -> Sequence[Part]:
+    if evidence.parameters.empty:
+        return ()
+    figures = []
+    if evidence.knows_truth:
+        every = np.ones(len(evidence.runs), bool)
+        figures.append(Figure(
+            "convergence_error", "Convergence of the parameters", ERROR_CAPTION, lambda: convergence_figure(
+                evidence, every, 100.0 * evidence.histories.errors, "largest relative\nerror [%]", LEAST_PERCENT),
+        ))  # fmt: skip
+    names = list(dict.fromkeys(map(str, evidence.runs["fitness"])))
+    return *figures, *(fitness_figure(evidence, name, len(names) > 1) for name in names)
+
+
+CONVERGENCE = Analysis("convergence", "Convergence", parts, "error and fitness against simulations")
+
+
+def fitness_figure(evidence: Evidence, fitness: str, several: bool) -> Figure:
+    """Return the figure of one fitness. several: whether there are others, so that its file is named by the fitness."""
+    own = (evidence.runs["fitness"] == fitness).to_numpy()
+    return Figure(
+        slug("convergence", fitness) if several else "convergence_fitness", f"Convergence of {fitness}",
+        FITNESS_CAPTION.format(fitness=fitness), lambda: convergence_figure(
+            evidence, own, evidence.histories.values, f"best fitness\n({fitness})", LEAST_FITNESS),
+    )  # fmt: skip
+
+
+def band(held_values: Array) -> Array:
     """Return lower quartile, median and upper quartile at each count of simulations, (3, n_grid).
 
     held_values: of the best candidate so far, (n_runs, n_grid), infinite before the first. Each is a value that a run
     had (the smallest with at least that share of runs at or below), since no mean with infinity exists.
     """
-    found: NDArray[np.float64] = np.quantile(held_values, QUARTILES, axis=0, method="inverted_cdf").astype(float)
+    found: Array = np.quantile(held_values, QUARTILES, axis=0, method="inverted_cdf").astype(float)
     return found
 
 
-Groups = Mapping[str, Mapping[str, np.ndarray]]
-COLUMNS = 4
-
-
-def convergence_figure(groups: Groups, grid: np.ndarray, label: str, floor: float) -> Any:
+def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array, label: str, floor: float) -> Any:
     """Draw one panel a variant: median as a line, quartiles as a band, a colour a setting.
 
-    groups: variant -> setting -> quantity of the best candidate so far, (n_runs, n_grid), infinite before the first;
-    grid: simulations, (n_grid,); label: of the quantity; floor: smaller values are drawn there.
+    own: runs to show, (n_runs,); values: quantity of the best candidate so far, (n_runs, n_grid), infinite before the
+    first; label: of the quantity; floor: smaller values are drawn there.
     """
-    figure, axes = panels(len(groups), COLUMNS, 4.4, 3.5)
-    settings = list(dict.fromkeys(s for of in groups.values() for s in of))
-    bands = {v: {s: shown_band(held, floor) for s, held in of.items()} for v, of in groups.items()}
-    low, high = limits(bands)
-    for axis, (variant, of) in zip(axes, bands.items(), strict=True):
+    grid = evidence.histories.grid
+    bands: dict[str, dict[str, Array]] = {}
+    for setting, variants in evidence.groups.items():
+        for variant, rows in variants.items():
+            if own[rows].any():
+                found = band(values[rows[own[rows]]])
+                shown = np.where(np.isfinite(found), np.maximum(found, floor), np.nan)
+                bands.setdefault(variant, {})[setting] = shown
+    every = np.concatenate([b[np.isfinite(b)] for of in bands.values() for b in of.values()])
+    limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
+    settings = list(dict.fromkeys(s for of in bands.values() for s in of))
+    figure, axes = panels(len(bands), COLUMNS, 4.4, 3.5)
+    for place, (axis, (variant, of)) in enumerate(zip(axes, bands.items(), strict=True)):
         for setting, (lower, middle, upper) in of.items():
             i = settings.index(setting)
             axis.plot(grid, best_of_all(bands, setting), color=PALE, lw=1.0, zorder=1)
             axis.fill_between(grid, lower, upper, color=COLOURS[i % 7], alpha=0.22, lw=0, zorder=2)
             axis.plot(grid, middle, color=COLOURS[i % 7], ls=DASHES[i % 3], lw=1.8, label=setting, zorder=3)
-        axis.set(xscale="log", yscale="log", xlim=(1, grid[-1]), ylim=(low, high))
+        axis.set(xscale="log", yscale="log", xlim=(1, grid[-1]), ylim=limits)
         axis.minorticks_off()
         axis.grid(alpha=0.3)
         axis.set_title(variant, fontsize="medium")
-    name_axes(figure, axes, label)
-    return figure
-
-
-def shown_band(held: np.ndarray, floor: float) -> np.ndarray:
-    """Return the band with what is infinite left out and what is below the floor raised to it."""
-    found = band(held)
-    return np.where(np.isfinite(found), np.maximum(found, floor), np.nan)
-
-
-def best_of_all(bands: Mapping[str, Mapping[str, np.ndarray]], setting: str) -> np.ndarray:
-    """Return the smallest median of all variants at each count of simulations."""
-    medians = np.array([of[setting][1] for of in bands.values() if setting in of])
-    smallest: np.ndarray = np.min(np.where(np.isnan(medians), np.inf, medians), axis=0)
-    return np.where(np.isfinite(smallest), smallest, np.nan)
-
-
-def limits(bands: Mapping[str, Mapping[str, np.ndarray]]) -> tuple[float, float]:
-    """Return the range of the upright axis, the same in all panels."""
-    every = np.concatenate([b[np.isfinite(b)] for of in bands.values() for b in of.values()])
-    return (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
-
-
-def name_axes(figure: Any, axes: list[Any], label: str) -> None:
-    """Label the outer axes and put one legend below all."""
-    for i, axis in enumerate(axes):
-        if i % COLUMNS == 0:
+        if place % COLUMNS == 0:
             axis.set_ylabel(label)
         else:
             axis.tick_params(labelleft=False)
-        if i + COLUMNS >= len(axes):
+        if place + COLUMNS >= len(axes):
             axis.set_xlabel("simulations")
-    handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
+    legend_below(figure, 4)
+    return figure
+
+
+def best_of_all(bands: Mapping[str, Mapping[str, Array]], setting: str) -> Array:
+    """Return the smallest median of all variants at each count of simulations, NaN where none has any."""
+    medians = np.array([of[setting][1] for of in bands.values() if setting in of])
+    smallest: Array = np.min(np.where(np.isnan(medians), np.inf, medians), axis=0)
+    return np.where(np.isfinite(smallest), smallest, np.nan)

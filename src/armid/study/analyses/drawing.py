@@ -1,92 +1,21 @@
-"""A figure of a report: what it is called, what it shows, and how it is drawn."""
+"""What figures of a study share beyond the house style: names beside lines, names of rows, one legend."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armid.report.style import OKABE_ITO, style
+from armid.report.document import Figure
+from armid.report.style import COLOURS, INK, look, panels, pyplot, save
 
-
-@dataclass(frozen=True, eq=False)
-class Figure:
-    """Hold one figure.
-
-    name: of its files; title; words: what it shows and how each mark was computed; draw: returns it as matplotlib's.
-    """
-
-    name: str
-    title: str
-    words: str
-    draw: Callable[[], Any]
-
-
-COLOURS = tuple(OKABE_ITO[c] for c in ("blue", "vermilion", "green", "purple", "orange", "sky", "black"))
-DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)))
-MARKERS = "osD^vPX"
-INK, PALE = "#222222", "0.75"
-DPI = 130
-MANY_MARKS = 1_000
-# Ids of an SVG come out of a hash; letters are drawn, so that no font is needed to read it.
-SETTINGS: Any = {"svg.hashsalt": "armid", "svg.fonttype": "path"}
-
-
-def pyplot() -> Any:
-    """Return pyplot in the house style, without the upper and right frame."""
-    plt = style()
-    plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False} | SETTINGS)
-    return plt
-
-
-def look(i: int) -> dict[str, Any]:
-    """Return colour and dashes of the i-th of up to 21 lines."""
-    return {"color": COLOURS[i % len(COLOURS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)]}
-
-
-def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list[Any]]:
-    """Return a figure and n axes in rows of so many columns, each of this size [inch]."""
-    plt = pyplot()
-    columns = max(1, min(columns, n))
-    rows = -(-n // columns)
-    size = (width * columns, height * rows)
-    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
-    flat = list(axes.ravel())
-    for unused in flat[n:]:
-        unused.remove()
-    return figure, flat[:n]
-
-
-def save(figure: Any, png: Path, svg: Path) -> None:
-    """Write a figure as PNG and SVG without dates, and close it."""
-    import matplotlib as mpl
-
-    # The layout takes longer than the drawing, and need not be found twice for each file.
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    for axis in figure.axes:
-        flatten_marks(axis)
-    with mpl.rc_context(SETTINGS):
-        figure.savefig(png, dpi=DPI, metadata={"Software": None})
-        figure.savefig(svg, dpi=DPI, metadata={"Date": None, "Creator": None})
-    pyplot().close(figure)
-
-
-def flatten_marks(axis: Any) -> None:
-    """Turn the marks of an axis into one picture inside the SVG where there are many: each would be an element."""
-    marks = [line for line in axis.lines if line.get_linestyle() == "None"]
-    if sum(len(line.get_xdata()) for line in marks) > MANY_MARKS:
-        for line in marks:
-            line.set_rasterized(True)
-
+# Interim names, until study/blind has moved.
+__all__ = ["COLOURS", "Figure", "listed_lines", "named_lines", "panels", "pyplot", "save"]
 
 # Where names stand beside the axes, as shares of their width; the distance between two [inch], and what an upright
 # panel needs beside its axes [inch].
 BESIDE, SAMPLE, GAP = 1.045, 0.055, 0.012
-APART_INCH, FRAME_INCH = 0.235, 1.0
-LEAST_HEIGHT = 4.6
+APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
 
 
 def panel_height(n_lines: int) -> float:
@@ -94,60 +23,61 @@ def panel_height(n_lines: int) -> float:
     return max(LEAST_HEIGHT, FRAME_INCH + APART_INCH * n_lines)
 
 
-def named_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], order: Mapping[str, int]) -> None:
+def row_names(axis: Any, i: int, names: Sequence[str]) -> None:
+    """Name the rows of the i-th panel, two panels side by side: the left one carries the names."""
+    axis.set_yticks(range(len(names)), names if i % 2 == 0 else [""] * len(names))
+
+
+def legend_below(figure: Any, ncols: int, handles: Sequence[Any] | None = None) -> None:
+    """Write one legend below all panels. handles: None takes those of the first panel."""
+    if handles is None:
+        handles = figure.axes[0].get_legend_handles_labels()[0]
+    labels = [handle.get_label() for handle in handles]
+    figure.legend(handles, labels, loc="outside lower center", ncols=ncols, frameon=False)
+
+
+def named_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int]) -> None:
     """Draw lines over a common x and name each beside its end, in the order of the ends.
 
-    order: name -> number of its colour and dashes, so that a name looks alike in all figures.
+    colours: name -> number of its colour and dashes, so that a name looks alike in all figures.
     """
-    draw(axis, x, lines, order)
-    ends = {name: last_finite(y) for name, y in lines.items()}
-    # Lines that end alike are told apart by what they did before.
-    before = {name: float(np.nansum(np.asarray(y, float))) for name, y in lines.items()}
-    names = sorted((n for n in lines if np.isfinite(ends[n])), key=lambda n: (ends[n], before[n]))
-    heights = [share(axis, ends[name]) for name in names]
-    for name, height, place in zip(names, heights, spread(heights, apart_in(axis)), strict=True):
-        colour = look(order[name])["color"]
+    draw_lines(axis, x, lines, colours)
+    values = {name: np.asarray(y, float) for name, y in lines.items()}
+    finite = {name: y[np.isfinite(y)] for name, y in values.items()}
+    # lines that end alike are ordered by what they did before
+    names = sorted((n for n in lines if finite[n].size), key=lambda n: (finite[n][-1], finite[n].sum()))
+    low, high = axis.get_ylim()
+    heights = [float(np.clip((finite[n][-1] - low) / (high - low), 0.0, 1.0)) for n in names]
+    for name, height, place in zip(names, heights, spread(heights, name_distance(axis)), strict=True):
+        colour = look(colours[name])["color"]
         axis.plot([1.0, BESIDE], [height, place], transform=axis.transAxes, color=colour, lw=0.7, clip_on=False)
-        write_name(axis, name, place, order)
+        write_name(axis, name, place, colours)
 
 
-def listed_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], order: Mapping[str, int],
+def listed_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int],
                  names: Sequence[str]) -> None:  # fmt: skip
     """Draw lines over a common x and list their names beside the axes from the top, in the order given."""
-    draw(axis, x, lines, order)
+    draw_lines(axis, x, lines, colours)
     for i, name in enumerate(names):
-        write_name(axis, name, 1.0 - apart_in(axis) * (i + 0.5), order)
+        write_name(axis, name, 1.0 - name_distance(axis) * (i + 0.5), colours)
 
 
-def draw(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], order: Mapping[str, int]) -> None:
-    """Draw the lines; the axes keep the upright range that they have."""
+def draw_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int]) -> None:
+    # the axes keep the upright range that they have
     axis.set_ylim(*axis.get_ylim())
     for name, y in lines.items():
-        axis.plot(x, y, lw=1.7, **look(order[name]))
+        axis.plot(x, y, lw=1.7, **look(colours[name]))
     axis.margins(x=0.0)
 
 
-def write_name(axis: Any, name: str, place: float, order: Mapping[str, int]) -> None:
+def write_name(axis: Any, name: str, place: float, colours: Mapping[str, int]) -> None:
     """Write a name beside the axes with a sample of its line."""
     there = {"transform": axis.transAxes, "clip_on": False}
-    axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], lw=1.9, **there, **look(order[name]))
+    axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], lw=1.9, **there, **look(colours[name]))
     axis.text(BESIDE + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
 
 
-def last_finite(y: ArrayLike) -> float:
-    """Return the last finite number, NaN without any."""
-    values = np.asarray(y, float)
-    finite = values[np.isfinite(values)]
-    return float(finite[-1]) if finite.size else np.nan
-
-
-def share(axis: Any, y: float) -> float:
-    """Return how far up the axes a value stands, 0 to 1."""
-    low, high = axis.get_ylim()
-    return float(np.clip((y - low) / (high - low), 0.0, 1.0))
-
-
-def apart_in(axis: Any) -> float:
+def name_distance(axis: Any) -> float:
     """Return the distance of two names as a share of the height of the axes."""
     grid = axis.get_subplotspec().get_gridspec()
     return float(APART_INCH / (axis.figure.get_size_inches()[1] / grid.nrows - FRAME_INCH))

@@ -1,4 +1,4 @@
-"""Errors by identifier and case."""
+"""Where the errors are: by identifier and case, and along the valley of parameters that stand in for each other."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,49 +6,57 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
-from armid.study.analyses.drawing import pyplot
-from armid.study.analyses.table import Column, Table
+from armid.report.document import Figure, Part, slug
+from armid.report.style import COLOURS, MARKERS, PALE, pyplot
+from armid.study.analyses.analysis import Analysis, Evidence
 
-
-def error_map(found: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
-    """Return the median over the seeds of the largest relative error, variants by cases in the orders given.
-
-    found: outcomes of runs of one setting; infinite where at least half of the runs failed, NaN where none was made.
-    """
-    medians = found.groupby(["variant", "case"], sort=False)["largest_error"].median().unstack("case")
-    there = [v for v in variants if v in medians.index]
-    return medians.reindex(index=there, columns=[c for c in cases if c in medians.columns])
-
-
-WORDS = (
-    "No truth is known. Median and population standard deviation of each parameter over all finished runs [SI], "
-    "Cramer-Rao standard deviation at the solution (median), the errors of the result on the train and the holdout "
-    "records (medians, in the unit of the signal), and runs of which the parameter ended on its bound."
+# Range of the colours of the map [%]; cells carry numbers up to so many cases.
+LOWEST, HIGHEST = 1e-6, 1e2
+MOST_NUMBERS = 12
+# The parameters that stand in for each other on the arm; others where a study has others.
+VALLEY = ("p0", "eta3", "n")
+MOST_PARAMETERS, MOST_COLOURED, MOST_POINTS = 3, 6, 600
+OTHERS = "all others"
+MAP_CAPTION = (
+    "Largest relative error of a run [%], median over the seeds, by identifier and case, one map a noise level, "
+    "the best identifier (over all) on top. The colours are logarithmic from 1e-6 % to 100 %."
+)
+VALLEY_CAPTION = (
+    "Deviation (value - truth)/truth [%] of the results of all finished runs in each pair of parameters, one mark a "
+    "run; counts on the diagonal. Where marks lie along a line, parameters stand in for each other. Of more than 600 "
+    "runs of one identifier every n-th is drawn."
 )
 
 
-def values(found: DataFrame, estimates: DataFrame) -> Table:
-    """Return one line a setting, variant and parameter. found: outcomes; estimates: a row a run and parameter."""
-    by = ["setting", "variant", "parameter", "unit"]
-    joined = estimates.merge(found[["run", "train_rmse", "holdout_rmse"]], on="run")
-    frame = joined.groupby(by, sort=False).agg(
-        n=("run", "size"), median=("value", "median"), deviation=("value", lambda v: v.std(ddof=0)),
-        bound=("deviation", "median"), train=("train_rmse", "median"), holdout=("holdout_rmse", "median"),
-        n_at_bound=("at_bound", "sum"),
-    ).reset_index()  # fmt: skip
-    columns = (
-        Column("setting", "noise"), Column("variant", "identifier"), Column("parameter", "parameter"),
-        Column("unit", "unit"), Column("n", "runs", ".0f"), Column("median", "median", ".6g"),
-        Column("deviation", "standard deviation", ".2g"), Column("bound", "Cramer-Rao", ".2g"),
-        Column("train", "RMSE train", ".4g"), Column("holdout", "RMSE holdout", ".4g"),
-        Column("n_at_bound", "at a bound", ".0f"),
-    )  # fmt: skip
-    return Table("values", "Parameters found", WORDS, frame, columns)
+def parts(evidence: Evidence) -> Sequence[Part]:
+    if not evidence.knows_truth:
+        return ()
+    maps = {s: error_map(evidence.of(s), evidence.best_first, evidence.cases) for s in evidence.settings}
+    figures = [Figure("error_map", "Errors by identifier and case", MAP_CAPTION, lambda: error_map_figure(maps))]
+    ends = end_points(evidence.estimates)
+    if ends.shape[1] > 3 and len(ends) > 1:
+        figures += [valley(ends, s, evidence) for s in evidence.settings]
+    return figures
 
 
-# Shown in %: better than the lower end is all the same colour.
-LOWEST, HIGHEST = 1e-6, 1e2
-MOST_NUMBERS = 12
+ERRORS = Analysis("errors", "Where the errors are", parts, "largest error by identifier and case; where runs end")
+
+
+def valley(ends: DataFrame, setting: str, evidence: Evidence) -> Figure:
+    """Return the figure of where the runs of one setting end."""
+    own, coloured = ends[ends["setting"] == setting], evidence.interesting[:MOST_COLOURED]
+    name = slug("valley", setting if len(evidence.settings) > 1 else "")
+    return Figure(name, f"Where runs end, {setting}", VALLEY_CAPTION, lambda: valley_figure(own, coloured))
+
+
+def error_map(runs: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
+    """Return the median over the seeds of the largest relative error, variants by cases in the orders given.
+
+    runs: outcomes of one setting; infinite where at least half of the runs failed, NaN where none was made.
+    """
+    medians = runs.groupby(["variant", "case"], sort=False)["largest_error"].median().unstack("case")
+    there = [v for v in variants if v in medians.index]
+    return medians.reindex(index=there, columns=[c for c in cases if c in medians.columns])
 
 
 def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
@@ -65,13 +73,12 @@ def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
     numbers = n_columns <= MOST_NUMBERS
     size = (3.4 + (0.95 if numbers else 0.36) * n_columns, 1.3 * len(maps) + 0.36 * n_rows + 0.4)
     figure, axes = plt.subplots(len(maps), 1, figsize=size, squeeze=False, layout="constrained")
-    norm = LogNorm(LOWEST, HIGHEST)
     for axis, (setting, errors) in zip(axes.ravel(), maps.items(), strict=True):
         percent = 100.0 * errors
-        colours = percent.clip(LOWEST, HIGHEST)
         text = percent.map(brief) if numbers else False
-        sns.heatmap(colours, ax=axis, norm=norm, cmap="cividis_r", annot=text, fmt="", cbar=False, linewidths=0.4,
-                    annot_kws={"fontsize": 8.5}, xticklabels=True, yticklabels=True)  # fmt: skip
+        sns.heatmap(percent.clip(LOWEST, HIGHEST), ax=axis, norm=LogNorm(LOWEST, HIGHEST), cmap="cividis_r",
+                    annot=text, fmt="", cbar=False, linewidths=0.4, annot_kws={"fontsize": 8.5}, xticklabels=True,
+                    yticklabels=True)  # fmt: skip
         axis.set(title=setting, xlabel="", ylabel="")
         axis.tick_params(length=0)
     beside = {"ax": list(axes.ravel()), "pad": 0.02, "fraction": 0.05, "shrink": 1.0 / len(maps), "aspect": 25}
@@ -85,3 +92,56 @@ def brief(percent: float) -> str:
     if not np.isfinite(percent):
         return "failed"
     return f"{percent:.2g}" if percent >= 1e-3 or percent == 0.0 else f"{percent:.0e}"
+
+
+def end_points(estimates: DataFrame) -> DataFrame:
+    """Return variant, setting and the deviation (value - truth)/abs(truth) [%] of each parameter, one row a run.
+
+    estimates: one row a run and parameter; runs with an unknown truth are left out. The columns are the p0-eta3-n
+    valley where these are free, else the first three parameters.
+    """
+    known = estimates[estimates["truth"].notna()]
+    deviation = 100.0 * (known["value"] - known["truth"]) / known["truth"].abs()
+    wide = known.assign(deviation=deviation).pivot(index="run", columns="parameter", values="deviation")
+    names = list(dict.fromkeys(known["parameter"]))
+    chosen = list(VALLEY) if set(VALLEY) <= set(names) else names[:MOST_PARAMETERS]
+    groups = known.drop_duplicates("run").set_index("run")[["variant", "setting"]]
+    return groups.join(wide[chosen].dropna(), how="inner")
+
+
+def valley_figure(ends: DataFrame, chosen: list[str]) -> Any:
+    """Draw the deviations from the truth [%] of each pair of parameters, one mark a run.
+
+    ends: variant, setting and one column a parameter; chosen: the variants with a colour of their own, up to six; all
+    others are pale.
+    """
+    import seaborn as sns
+
+    pyplot()
+    names = [c for c in ends.columns if c not in ("variant", "setting")]
+    shown = thinned(ends.assign(shown=ends["variant"].where(ends["variant"].isin(chosen), OTHERS)))
+    there = [v for v in (OTHERS, *chosen) if v in set(shown["shown"])]
+    palette = {v: PALE if v == OTHERS else COLOURS[chosen.index(v) % len(COLOURS)] for v in there}
+    marks = ["." if v == OTHERS else MARKERS[chosen.index(v) % len(MARKERS)] for v in there]
+    grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=there, palette=palette, corner=True, height=2.9,
+                        hue_kws={"marker": marks})  # fmt: skip
+    grid.map_lower(scatter)
+    grid.map_diag(sns.histplot, element="step", fill=False, bins=30, common_norm=False)
+    for i, name in enumerate(names):
+        grid.axes[i, 0].set_ylabel(f"{name}: deviation [%]" if i else "runs")
+        grid.axes[-1, i].set_xlabel(f"{name}: deviation [%]")
+    grid.add_legend(title="", loc="upper right", bbox_to_anchor=(0.99, 0.98), fontsize=10, markerscale=1.2)
+    return grid.figure
+
+
+def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:
+    """Draw marks, hollow so that those below stay visible."""
+    pyplot().gca().plot(
+        x, y, ls="", marker=look["marker"], ms=5, mfc="none", mec=look["color"], mew=0.9, label=look.get("label")
+    )
+
+
+def thinned(ends: DataFrame) -> DataFrame:
+    """Return every n-th run of a variant that has very many."""
+    parts = [g.iloc[:: -(-len(g) // MOST_POINTS)].index for _, g in ends.groupby("variant", sort=False)]
+    return ends.loc[[i for part in parts for i in part]]

@@ -1,40 +1,94 @@
-"""The compact table: every identifier on one line."""
+"""The table that answers a study's question: every identifier on one line, its errors or (without truths) its values.
+
+Also the last table of every report: what was run, and why runs stopped.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 from pandas import DataFrame
 
-from armid.study.analyses.table import Column, Table
+from armid.report.document import Column, Part, Table
+from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VARIANT, Analysis, Evidence
 
-PAPER = "the paper's pso"
+OVERVIEW_CAPTION = (
+    "Relative error abs(value - truth)/abs(truth) in %, mean and median over all finished runs (cases and seeds "
+    "together). 'largest' is the largest error among the parameters of one run: its median, 95th percentile and "
+    "worst over the runs; a failed run counts as infinite there."
+)
+PAPER_CAPTION = (
+    f" The line '{PAPER}' is computed from the values that the paper printed, one run a row, on its own data."
+)
+VALUES_CAPTION = (
+    "No truth is known. Median and population standard deviation of each parameter over all finished runs [SI], "
+    "Cramer-Rao standard deviation at the solution (median), the errors of the result on the train and the holdout "
+    "records (medians, in the unit of the signal), and runs of which the parameter ended on its bound."
+)
+RUNS_CAPTION = (
+    "One line a noise and identifier. budget, used: simulations of a run (median used); diverged: share of the used "
+    "simulations that gave no finite record. failed: runs that ended in an error and hold no result. at a bound: runs "
+    "of which at least one parameter ended on a bound of the box."
+)
+VALUES_COLUMNS = (
+    SETTING, VARIANT, PARAMETER, Column("unit", "unit"), N_RUNS, Column("median", "median", ".6g"),
+    Column("deviation", "standard deviation", ".2g"), Column("bound", "Cramer-Rao", ".2g"),
+    Column("train", "RMSE train", ".4g"), Column("holdout", "RMSE holdout", ".4g"),
+    Column("n_at_bound", "at a bound", ".0f"),
+)  # fmt: skip
+RUNS_COLUMNS = (
+    SETTING, VARIANT, N_RUNS, Column("failed", "failed", ".0f"), Column("budget", "budget", ".0f"),
+    Column("used", "used", ".0f"), Column("diverged", "diverged [%]", ".2g", 100.0),
+    Column("held", "at a bound", ".0f"),
+)  # fmt: skip
 
 
-def overview(found: DataFrame, estimates: DataFrame, published: DataFrame) -> Table:
+def main_table(evidence: Evidence) -> Table:
+    """Return the table that is printed: errors where truths are known, else values."""
+    if not evidence.knows_truth:
+        return values(evidence.runs, evidence.estimates)
+    is_table1 = evidence.study.get("report") == "table1"
+    return overview(evidence.runs, evidence.estimates, evidence.published if is_table1 else evidence.published[:0])
+
+
+def overview_parts(evidence: Evidence) -> Sequence[Part]:
+    return (main_table(evidence),)
+
+
+def runs_parts(evidence: Evidence) -> Sequence[Part]:
+    return runs_table(evidence.runs, evidence.parameters), reasons(evidence.runs)
+
+
+OVERVIEW = Analysis("overview", "Overview", overview_parts, "errors of all identifiers, without truths their values")
+RUNS = Analysis("runs", "Runs", runs_parts, "what was run, and why runs stopped")
+
+
+def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Table:
     """Return mean and median relative error of each parameter, and the tail of the largest, one line a variant.
 
-    found: outcomes of runs; estimates: one row a run and parameter; published: the paper's values, empty without any.
+    runs: outcomes; estimates: one row a run and parameter; published: the paper's values, empty without any.
     """
     names = list(dict.fromkeys(estimates["parameter"]))
     rows = [paper_row(published, names)] if len(published) else []
     by = ["setting", "variant"]
     groups = estimates.groupby([*by, "parameter"], sort=False)["relative_error"].agg(["mean", "median"])
-    for key, group in found.groupby(by, sort=False):
-        row = dict(zip(by, key, strict=True)) | counts(group) | tail(group["largest_error"].to_numpy())
+    for key, group in runs.groupby(by, sort=False):
+        failed = int((group["status"] != "done").sum())
+        row: dict[str, object] = {**dict(zip(by, key, strict=True)), "n": len(group), "n_failed_runs": failed}
+        row |= tail(group["largest_error"].to_numpy())
         for name in names:
             there = (*key, name) in groups.index
             both = groups.loc[(*key, name)] if there else {"mean": np.nan, "median": np.nan}
             row |= {f"{name}_mean": both["mean"], f"{name}_median": both["median"]}
         rows.append(row)
     frame = DataFrame(rows)
-    return Table(
-        "overview", "Relative errors of all identifiers [%]", words(len(published) > 0), frame.sort_values(
-            "setting", key=lambda s: s.map({v: i for i, v in enumerate(dict.fromkeys(s))}), kind="stable"
-        ), columns(names),
-    )  # fmt: skip
-
-
-def counts(group: DataFrame) -> dict[str, int]:
-    """Return how many runs there are, and how many of them failed."""
-    return {"n": len(group), "n_failed_runs": int((group["status"] != "done").sum())}
+    place = {setting: i for i, setting in enumerate(dict.fromkeys(frame["setting"]))}
+    frame = frame.sort_values("setting", key=lambda s: s.map(place), kind="stable")
+    columns = [Column(f"{n}_{kind}", f"{n} {kind}", ".3g", 100.0) for n in names for kind in ("mean", "median")]
+    columns += [Column(f"largest_{key}", f"largest {text}", ".3g", 100.0)
+                for key, text in (("median", "median"), ("p95", "95 %"), ("worst", "worst"))]  # fmt: skip
+    caption = OVERVIEW_CAPTION + (PAPER_CAPTION if len(published) else "")
+    return Table("overview", "Relative errors of all identifiers [%]", caption, frame,
+                 (SETTING, VARIANT, N_RUNS, *columns), grouped=True)  # fmt: skip
 
 
 def tail(errors: np.ndarray) -> dict[str, float]:
@@ -54,60 +108,36 @@ def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
     return row
 
 
-def columns(names: list[str]) -> tuple[Column, ...]:
-    """Return what is shown."""
-    of_names = [Column(f"{n}_{kind}", f"{n} {kind}", ".3g", 100.0) for n in names for kind in ("mean", "median")]
-    ends = [Column(f"largest_{k}", f"largest {text}", ".3g", 100.0)
-            for k, text in (("median", "median"), ("p95", "95 %"), ("worst", "worst"))]  # fmt: skip
-    first = (Column("setting", "noise"), Column("variant", "identifier"), Column("n", "runs", ".0f"))
-    return (*first, *of_names, *ends)
+def values(runs: DataFrame, estimates: DataFrame) -> Table:
+    """Return one line a setting, variant and parameter. runs: outcomes; estimates: a row a run and parameter."""
+    joined = estimates.merge(runs[["run", "train_rmse", "holdout_rmse"]], on="run")
+    frame = joined.groupby(["setting", "variant", "parameter", "unit"], sort=False).agg(
+        n=("run", "size"), median=("value", "median"), deviation=("value", lambda v: v.std(ddof=0)),
+        bound=("deviation", "median"), train=("train_rmse", "median"), holdout=("holdout_rmse", "median"),
+        n_at_bound=("at_bound", "sum"),
+    ).reset_index()  # fmt: skip
+    return Table("values", "Parameters found", VALUES_CAPTION, frame, VALUES_COLUMNS, grouped=True)
 
 
-def words(with_paper: bool) -> str:
-    """Return what the table says and how."""
-    paper = (
-        f" The line '{PAPER}' is computed from the values that the paper printed, one run a row, on its own data."
-        if with_paper else ""
-    )  # fmt: skip
-    return (
-        "Relative error abs(value - truth)/abs(truth) in %, mean and median over all finished runs (cases and seeds "
-        "together). 'largest' is the largest error among the parameters of one run: its median, 95th percentile and "
-        f"worst over the runs; a failed run counts as infinite there.{paper}"
-    )
-
-
-WORDS = (
-    "One line a noise and identifier. budget, used: simulations of a run (median used); diverged: share of the used "
-    "simulations that gave no finite record. failed: runs that ended in an error and hold no result. at a bound: runs "
-    "of which at least one parameter ended on a bound of the box."
-)
-
-
-def runs(found: DataFrame, parameters: DataFrame) -> Table:
-    """Return the counts. found: outcomes of runs; parameters: one row a run and parameter."""
+def runs_table(runs: DataFrame, parameters: DataFrame) -> Table:
+    """Return the counts. runs: outcomes; parameters: one row a run and parameter."""
     held = set(parameters.loc[parameters["at_bound"].astype(bool), "run"])
-    marked = found.assign(done=found["status"] == "done", held=found["run"].isin(held))
-    groups = marked.groupby(["setting", "variant"], sort=False)
-    frame = groups.agg(
+    marked = runs.assign(done=runs["status"] == "done", held=runs["run"].isin(held))
+    frame = marked.groupby(["setting", "variant"], sort=False).agg(
         n=("run", "size"), done=("done", "sum"), budget=("budget", "max"), used=("used", "median"),
         total=("used", "sum"), lost=("n_failed", "sum"), held=("held", "sum"),
     ).reset_index()  # fmt: skip
     frame["failed"] = frame["n"] - frame["done"]
     frame["diverged"] = frame["lost"] / frame["total"].where(frame["total"] > 0)
-    columns = (
-        Column("setting", "noise"), Column("variant", "identifier"), Column("n", "runs", ".0f"),
-        Column("failed", "failed", ".0f"), Column("budget", "budget", ".0f"), Column("used", "used", ".0f"),
-        Column("diverged", "diverged [%]", ".2g", 100.0), Column("held", "at a bound", ".0f"),
-    )  # fmt: skip
-    return Table("runs", "Runs", WORDS, frame, columns)
+    return Table("runs", "Runs", RUNS_CAPTION, frame, RUNS_COLUMNS)
 
 
-def reasons(found: DataFrame) -> Table:
+def reasons(runs: DataFrame) -> Table:
     """Return why runs stopped, or failed, with counts."""
-    failed = found["status"] != "done"
-    reason = found["stopped"].where(~failed, "failed: " + found["error"].map(first_line))
-    frame = found.assign(reason=reason).groupby(["variant", "reason"], sort=False).size().reset_index(name="n")
-    columns = (Column("variant", "identifier"), Column("reason", "reason"), Column("n", "runs", ".0f"))
+    failed = runs["status"] != "done"
+    reason = runs["stopped"].where(~failed, "failed: " + runs["error"].map(first_line))
+    frame = runs.assign(reason=reason).groupby(["variant", "reason"], sort=False).size().reset_index(name="n")
+    columns = (VARIANT, Column("reason", "reason"), N_RUNS)
     return Table("reasons", "Why runs stopped", "Counted over all cases, noise levels and seeds.", frame, columns)
 
 

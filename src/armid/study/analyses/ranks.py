@@ -1,6 +1,7 @@
-"""Rank tests over cases: Friedman, and Wilcoxon signed-rank for each pair with Holm's correction."""
+"""Ranks over cases: Friedman's test, Wilcoxon's signed-rank test for each pair with Holm's correction, effect sizes."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -9,8 +10,138 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pandas import DataFrame, Series
 
-from armid.study.analyses.drawing import INK, look, pyplot
-from armid.study.analyses.table import Column, Table
+from armid.report.document import Column, Figure, Part, Table, Text, slug
+from armid.report.style import INK, look, pyplot
+from armid.study.analyses.analysis import VARIANT, Analysis, Evidence
+
+Array = NDArray[np.float64]
+# Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
+FLOOR = 1e-8
+# A critical-difference diagram of fewer cases would say little.
+LEAST_CASES = 20
+INTRODUCTION = "How sure is it that one identifier is better than another on cases like these?"
+RANK_CAPTION = (
+    "Largest relative error of a run, median over the seeds: one number a case and identifier, so that a case is one "
+    "block and seeds are no false witnesses. Errors of 1e-6 % and below count as equal. Rank 1 is the best of a case; "
+    "the table shows the mean over the cases."
+)
+PAIRS_CAPTION = (
+    "Wilcoxon's signed-rank test of the logarithms of the same block values (two-sided, Pratt's rule for ties), "
+    "corrected after Holm over all {n} pairs of this setting. A12 is the probability that a run of the first has a "
+    "smaller error than a run of the second, over all runs, ties by half (Vargha and Delaney). With {n_cases} cases "
+    "the smallest p that the test can give before correction is {least:.2g}."
+)
+FIGURE_CAPTION = (
+    "Mean ranks over the cases. A bar joins identifiers of which no pair differs significantly at 5 % (Wilcoxon "
+    "signed-rank, Holm)."
+)
+
+
+def parts(evidence: Evidence) -> Sequence[Part]:
+    if not evidence.knows_truth or len(evidence.variants) < 2 or len(evidence.cases) < 2:
+        return ()
+    tables, figures = [], []
+    for setting in evidence.settings:
+        tests = rank_tests(evidence.of(setting))
+        if tests.n_cases < 2 or len(tests.ranks) < 2:
+            continue
+        end = "" if len(evidence.settings) == 1 else setting
+        tables += [mean_ranks(tests, setting, slug("ranks", end)), pairs(tests, setting, slug("pairs", end))]
+        if tests.n_cases >= LEAST_CASES and len(tests.ranks) > 2:
+            figures.append(critical_difference(tests, setting, slug("critical_difference", end)))
+    note = "" if figures else f" A critical-difference diagram wants {LEAST_CASES} cases or more."
+    return Text(INTRODUCTION + note), *tables, *figures
+
+
+RANKS = Analysis("ranks", "Ranks", parts, "which identifiers differ: Friedman, Wilcoxon with Holm, effect sizes")
+
+
+def critical_difference(tests: "RankTests", setting: str, name: str) -> Figure:
+    """Return the diagram of one setting."""
+    return Figure(name, f"Critical differences, {setting}", FIGURE_CAPTION,
+                  lambda: critical_difference_figure(tests, setting))  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class RankTests:
+    """The comparison of all variants on the same cases.
+
+    Attributes
+    ----------
+    blocks
+        Median over the seeds, one row a case and one column a variant.
+    ranks
+        Mean rank of each variant, 1 is best, rising.
+    friedman, p
+        Statistic, and probability that all variants are equal; NaN for fewer than 3 variants.
+    pairs
+        Columns first, second, n, p, p_holm, a12; one row a pair.
+    """
+
+    blocks: DataFrame
+    ranks: Series
+    friedman: float
+    p: float
+    pairs: DataFrame
+
+    @property
+    def n_cases(self) -> int:
+        """How many cases enter."""
+        return len(self.blocks)
+
+
+def rank_tests(runs: DataFrame) -> RankTests:
+    """Compare the largest errors of the variants of one setting on the cases that all of them ran.
+
+    A case is one block: its value is the median over the seeds, since seeds of one case are repeats and no independent
+    evidence about other cases. Errors below FLOOR count as equal to it. runs: outcomes of one setting.
+    Source: Demsar, J. Mach. Learn. Res. 7 (2006) 1.
+    """
+    raised = runs.assign(largest_error=runs["largest_error"].clip(lower=FLOOR))
+    medians = raised.groupby(["case", "variant"], sort=False)["largest_error"].median().unstack("variant")
+    blocks = medians.reindex(columns=list(dict.fromkeys(runs["variant"]))).dropna(axis=0)
+    statistic, p = friedman(blocks.to_numpy())
+    ranks = blocks.rank(axis=1).mean(axis=0).sort_values(kind="stable")
+    return RankTests(blocks, ranks, statistic, p, pair_tests(blocks, raised))
+
+
+def friedman(blocks: Array) -> tuple[float, float]:
+    """Return Friedman's statistic and its probability; NaN for under 3 variants or 2 cases, or if all are equal."""
+    from scipy.stats import friedmanchisquare
+
+    n_cases, n_variants = blocks.shape
+    if n_variants < 3 or n_cases < 2 or (blocks == blocks[:, :1]).all():
+        return np.nan, np.nan
+    found = friedmanchisquare(*blocks.T)
+    return float(found.statistic), float(found.pvalue)
+
+
+def pair_tests(blocks: DataFrame, runs: DataFrame) -> DataFrame:
+    """Return the tests of all pairs, Holm's correction over all of them."""
+    from statsmodels.stats.multitest import multipletests
+
+    samples = {v: g["largest_error"].to_numpy() for v, g in runs.groupby("variant", sort=False)}
+    rows = [
+        (a, b, len(blocks), signed_rank(blocks[a].to_numpy(), blocks[b].to_numpy()), a12(samples[a], samples[b]))
+        for a, b in combinations(blocks.columns, 2)
+    ]
+    pairs = DataFrame(rows, columns=["first", "second", "n", "p", "a12"])
+    corrected = multipletests(pairs["p"], method="holm")[1] if len(pairs) and len(blocks) else np.nan
+    return pairs.assign(p_holm=corrected)
+
+
+def signed_rank(first: Array, second: Array) -> float:
+    """Return the two-sided probability of Wilcoxon's signed-rank test; 1 when no pair differs.
+
+    Differences are taken between the logarithms, since errors span many powers of ten, zero and infinity counting as
+    the ends of all floats; Pratt's rule for ties.
+    """
+    from scipy.stats import wilcoxon
+
+    ends = np.finfo(np.float64)
+    x, y = (np.log(np.clip(v, ends.tiny, ends.max)) for v in (first, second))
+    differences = np.where(first == second, 0.0, x - y)
+    return float(wilcoxon(differences, zero_method="pratt").pvalue) if differences.any() else 1.0
 
 
 def a12(first: ArrayLike, second: ArrayLike) -> float:
@@ -37,138 +168,18 @@ def size_in_words(value: float) -> str:
     return "large"
 
 
-Array = NDArray[np.float64]
-# Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
-FLOOR = 1e-8
-
-
-@dataclass(frozen=True, eq=False)
-class RankTests:
-    """Hold the comparison of all variants on the same cases.
-
-    blocks: median over the seeds, one row a case and one column a variant; ranks: mean rank of each variant, 1 is best;
-    friedman, p: statistic and probability that all variants are equal (NaN for fewer than 3 variants);
-    pairs: first, second, n, p, p_holm, a12, one row a pair.
-    """
-
-    blocks: DataFrame
-    ranks: Series
-    friedman: float
-    p: float
-    pairs: DataFrame
-
-    @property
-    def n_cases(self) -> int:
-        """How many cases enter."""
-        return len(self.blocks)
-
-
-def rank_tests(found: DataFrame, measure: str = "largest_error", floor: float = FLOOR) -> RankTests:
-    """Compare the variants of one setting on the cases that all of them ran.
-
-    A case is one block: its value is the median over the seeds, since seeds of one case are repeats and no independent
-    evidence about other cases. found: outcomes of runs of one setting; measure: the column to compare, smaller is
-    better; floor: values below it count as equal to it. Source: Demsar, J. Mach. Learn. Res. 7 (2006) 1.
-    """
-    raised = found.assign(**{measure: found[measure].clip(lower=floor)})
-    blocks = case_medians(raised, measure)
-    statistic, p = friedman(blocks.to_numpy())
-    ranks = blocks.rank(axis=1).mean(axis=0)
-    return RankTests(blocks, ranks.sort_values(kind="stable"), statistic, p, pair_tests(blocks, raised, measure))
-
-
-def case_medians(found: DataFrame, measure: str) -> DataFrame:
-    """Return the median over the seeds, case by variant, of the cases that every variant ran."""
-    order = list(dict.fromkeys(found["variant"]))
-    medians = found.groupby(["case", "variant"], sort=False)[measure].median().unstack("variant")
-    return medians.reindex(columns=order).dropna(axis=0)
-
-
-def friedman(blocks: Array) -> tuple[float, float]:
-    """Return Friedman's statistic and its probability; NaN for under 3 variants or 2 cases, or if all are equal."""
-    from scipy.stats import friedmanchisquare
-
-    n_cases, n_variants = blocks.shape
-    if n_variants < 3 or n_cases < 2 or (blocks == blocks[:, :1]).all():
-        return np.nan, np.nan
-    found = friedmanchisquare(*blocks.T)
-    return float(found.statistic), float(found.pvalue)
-
-
-def pair_tests(blocks: DataFrame, found: DataFrame, measure: str) -> DataFrame:
-    """Return the tests of all pairs, Holm's correction over all of them."""
-    from statsmodels.stats.multitest import multipletests
-
-    samples = {v: g[measure].to_numpy() for v, g in found.groupby("variant", sort=False)}
-    rows = [
-        (a, b, len(blocks), signed_rank(blocks[a].to_numpy(), blocks[b].to_numpy()), a12(samples[a], samples[b]))
-        for a, b in combinations(blocks.columns, 2)
-    ]
-    pairs = DataFrame(rows, columns=["first", "second", "n", "p", "a12"])
-    corrected = multipletests(pairs["p"], method="holm")[1] if len(pairs) and len(blocks) else np.nan
-    return pairs.assign(p_holm=corrected)
-
-
-def signed_rank(first: Array, second: Array) -> float:
-    """Return the two-sided probability of Wilcoxon's signed-rank test; 1 when no pair differs.
-
-    Differences are taken between the logarithms, since errors span many powers of ten; Pratt's rule for ties.
-    """
-    from scipy.stats import wilcoxon
-
-    differences = log_difference(first, second)
-    if not differences.any():
-        return 1.0
-    return float(wilcoxon(differences, zero_method="pratt").pvalue)
-
-
-def log_difference(first: Array, second: Array) -> Array:
-    """Return log(first/second), 0 for equal ones; zero and infinity count as the ends of all floats."""
-    ends = np.finfo(np.float64)
-    x, y = (np.log(np.clip(v, ends.tiny, ends.max)) for v in (first, second))
-    return np.where(first == second, 0.0, x - y)
-
-
-def p_matrix(tests: RankTests) -> DataFrame:
-    """Return Holm's probabilities as a symmetric table, 1 on the diagonal."""
-    names = list(tests.blocks.columns)
-    place = {name: i for i, name in enumerate(names)}
-    matrix = np.ones((len(names), len(names)))
-    first, second = (tests.pairs[key].map(place).to_numpy(int) for key in ("first", "second"))
-    matrix[first, second] = matrix[second, first] = tests.pairs["p_holm"].to_numpy(float)
-    return DataFrame(matrix, index=names, columns=names)
-
-
-WORDS = (
-    "Largest relative error of a run, median over the seeds: one number a case and identifier, so that a case is one "
-    "block and seeds are no false witnesses. Errors of 1e-6 % and below count as equal. Rank 1 is the best of a case; "
-    "the table shows the mean over the cases."
-)
-PAIR_WORDS = (
-    "Wilcoxon's signed-rank test of the logarithms of the same block values (two-sided, Pratt's rule for ties), "
-    "corrected after Holm over all {n} pairs of this setting. A12 is the probability that a run of the first has a "
-    "smaller error than a run of the second, over all runs, ties by half (Vargha and Delaney). With {n_cases} cases "
-    "the smallest p that the test can give before correction is {least:.2g}."
-)
-
-
 def mean_ranks(tests: RankTests, setting: str, name: str) -> Table:
     """Return the mean rank and the median of the block values of each variant."""
-    frame = DataFrame({
-        "variant": tests.ranks.index, "rank": tests.ranks.to_numpy(),
-        "median": tests.blocks[tests.ranks.index].median().to_numpy(),
-    })  # fmt: skip
-    columns = (
-        Column("variant", "identifier"), Column("rank", "mean rank", ".2f"),
-        Column("median", "median of the cases [%]", ".3g", 100.0),
-    )  # fmt: skip
-    return Table(name, f"Mean ranks over {tests.n_cases} cases, {setting}", f"{WORDS} {friedman_words(tests)}", frame,
-                 columns)  # fmt: skip
+    medians = tests.blocks[tests.ranks.index].median()
+    frame = DataFrame({"variant": tests.ranks.index, "rank": tests.ranks.to_numpy(), "median": medians.to_numpy()})
+    columns = (VARIANT, Column("rank", "mean rank", ".2f"), Column("median", "median of the cases [%]", ".3g", 100.0))
+    title = f"Mean ranks over {tests.n_cases} cases, {setting}"
+    return Table(name, title, f"{RANK_CAPTION} {friedman_sentence(tests)}", frame, columns)
 
 
-def friedman_words(tests: RankTests) -> str:
+def friedman_sentence(tests: RankTests) -> str:
     """Return what Friedman's test says."""
-    if tests.p != tests.p:
+    if np.isnan(tests.p):
         return "Friedman's test needs at least three identifiers that differ and two cases."
     verdict = "differ" if tests.p < 0.05 else "cannot be told apart"
     degrees = len(tests.ranks) - 1
@@ -179,17 +190,24 @@ def pairs(tests: RankTests, setting: str, name: str) -> Table:
     """Return the tests of all pairs, those with the best-ranked identifier first."""
     best = tests.ranks.index[0]
     frame = tests.pairs.assign(size=tests.pairs["a12"].map(size_in_words))
-    with_best = (frame["first"] == best) | (frame["second"] == best)
-    frame = frame.assign(_first=~with_best).sort_values(["_first", "p_holm"], kind="stable").drop(columns="_first")
-    words = PAIR_WORDS.format(n=len(frame), n_cases=tests.n_cases, least=2.0 ** (1 - tests.n_cases))
+    without_best = (frame["first"] != best) & (frame["second"] != best)
+    frame = frame.assign(_last=without_best).sort_values(["_last", "p_holm"], kind="stable").drop(columns="_last")
+    caption = PAIRS_CAPTION.format(n=len(frame), n_cases=tests.n_cases, least=2.0 ** (1 - tests.n_cases))
     columns = (
         Column("first", "first"), Column("second", "second"), Column("n", "cases", ".0f"), Column("p", "p", ".2g"),
         Column("p_holm", "p, Holm", ".2g"), Column("a12", "A12", ".2f"), Column("size", "difference"),
     )  # fmt: skip
-    return Table(name, f"Pairs, {setting}", words, frame, columns, most=max(20, len(tests.ranks) - 1))
+    return Table(name, f"Pairs, {setting}", caption, frame, columns, most=max(20, len(tests.ranks) - 1))
 
 
-LEAST_CASES = 20
+def p_matrix(tests: RankTests) -> DataFrame:
+    """Return Holm's probabilities as a symmetric table, 1 on the diagonal."""
+    names = list(tests.blocks.columns)
+    place = {name: i for i, name in enumerate(names)}
+    matrix = np.ones((len(names), len(names)))
+    first, second = (tests.pairs[key].map(place).to_numpy(int) for key in ("first", "second"))
+    matrix[first, second] = matrix[second, first] = tests.pairs["p_holm"].to_numpy(float)
+    return DataFrame(matrix, index=names, columns=names)
 
 
 def critical_difference_figure(tests: RankTests, setting: str) -> Any:

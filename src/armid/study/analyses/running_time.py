@@ -1,18 +1,70 @@
-"""Expected running time: what one success costs when a method is started again until it has one."""
+"""Cost of the truth: simulations until the parameters are within a tolerance of it.
 
-from collections.abc import Mapping
+The expected running time is what one success costs when a method is started again until it has one.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pandas import DataFrame
 
-from armid.study.analyses.drawing import listed_lines, panel_height, panels
-from armid.study.analyses.histories import ERROR_TARGETS, SHARES_LEFT, VALUE_TARGETS
+from armid.report.document import Column, Figure, Part, Table
+from armid.report.style import panels
+from armid.study.analyses.analysis import N_RUNS, SETTING, VARIANT, Analysis, Evidence
+from armid.study.analyses.drawing import listed_lines, named_lines, panel_height
 from armid.study.analyses.success import TOLERANCES
-from armid.study.analyses.table import Column, Table
+from armid.study.traces import TARGETS
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
+# Said of both targets, see best_fitness.py too.
+CAPTION = (
+    "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
+    "runs that hit it), over all cases and seeds; inf where no run hits it. In brackets the share of runs that hit. "
+    "{target} A run that hits a target may leave it again, since the fitness and not the error decides what is best: "
+    "hits can exceed the success rates, which judge the end."
+)
+TARGET = "Target: the largest relative error of the best candidate so far is at the tolerance or below."
+ECDF_CAPTION = (
+    "Share of all pairs of a run and a target that are hit within so many simulations. The 51 targets are largest "
+    "relative errors of the parameters, evenly spread in their logarithm from 100 % to 1e-8 %; a target is hit when "
+    "the best candidate so far (by fitness) is first that near to the truth. Names stand in the order in which the "
+    "lines end; a run that stops early stays where it ended."
+)
+FIGURE_CAPTION = (
+    "Simulations that one success costs on average when a method is started again until it has one: those of all runs "
+    "until the target is first hit (all that were used where it is not), divided by the number of runs that hit. A "
+    "line ends at the strictest target that any run hit; names are listed from the strictest one on."
+)
+
+
+def parts(evidence: Evidence) -> Sequence[Part]:
+    if not evidence.knows_truth:
+        return ()
+    hits = evidence.histories.error_hits
+    shown = {f"{100 * t:g} %": t for t in TOLERANCES}
+    label = "largest relative error of the best candidate [%]"
+    title = "Expected running time to the truth [simulations]"
+    return (
+        running_time(evidence, hits, shown, "running_time", title, TARGET),
+        Figure("ecdf", "ECDF over targets", ECDF_CAPTION, lambda: ecdf_figure(evidence)),
+        Figure("running_time", "Expected running time", FIGURE_CAPTION,
+               lambda: running_time_figure(evidence, hits, 100.0 * TARGETS, label)),
+    )  # fmt: skip
+
+
+RUNNING_TIME = Analysis("running_time", "Cost of the truth", parts, "simulations until the parameters are right")
+
+
+def share_hit(hits: Array, grid: NDArray[np.int64]) -> Array:
+    """Return the share of (run, target) pairs that are hit within each number of simulations, (n_grid,).
+
+    F(e) = #{(r, t) : h_rt <= e} / (n_runs n_targets). hits: (n_runs, n_targets), infinite for never;
+    grid: simulations, (n_grid,). Runs are not restarted in thought: what ends early stays where it ended.
+    Source: Hansen et al., arXiv:1605.03560, section 5.
+    """
+    return np.searchsorted(np.sort(hits, axis=None), grid, side="right") / hits.size
 
 
 def expected_running_time(hits: Array, used: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -29,104 +81,66 @@ def expected_running_time(hits: Array, used: Array) -> tuple[Array, NDArray[np.i
     return ert, successes
 
 
-WORDS = (
-    "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
-    "runs that hit it), over all cases and seeds; inf where no run hits it. In brackets the share of runs that hit. "
-    "{target} A run that hits a target may leave it again, since the fitness and not the error decides what is best: "
-    "hits can exceed the success rates, which judge the end."
-)
-OF_ERRORS = "Target: the largest relative error of the best candidate so far is at the tolerance or below."
-OF_VALUES = (
-    "Target: of the way from a first candidate (median of the first fitness of all runs on the case) to the best "
-    "fitness that any identifier found on the same case, noise and seed, no more than this share is left. Where "
-    "several fitnesses were run, each is compared with its own kind."
-)
+def running_time(
+    evidence: Evidence, hits: Array, shown: Mapping[str, float], name: str, title: str, target: str
+) -> Table:
+    """Return the expected running time to some targets, one line a setting and variant.
 
-
-def running_time(found: DataFrame, error_hits: np.ndarray) -> Table:
-    """Return the expected running time to errors of 1, 0.1 and 0.01 %.
-
-    found: outcomes of runs; error_hits: first hits of ERROR_TARGETS, (n_runs, n_targets).
+    hits: first hits of TARGETS, (n_runs, n_targets). shown: heading -> target. target: what it is, in words.
     """
-    shown = {f"{100 * t:g} %": index_of(ERROR_TARGETS, t) for t in TOLERANCES}
-    words = WORDS.format(target=OF_ERRORS)
-    return table("running_time", "Expected running time to the truth [simulations]", words, found, error_hits, shown)
-
-
-def fixed_target(found: DataFrame, value_hits: np.ndarray) -> Table:
-    """Return the expected running time to shares of the way to the best known fitness.
-
-    found: outcomes of runs; value_hits: first hits of VALUE_TARGETS, (n_runs, n_targets).
-    """
-    shown = {f"{t:g} left": index_of(VALUE_TARGETS, t) for t in SHARES_LEFT}
-    words = WORDS.format(target=OF_VALUES)
-    title = "Expected running time to the best known fitness [simulations]"
-    return table("fixed_target", title, words, found, value_hits, shown)
-
-
-def index_of(targets: np.ndarray, wanted: float) -> int:
-    """Return the number of a target that is among them."""
-    return int(np.flatnonzero(np.isclose(targets, wanted, rtol=1e-9, atol=0.0))[0])
-
-
-def table(name: str, title: str, words: str, found: DataFrame, hits: np.ndarray, shown: dict[str, int]) -> Table:
-    """Return a table of expected running times, one line a setting and variant."""
+    places = {text: int(np.flatnonzero(np.isclose(TARGETS, t, rtol=1e-9, atol=0.0))[0]) for text, t in shown.items()}
     rows = []
-    keys = ["setting", "variant"]
-    for key, own in found.reset_index(drop=True).groupby(keys, sort=False):
-        places = own.index.to_numpy()
-        row: dict[str, object] = dict(zip(keys, key, strict=True)) | {"n": len(places)}
-        ert, successes = expected_running_time(hits[places], own["used"].to_numpy(float))
-        for text, i in shown.items():
+    for (setting, variant), group in evidence.runs.groupby(["setting", "variant"], sort=False):
+        own = group.index.to_numpy()
+        ert, successes = expected_running_time(hits[own], evidence.used[own])
+        row: dict[str, object] = {"setting": setting, "variant": variant, "n": len(own)}
+        for text, i in places.items():
             row |= {f"ert {text}": ert[i], f"hits {text}": successes[i]}
-            row[text] = f"{ert[i]:.0f} ({100 * successes[i] / len(places):.0f} %)"
+            row[text] = f"{ert[i]:.0f} ({100 * successes[i] / len(own):.0f} %)"
         rows.append(row)
-    first = (Column("setting", "noise"), Column("variant", "identifier"), Column("n", "runs", ".0f"))
-    return Table(name, title, words, DataFrame(rows), (*first, *(Column(text, text) for text in shown)))
+    columns = (SETTING, VARIANT, N_RUNS, *(Column(text, text) for text in shown))
+    return Table(name, title, CAPTION.format(target=target), DataFrame(rows), columns)
 
 
-Hits = tuple[np.ndarray, np.ndarray]
-
-
-def running_time_figure(
-    groups: Mapping[str, Mapping[str, Hits]], targets: np.ndarray, order: Mapping[str, int], label: str
-) -> Any:
-    """Draw one panel a setting and one line a variant; a line ends where no run hits the target.
-
-    Names are listed from the strictest target reached.
-
-    groups: setting -> variant -> (first hits, (n_runs, n_targets); simulations used, (n_runs,)); targets: falling,
-    (n_targets,), as shown; label: of the axis of targets.
-    """
-    figure, axes = panels(len(groups), 2, 7.8, panel_height(len(order)))
-    for axis, (setting, variants) in zip(axes, groups.items(), strict=True):
-        axis.set_xscale("log")
-        axis.set_yscale("log")
-        lines = {v: np.where(np.isfinite(e), e, np.nan) for v, e in running_times(variants).items()}
-        axis.set_xlim(targets[0], targets[-1])
-        axis.set_ylim(*limits(lines))
-        listed_lines(axis, targets, lines, order, sorted(lines, key=lambda v: farthest(lines[v])))
-        axis.set_title(setting)
-        axis.set_xlabel(label)
-        axis.set_ylabel("expected running time [simulations]")
+def ecdf_figure(evidence: Evidence) -> Any:
+    """Draw the shares of targets hit against simulations, one panel a setting and one line a variant."""
+    kept = evidence.histories
+    figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
+    for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
+        axis.set(xscale="log", ylim=(0.0, 1.0))
+        lines = {v: share_hit(kept.error_hits[rows], kept.grid) for v, rows in variants.items()}
+        named_lines(axis, kept.grid, lines, evidence.colours)
+        axis.set(title=setting, xlabel="simulations", ylabel="share of (run, target) pairs hit")
         axis.grid(alpha=0.3)
     return figure
 
 
-def running_times(variants: Mapping[str, Hits]) -> dict[str, np.ndarray]:
-    """Return the expected running time of each variant to each target."""
-    return {variant: expected_running_time(hits, used)[0] for variant, (hits, used) in variants.items()}
+def running_time_figure(evidence: Evidence, hits: Array, targets: Array, label: str) -> Any:
+    """Draw one panel a setting and one line a variant; a line ends where no run hits the target.
+
+    Names are listed from the strictest target reached. hits: first hits, (n_runs, n_targets); targets: falling,
+    (n_targets,), as shown; label: of the axis of targets.
+    """
+    figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
+    for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
+        lines = {v: expected_running_time(hits[rows], evidence.used[rows])[0] for v, rows in variants.items()}
+        lines = {v: np.where(np.isfinite(ert), ert, np.nan) for v, ert in lines.items()}
+        axis.set(xscale="log", yscale="log", xlim=(targets[0], targets[-1]), ylim=powers_around(lines.values()))
+        listed_lines(axis, targets, lines, evidence.colours, sorted(lines, key=lambda v: strictest(lines[v])))
+        axis.set(title=setting, xlabel=label, ylabel="expected running time [simulations]")
+        axis.grid(alpha=0.3)
+    return figure
 
 
-def farthest(line: np.ndarray) -> tuple[int, float]:
+def strictest(line: Array) -> tuple[int, float]:
     """Return what sorts lines: how many targets are not reached, then the running time to the last that is."""
-    reached = np.isfinite(line)
-    return int(np.count_nonzero(~reached)), float(line[reached][-1]) if reached.any() else np.inf
+    reached = line[np.isfinite(line)]
+    return line.size - reached.size, float(reached[-1]) if reached.size else np.inf
 
 
-def limits(lines: Mapping[str, np.ndarray]) -> tuple[float, float]:
-    """Return the range of the upright axis: powers of ten around all that is finite."""
-    finite = np.concatenate([y[np.isfinite(y)] for y in lines.values()] or [np.ones(1)])
+def powers_around(lines: Iterable[Array]) -> tuple[float, float]:
+    """Return the powers of ten around all numbers that are finite."""
+    finite = np.concatenate([y[np.isfinite(y)] for y in lines])
     if not finite.size:
         return 1.0, 10.0
     return 10.0 ** np.floor(np.log10(finite.min())), 10.0 ** np.ceil(np.log10(finite.max()) + 1e-9)

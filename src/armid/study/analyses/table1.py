@@ -1,40 +1,30 @@
-"""Where a published error falls among ours."""
+"""Table I of the paper beside ours: where a published error falls among the errors of our runs."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pandas import DataFrame
 
-from armid.study.analyses.drawing import COLOURS, panels
-from armid.study.analyses.histories import median_interval
-from armid.study.analyses.table import Column, Table
+from armid.report.document import Column, Figure, Part, Table, Text, slug, unlike
+from armid.report.style import COLOURS, panels
+from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence
+from armid.study.analyses.drawing import legend_below, row_names
 from armid.units import SHOWN
 
-
-def percentile_among(errors: ArrayLike, published: float) -> float:
-    """Return the percentage of errors below a published one, equal ones by half; NaN for an empty sample.
-
-    10 says that one in ten of our runs was better than the published result. errors: (n,), infinite ones allowed.
-    """
-    from scipy.stats import percentileofscore
-
-    sample = np.asarray(errors, np.float64)
-    return float(percentileofscore(sample, published, kind="mean")) if sample.size else np.nan
-
-
+Array = NDArray[np.float64]
 MEAN_ROW = "mean of the rows"
 COLUMNS = (
-    Column("case", "row"), Column("parameter", "parameter"), Column("unit", "unit"), Column("truth", "truth", ".4f"),
+    Column("case", "row"), PARAMETER, Column("unit", "unit"), Column("truth", "truth", ".4f"),
     Column("published", "paper", ".4f"), Column("median", "ours (median)", ".4f"),
     Column("published_error", "paper's error [%]", ".3f", 100.0),
     Column("error_of_median", "error of our median [%]", ".3g", 100.0),
     Column("median_error", "our median error [%]", ".3g", 100.0), Column("low", "95 % from [%]", ".3g", 100.0),
     Column("high", "to [%]", ".3g", 100.0), Column("mean_error", "our mean error [%]", ".3g", 100.0),
-    Column("percentile", "paper's error lies at [percentile of ours]", ".0f"), Column("n", "runs", ".0f"),
+    Column("percentile", "paper's error lies at [percentile of ours]", ".0f"), N_RUNS,
 )  # fmt: skip
-WORDS = (
+TABLE_CAPTION = (
     "truth and paper: Table I as printed. ours: median over the seeds. Errors are abs(value - truth)/truth: of our "
     "median, and the median and mean over the seeds with a 95 % percentile bootstrap interval of the median (2000 "
     "resamples). The percentile says which share of our runs has a smaller error than the paper's value on that row "
@@ -43,6 +33,38 @@ WORDS = (
     "over rows and seeds). Ours is synthetic: simulated from the truth with the constants of an estimated arm, since "
     "the paper prints none."
 )
+FIGURE_CAPTION = (
+    "Relative error [%] on a logarithmic axis, all rows and seeds together: the box spans the quartiles, the thick "
+    "line is the median, the whiskers reach from the 5th to the 95th percentile, dots are the runs beyond. Diamonds "
+    "are the paper's errors on its rows, the dashed line is their mean. Errors below 1e-9 % are drawn there."
+)
+# Smaller errors are drawn there [%].
+FLOOR = 1e-9
+RESAMPLES = 2000
+# Numbers that a batch of resamples may hold at once.
+BATCH_NUMBERS = 4_000_000
+
+
+def parts(evidence: Evidence) -> Sequence[Part]:
+    if evidence.study.get("report") != "table1" or evidence.published.empty:
+        return ()
+    rows = table1_rows(evidence.estimates, evidence.published)
+    if rows.empty:
+        return ()
+    wanted = [(s, v) for v in evidence.interesting for s in evidence.settings if v in evidence.groups[s]]
+    names = unlike([slug("table1", v, s) for s, v in wanted])
+    order = [v for v in evidence.best_first if v in set(evidence.estimates["variant"])]
+    return (
+        Text(f"Shown for {', '.join(evidence.interesting)}: the swarm in every form that was run, then the best of the "
+             "others by the rank of their median largest error. All identifiers are in table1.csv."),
+        *(table1(rows, s, v, name) for (s, v), name in zip(wanted, names, strict=True)),
+        table1_all(rows),
+        Figure("table1", "Errors on Table I beside the paper's", FIGURE_CAPTION,
+               lambda: table1_figure(evidence.estimates, evidence.published, order)),
+    )  # fmt: skip
+
+
+TABLE1 = Analysis("table1", "Table I of the paper beside ours", parts, "row by row, where the study asks for it")
 
 
 def table1_rows(estimates: DataFrame, published: DataFrame) -> DataFrame:
@@ -87,7 +109,7 @@ def with_means(rows: DataFrame) -> DataFrame:
 def table1(rows: DataFrame, setting: str, variant: str, name: str) -> Table:
     """Return the table of one variant under one setting, in the units that people read."""
     chosen = rows[(rows["setting"] == setting) & (rows["variant"] == variant)]
-    return Table(name, f"Table I beside ours: {variant}, {setting}", WORDS, in_shown_units(chosen), COLUMNS)
+    return Table(name, f"Table I beside ours: {variant}, {setting}", TABLE_CAPTION, in_shown_units(chosen), COLUMNS)
 
 
 def in_shown_units(rows: DataFrame) -> DataFrame:
@@ -99,12 +121,46 @@ def in_shown_units(rows: DataFrame) -> DataFrame:
 
 def table1_all(rows: DataFrame) -> Table:
     """Return every variant and setting in one table, for the CSV file."""
-    both = (Column("setting", "noise"), Column("variant", "identifier"))
     title = "Table I beside ours: all identifiers"
-    return Table("table1", title, WORDS, in_shown_units(rows), (*both, *COLUMNS), most=0)
+    return Table("table1", title, TABLE_CAPTION, in_shown_units(rows), (SETTING, VARIANT, *COLUMNS), most=0)
 
 
-FLOOR = 1e-9
+def percentile_among(errors: ArrayLike, published: float) -> float:
+    """Return the percentage of errors below a published one, equal ones by half; NaN for an empty sample.
+
+    10 says that one in ten of our runs was better than the published result. errors: (n,), infinite ones allowed.
+    """
+    from scipy.stats import percentileofscore
+
+    sample = np.asarray(errors, np.float64)
+    return float(percentileofscore(sample, published, kind="mean")) if sample.size else np.nan
+
+
+def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) -> tuple[float, float]:
+    """Return the percentile bootstrap interval of the median of a sample, 2000 resamples.
+
+    values: (n,), infinite ones allowed; seed: of the resampling, so that the same sample gives the same interval.
+    A sample of fewer than two gives NaN. Source: Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 13.
+    """
+    from scipy.stats import bootstrap
+
+    sample = np.sort(np.asarray(values, np.float64))
+    if sample.size < 2:
+        return np.nan, np.nan
+    # ranks instead of values where some are infinite: the bootstrap subtracts, and inf - inf is no number
+    finite = bool(np.isfinite(sample).all())
+    resampled = sample if finite else np.arange(sample.size, dtype=np.float64)
+    found = bootstrap(
+        (resampled,), np.median, n_resamples=RESAMPLES, batch=max(1, BATCH_NUMBERS // sample.size),
+        confidence_level=confidence, method="percentile", rng=np.random.default_rng(seed),
+    ).confidence_interval  # fmt: skip
+    low, high = float(found.low), float(found.high)
+    return (low, high) if finite else (at_rank(sample, low), at_rank(sample, high))
+
+
+def at_rank(ordered: Array, rank: float) -> float:
+    """Return the value at a rank of an ordered sample, between two values their mean."""
+    return float((ordered[int(np.floor(rank))] + ordered[int(np.ceil(rank))]) / 2.0)
 
 
 def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence[str]) -> Any:
@@ -113,6 +169,8 @@ def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence
     estimates: one row a run and parameter; published: the paper's values with their errors; variants: top to bottom.
     The box spans the quartiles, the whiskers the 5th to the 95th percentile, dots are the runs beyond.
     """
+    from matplotlib.lines import Line2D
+
     names = [n for n in dict.fromkeys(published["parameter"]) if n in set(estimates["parameter"])]
     settings = list(dict.fromkeys(estimates["setting"]))
     figure, axes = panels(len(names), 2, 6.8, 1.5 + (0.16 + 0.19 * len(settings)) * len(variants))
@@ -120,11 +178,16 @@ def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence
         own = estimates[estimates["parameter"] == name]
         for j, setting in enumerate(settings):
             draw_boxes(axis, own[own["setting"] == setting], variants, j, len(settings))
-        draw_paper(axis, 100.0 * published.loc[published["parameter"] == name, "relative_error"].to_numpy())
-        axis.set_yticks(range(len(variants)), variants if i % 2 == 0 else [""] * len(variants))
+        errors = 100.0 * published.loc[published["parameter"] == name, "relative_error"].to_numpy()
+        axis.axvline(errors.mean(), color="black", lw=1.2, ls="--", zorder=0)
+        axis.plot(np.maximum(errors, FLOOR), np.full(errors.size, -0.5), "D", color="black", ms=5, clip_on=False,
+                  zorder=5)  # fmt: skip
+        row_names(axis, i, variants)
         axis.set(xscale="log", ylim=(len(variants) - 0.4, -0.6), title=name, xlabel="relative error [%]")
         axis.grid(axis="x", alpha=0.3)
-    name_colours(figure, settings)
+    handles = [Line2D([], [], color=COLOURS[j % 7], lw=3, label=f"ours, {s}") for j, s in enumerate(settings)]
+    paper = "the paper: its rows, and their mean"
+    legend_below(figure, 3, [*handles, Line2D([], [], color="black", marker="D", ls="--", lw=1.2, label=paper)])
     return figure
 
 
@@ -141,19 +204,3 @@ def draw_boxes(axis: Any, own: DataFrame, variants: Sequence[str], j: int, n: in
         manage_ticks=False, medianprops={"color": colour, "lw": 2.4}, boxprops=line, whiskerprops=line, capprops=line,
         flierprops={"marker": ".", "ms": 2.5, "mfc": colour, "mec": "none", "alpha": 0.6},
     )  # fmt: skip
-
-
-def draw_paper(axis: Any, errors: np.ndarray) -> None:
-    """Draw the paper's errors as diamonds on top, and their mean as a line through all."""
-    axis.axvline(errors.mean(), color="black", lw=1.2, ls="--", zorder=0)
-    axis.plot(np.maximum(errors, FLOOR), np.full(errors.size, -0.5), "D", color="black", ms=5, clip_on=False, zorder=5)
-
-
-def name_colours(figure: Any, settings: Sequence[str]) -> None:
-    """Write one legend below all panels."""
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], color=COLOURS[j % 7], lw=3, label=f"ours, {s}") for j, s in enumerate(settings)]
-    paper = "the paper: its rows, and their mean"
-    handles.append(Line2D([], [], color="black", marker="D", ls="--", lw=1.2, label=paper))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)

@@ -1,4 +1,4 @@
-"""Mean and spread of repeated identifications."""
+"""Table II of the paper beside ours: mean and spread of repeated identifications."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -7,41 +7,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pandas import DataFrame
 
-from armid.study.analyses.drawing import COLOURS, MARKERS, panels
-from armid.study.analyses.table import Column, Table
+from armid.report.document import Column, Figure, Part, Table
+from armid.report.style import COLOURS, MARKERS, panels
+from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, VARIANT, Analysis, Evidence
+from armid.study.analyses.drawing import legend_below, row_names
 from armid.units import SHOWN
 
-
-class Spread(NamedTuple):
-    """Number, mean and population standard deviation of a sample."""
-
-    n: int
-    mean: float
-    deviation: float
-
-
-def spread(values: ArrayLike) -> Spread:
-    """Return n, mean and population standard deviation sqrt(mean (x - mean)^2), which is what the paper's Table II
-    prints as "mean square error"; NaN for an empty sample.
-
-    values: (n,).
-    """
-    sample = np.asarray(values, np.float64)
-    if not sample.size:
-        return Spread(0, np.nan, np.nan)
-    return Spread(sample.size, float(sample.mean()), float(sample.std(ddof=0)))
-
-
-PAPER = "the paper's pso"
 COLUMNS = (
-    Column("setting", "noise, window"), Column("variant", "identifier"), Column("parameter", "parameter"),
-    Column("unit", "unit"), Column("truth", "truth", ".4f"), Column("n", "runs", ".0f"), Column("mean", "mean", ".4f"),
+    Column("setting", "noise, window"), VARIANT, PARAMETER,
+    Column("unit", "unit"), Column("truth", "truth", ".4f"), N_RUNS, Column("mean", "mean", ".4f"),
     Column("deviation", "standard deviation", ".2g"), Column("between", "between records", ".2g"),
     Column("within", "within a record", ".2g"), Column("bound", "Cramer-Rao", ".2g"), Column("low", "low", ".4g"),
     Column("high", "high", ".4g"), Column("n_at_bound", "at a bound", ".0f"),
 )  # fmt: skip
 IN_UNIT = ("truth", "mean", "deviation", "between", "within", "bound", "low", "high")
-WORDS = (
+TABLE_CAPTION = (
     "mean and standard deviation: over all runs (records and repeats together); standard deviations are those of the "
     "population, sqrt(mean (x - mean)^2), which is what the paper calls mean square error. between records: of the "
     "means of the records, which the noise of the records makes; within a record: root mean square over the records "
@@ -52,6 +32,23 @@ WORDS = (
     "computed from its five printed identifications of a real arm; ours are of records whose truth is known (a test "
     "stand's, synthetic), so the two need not agree."
 )
+FIGURE_CAPTION = (
+    "Result of each run, one mark and colour a record; the paper's identifications of its measured records above as "
+    "diamonds. The line is the truth of the synthetic records, the grey band the truth +- one Cramer-Rao standard "
+    "deviation of one record (median over the runs), dotted lines are bounds of the box."
+)
+
+
+def parts(evidence: Evidence) -> Sequence[Part]:
+    estimates, published = evidence.estimates, evidence.published
+    if evidence.study.get("report") != "table2" or estimates.empty:
+        return ()
+    figure = Figure("table2", "Repeated identifications beside the paper's", FIGURE_CAPTION,
+                    lambda: table2_figure(estimates, published))  # fmt: skip
+    return table2(estimates, published), table2_records(estimates), figure
+
+
+TABLE2 = Analysis("table2", "Table II of the paper beside ours", parts, "mean and spread, where the study asks for it")
 
 
 def table2(estimates: DataFrame, published: DataFrame) -> Table:
@@ -70,7 +67,7 @@ def table2(estimates: DataFrame, published: DataFrame) -> Table:
     factor = frame["parameter"].map(lambda p: SHOWN.get(units[p], ("", 1.0))[1])
     shown = {key: frame[key] * factor for key in IN_UNIT}
     frame = frame.assign(**shown, unit=frame["parameter"].map(lambda p: SHOWN.get(units[p], (units[p], 1.0))[0]))
-    return Table("table2", "Table II beside ours", WORDS, frame[[c.key for c in COLUMNS]], COLUMNS)
+    return Table("table2", "Table II beside ours", TABLE_CAPTION, frame[[c.key for c in COLUMNS]], COLUMNS)
 
 
 def paper_row(name: str, values: np.ndarray, box: DataFrame) -> dict[str, object]:
@@ -106,36 +103,62 @@ def table2_records(estimates: DataFrame) -> Table:
         for k, g in estimates.groupby(keys, sort=False)
     ]  # fmt: skip
     columns = (*(Column(k, k) for k in keys), *(Column(k, k, ".6g") for k in ("n", "mean", "deviation", "bound")))
-    return Table("table2_records", "Table II, record by record", WORDS, DataFrame(rows), columns, most=0)
+    return Table("table2_records", "Table II, record by record", TABLE_CAPTION, DataFrame(rows), columns, most=0)
+
+
+class Spread(NamedTuple):
+    """Number, mean and population standard deviation of a sample."""
+
+    n: int
+    mean: float
+    deviation: float
+
+
+def spread(values: ArrayLike) -> Spread:
+    """Return n, mean and population standard deviation sqrt(mean (x - mean)^2), which is what the paper's Table II
+    prints as "mean square error"; NaN for an empty sample.
+
+    values: (n,).
+    """
+    sample = np.asarray(values, np.float64)
+    if not sample.size:
+        return Spread(0, np.nan, np.nan)
+    return Spread(sample.size, float(sample.mean()), float(sample.std(ddof=0)))
 
 
 def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
     """Draw one panel a parameter: the result of each run, a mark and colour a record, lines by identifier and setting.
 
     estimates: one row a run and parameter; published: the paper's identifications, one row a record and parameter, SI.
-    The grey band is the truth +- the Cramer-Rao bound of one record, dashed lines are the bounds of the box.
+    The grey band is the truth +- the Cramer-Rao bound of one record, dotted lines are the bounds of the box.
     """
+    from matplotlib.lines import Line2D
+
     names = list(dict.fromkeys(estimates["parameter"]))
     groups = list(dict.fromkeys(zip(estimates["variant"], estimates["setting"], strict=True)))
-    labels = [f"{v}\n{s}" for v, s in groups]
     figure, axes = panels(len(names), 2, 6.8, 1.6 + 0.5 * (len(groups) + 1))
     for i, (axis, name) in enumerate(zip(axes, names, strict=True)):
         own = estimates[estimates["parameter"] == name]
         unit, factor = SHOWN.get(own["unit"].iloc[0], (own["unit"].iloc[0], 1.0))
-        draw_paper(axis, factor * published.loc[published["parameter"] == name, "published"].to_numpy(float))
+        paper = factor * published.loc[published["parameter"] == name, "published"].to_numpy(float)
+        axis.plot(paper, np.zeros(paper.size), "D", color="black", ms=5)
         for j, (variant, setting) in enumerate(groups):
             draw_group(axis, own[(own["variant"] == variant) & (own["setting"] == setting)], j + 1, factor)
-        draw_box(axis, own, factor)
-        axis.set_yticks(range(len(groups) + 1), ["the paper", *labels] if i % 2 == 0 else [""] * (len(groups) + 1))
+        # the bounds of the search where they are near
+        low, high = axis.get_xlim()
+        for bound in (factor * own["low"].min(), factor * own["high"].max()):
+            if low - 0.2 * (high - low) <= bound <= high + 0.2 * (high - low):
+                axis.axvline(bound, color="black", ls=":", lw=1.0)
+        row_names(axis, i, ["the paper", *(f"{v}\n{s}" for v, s in groups)])
         axis.set(ylim=(len(groups) + 0.6, -0.6), xlabel=f"{name} [{unit}]")
         axis.tick_params(axis="y", labelsize=9)
-    name_records(figure, list(dict.fromkeys(estimates["case"])))
+    legend_below(figure, 4, [
+        *(Line2D([], [], color=COLOURS[k % 7], marker=MARKERS[k % 7], mfc="none", ls="", label=record)
+          for k, record in enumerate(dict.fromkeys(estimates["case"]))),
+        Line2D([], [], color="0.35", lw=1.0, label="truth"), Line2D([], [], color="0.86", lw=6, label="Cramer-Rao"),
+        Line2D([], [], color="black", ls=":", lw=1.0, label="bound of the box"),
+    ])  # fmt: skip
     return figure
-
-
-def draw_paper(axis: Any, values: np.ndarray) -> None:
-    """Draw the paper's identifications as diamonds."""
-    axis.plot(values, np.zeros(values.size), "D", color="black", ms=5)
 
 
 def draw_group(axis: Any, group: DataFrame, height: int, factor: float) -> None:
@@ -150,26 +173,3 @@ def draw_group(axis: Any, group: DataFrame, height: int, factor: float) -> None:
     if np.isfinite(truth) and np.isfinite(bound):
         axis.fill_betweenx([height - 0.4, height + 0.4], truth - bound, truth + bound, color="0.86", lw=0, zorder=0)
         axis.plot([truth, truth], [height - 0.4, height + 0.4], color="0.35", lw=1.0, zorder=1)
-
-
-def draw_box(axis: Any, own: DataFrame, factor: float) -> None:
-    """Draw the bounds of the search where they are near."""
-    low, high = axis.get_xlim()
-    for bound in (factor * own["low"].min(), factor * own["high"].max()):
-        if low - 0.2 * (high - low) <= bound <= high + 0.2 * (high - low):
-            axis.axvline(bound, color="black", ls=":", lw=1.0)
-
-
-def name_records(figure: Any, records: Sequence[str]) -> None:
-    """Write one legend below all panels."""
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=COLOURS[k % 7], marker=MARKERS[k % 7], mfc="none", ls="", label=record)
-        for k, record in enumerate(records)
-    ]
-    handles += [
-        Line2D([], [], color="0.35", lw=1.0, label="truth"), Line2D([], [], color="0.86", lw=6, label="Cramer-Rao"),
-        Line2D([], [], color="black", ls=":", lw=1.0, label="bound of the box"),
-    ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)

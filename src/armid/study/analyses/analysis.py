@@ -1,0 +1,207 @@
+"""What an analysis is, and what it is given: the runs of a study beside their truths, names and settings."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pandas import DataFrame
+
+from armid.report.document import Column, Part
+from armid.study.results import StudyResults
+from armid.study.traces import Histories, histories
+
+NOISE_FREE = "noise-free"
+PAPER = "the paper's pso"
+# Variants that a table of every row and parameter is printed for, beside the paper's own method.
+MOST_OTHERS = 3
+# The columns by which most tables tell their rows apart.
+SETTING, VARIANT = Column("setting", "noise"), Column("variant", "identifier")
+PARAMETER, N_RUNS = Column("parameter", "parameter"), Column("n", "runs", ".0f")
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """One section of the report of a study.
+
+    Parameters
+    ----------
+    name, title
+        In the list of analyses, and over the section.
+    parts
+        Function of the evidence: tables, figures and texts, in order; none where the analysis does not apply.
+    note
+        What the analysis tells, one sentence.
+    """
+
+    name: str
+    title: str
+    parts: Callable[["Evidence"], Sequence[Part]]
+    note: str
+
+
+class Evidence:
+    """Compute once what several analyses share; the traces are read when one of them first asks.
+
+    runs: outcomes, one row a run, in the order of the study. parameters: one row a run and free parameter. estimates:
+    the same of finished runs, with case, variant, setting, seed, fitness and noise beside.
+    """
+
+    def __init__(self, results: StudyResults) -> None:
+        self.results = results
+        self.study: dict[str, Any] = results.study
+        self.parameters: DataFrame = results.parameters
+        self.runs = ordered(outcomes(results.runs, self.parameters), self.study)
+        self.estimates = by_parameter(self.runs, self.parameters)
+
+    @cached_property
+    def variants(self) -> list[str]:
+        """Names that are compared, in the order of the study."""
+        return list(dict.fromkeys(self.runs["variant"]))
+
+    @cached_property
+    def settings(self) -> list[str]:
+        """Noise and window, in rising order."""
+        return list(dict.fromkeys(self.runs.sort_values(["noise_deg_s", "window"], kind="stable")["setting"]))
+
+    @cached_property
+    def cases(self) -> list[str]:
+        """Cases that were run, in the order of the study."""
+        there = set(self.runs["case"])
+        return [str(c["name"]) for c in self.study["cases"] if c["name"] in there]
+
+    @property
+    def knows_truth(self) -> bool:
+        """Whether any truth is known, so that errors exist."""
+        return bool(self.parameters["truth"].notna().any())
+
+    @cached_property
+    def groups(self) -> dict[str, dict[str, NDArray[np.intp]]]:
+        """Setting -> variant -> positions of its runs."""
+        rows = self.runs.groupby(["setting", "variant"], sort=False).indices
+        return {s: {v: np.asarray(rows[s, v]) for v in self.variants if (s, v) in rows} for s in self.settings}
+
+    @cached_property
+    def histories(self) -> Histories:
+        """What the traces say."""
+        return histories(self.results, self.runs, truths_of(self.runs, self.parameters))
+
+    @cached_property
+    def used(self) -> NDArray[np.float64]:
+        """Simulations of each run, (n_runs,); a failed run, which tells none, counts its budget."""
+        return self.runs["used"].where(self.runs["status"] == "done", self.runs["budget"]).to_numpy(float)
+
+    @cached_property
+    def n_free(self) -> NDArray[np.integer[Any]]:
+        """Number of free parameters of each run, (n_runs,); of a failed run the largest of the others."""
+        counts = self.runs["run"].map(self.parameters.groupby("run").size())
+        return counts.fillna(counts.max() if counts.notna().any() else 1).to_numpy(np.int64)
+
+    @cached_property
+    def published(self) -> DataFrame:
+        """Published values case by case, empty without any."""
+        return published_values(self.study)
+
+    @cached_property
+    def colours(self) -> dict[str, int]:
+        """Variant -> number of its colour, the same in all figures."""
+        return {name: i for i, name in enumerate(self.variants)}
+
+    @cached_property
+    def best_first(self) -> list[str]:
+        """Variants by the rank of their median largest error, mean over the settings; without truths as they come."""
+        if not self.knows_truth:
+            return self.variants
+        medians = self.runs.groupby(["variant", "setting"], sort=False)["largest_error"].median().unstack("setting")
+        ranks = medians.rank().mean(axis=1)
+        return [str(v) for v in ranks.sort_values(kind="stable").index]
+
+    @cached_property
+    def interesting(self) -> list[str]:
+        """The paper's own swarm in every form that was run, then the best of the others."""
+        own = [v for v in self.variants if v.startswith("pso") and "+" not in v]
+        return own + [v for v in self.best_first if v not in own][:MOST_OTHERS]
+
+    def of(self, setting: str) -> DataFrame:
+        """Return the outcomes of one setting."""
+        return self.runs[self.runs["setting"] == setting]
+
+
+def wide_runs(evidence: Evidence) -> DataFrame:
+    """Return one row a run with its parameters beside, as an analysis of a user gets it.
+
+    The columns stand at `armid.contract.analysis.synthetic_runs`.
+    """
+    columns = {"value": "", "truth": "_truth", "relative_error": "_error", "deviation": "_deviation",
+               "at_bound": "_at_bound"}  # fmt: skip
+    wide = evidence.runs.drop(columns=["started_at", "model", "versions"], errors="ignore")
+    wide.insert(0, "study", str(evidence.study["name"]))
+    for name, rows in evidence.parameters.groupby("parameter", sort=False):
+        own = rows.set_index("run")
+        wide = wide.assign(**{f"{name}{end}": wide["run"].map(own[key]) for key, end in columns.items()})
+    return wide
+
+
+def outcomes(runs: DataFrame, parameters: DataFrame) -> DataFrame:
+    """Return the runs with `variant`, `setting` and `largest_error`.
+
+    variant: label of the identifier, and the fitness where a label ran on several. setting: noise, and the window where
+    the study has several. largest_error: max of abs(value - truth)/abs(truth) over the free parameters whose truth is
+    known; infinite for a failed run, NaN where no truth is known.
+    """
+    several = runs.groupby("identifier")["fitness"].transform("nunique") > 1
+    noise = runs["noise_deg_s"].map(noise_text)
+    largest = runs["run"].map(parameters.groupby("run", sort=False)["relative_error"].max())
+    return runs.assign(
+        variant=runs["identifier"].where(~several, runs["identifier"] + " on " + runs["fitness"]),
+        setting=noise if runs["window"].nunique() < 2 else noise + ", " + runs["window"],
+        largest_error=largest.where(runs["status"] == "done", np.inf).astype(float),
+    )
+
+
+def noise_text(noise_deg_s: float) -> str:
+    """Return a noise level in words; NaN is the noise that the records have of their own."""
+    if np.isnan(noise_deg_s):
+        return "as recorded"
+    return NOISE_FREE if noise_deg_s == 0.0 else f"{noise_deg_s:g} deg/s"
+
+
+def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
+    """Return the runs in the order of the study: identifier, fitness, case, noise, window, seed.
+
+    The store holds them in the order in which they ended, which two runners do not repeat.
+    """
+    label = {str(name): i for i, name in enumerate(study["identifiers"])}
+    case = {str(c["name"]): i for i, c in enumerate(study["cases"])}
+    keys = runs.assign(_label=runs["identifier"].map(label), _case=runs["case"].map(case))
+    by = ["_label", "identifier", "fitness", "_case", "case", "noise_deg_s", "window", "seed", "run"]
+    return keys.sort_values(by, kind="stable", ignore_index=True).drop(columns=["_label", "_case"])
+
+
+def by_parameter(runs: DataFrame, parameters: DataFrame) -> DataFrame:
+    """Return one row a finished run and free parameter, with case, variant, setting and seed beside."""
+    keys = runs.loc[runs["status"] == "done", ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]]
+    return keys.merge(parameters, on="run", how="inner", sort=False)
+
+
+def truths_of(runs: DataFrame, parameters: DataFrame) -> dict[str, dict[str, float]]:
+    """Return case -> parameter -> truth [SI], of the truths that are known."""
+    known = parameters[parameters["truth"].notna()].merge(runs[["run", "case"]], on="run")
+    rows = known.drop_duplicates(["case", "parameter"])
+    truths: dict[str, dict[str, float]] = {}
+    for case, parameter, truth in zip(rows["case"], rows["parameter"], rows["truth"], strict=True):
+        truths.setdefault(str(case), {})[str(parameter)] = float(truth)
+    return truths
+
+
+def published_values(study: dict[str, Any]) -> DataFrame:
+    """Return case, parameter, truth, published [SI] and relative error of the cases that carry a published result."""
+    rows = []
+    for case in study["cases"]:
+        truth = case.get("truth") or {}
+        for parameter, value in (case.get("published") or {}).items():
+            true = float(truth.get(parameter, np.nan))
+            rows.append((case["name"], parameter, true, float(value), abs(value - true) / abs(true)))
+    return DataFrame(rows, columns=["case", "parameter", "truth", "published", "relative_error"])

@@ -1,0 +1,74 @@
+"""All analyses in the order of the report, and how one of a user becomes a section of it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pandas import DataFrame, RangeIndex
+from pandas.api.types import is_bool_dtype, is_integer_dtype, is_numeric_dtype
+
+from armid.contract.analysis import parts_of
+from armid.errors import ArmidError
+from armid.report.document import Column, Figure, Part, Section, Table, slug, unlike
+from armid.report.style import pyplot
+from armid.study.analyses.best_fitness import BEST_FITNESS
+from armid.study.analyses.convergence import CONVERGENCE
+from armid.study.analyses.cramer_rao import CRAMER_RAO
+from armid.study.analyses.errors import ERRORS
+from armid.study.analyses.fitness_quality import FITNESS_QUALITY
+from armid.study.analyses.overview import OVERVIEW, RUNS
+from armid.study.analyses.ranks import RANKS
+from armid.study.analyses.running_time import RUNNING_TIME
+from armid.study.analyses.success import SUCCESS
+from armid.study.analyses.table1 import TABLE1
+from armid.study.analyses.table2 import TABLE2
+
+# A new analysis is a file beside this one, and a name here.
+ANALYSES = (
+    OVERVIEW, TABLE1, TABLE2, CRAMER_RAO, FITNESS_QUALITY, SUCCESS, RUNNING_TIME, BEST_FITNESS, CONVERGENCE, ERRORS,
+    RANKS, RUNS,
+)  # fmt: skip
+# name -> function of the runs, see `armid.contract.analysis`.
+OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
+
+
+def check_names(own: OwnAnalyses) -> None:
+    """Refuse an analysis of a user that is called like one of ours.
+
+    Raises ArmidError.
+    """
+    for name in own:
+        if name in {a.name for a in ANALYSES}:
+            raise ArmidError(f"analyses: '{name}' is there already, give yours another name")
+
+
+def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:
+    """Return a section for each analysis of a user that returns something.
+
+    runs: one row a run; each function gets a copy. Raises ArmidError for what is no table and no figure.
+    """
+    # before a plug-in imports it: no window is opened, and the figures look alike
+    pyplot()
+    sections = []
+    for name, function in own.items():
+        found = parts_of(name, function(runs.copy()))
+        files = unlike([slug("own", name, title if title != name else "") for title in found])
+        parts = [part(file, title, one) for file, (title, one) in zip(files, found.items(), strict=True)]
+        if parts:
+            sections.append(Section(name.replace("_", " ").capitalize(), tuple(parts)))
+    return tuple(sections)
+
+
+def part(file: str, title: str, found: Any) -> Part:
+    """Return a table or a figure of a user; numbers are shown with six digits."""
+    if not isinstance(found, DataFrame):
+        return Figure(file, title, "", lambda: found)
+    frame = found if isinstance(found.index, RangeIndex) else found.reset_index()
+    frame = frame.set_axis([" ".join(map(str, c)).strip() if isinstance(c, tuple) else str(c) for c in frame], axis=1)
+    return Table(file, title, "", frame, tuple(Column(str(c), str(c), digits(frame[c].dtype)) for c in frame))
+
+
+def digits(kind: Any) -> str:
+    """Return the format of a column's numbers, "" for text and truth values."""
+    if is_bool_dtype(kind) or not is_numeric_dtype(kind):
+        return ""
+    return ".0f" if is_integer_dtype(kind) else ".6g"
