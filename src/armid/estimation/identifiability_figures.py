@@ -142,7 +142,6 @@ def draw_correlation(axis: Any, found: Examination) -> None:
 
 
 def draw_shares(axis: Any, found: Examination, jacobians: list[Array]) -> None:
-    """Draw how much of the information on each parameter comes from each record, in percent."""
     import seaborn as sns
 
     squares = np.array([np.sum(j**2, axis=0) for j in jacobians])

@@ -61,7 +61,6 @@ def record_figure(curves: Mapping[str, Mapping[str, Any]], unit: str) -> Any:
 
 
 def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) -> None:
-    """Draw the curves (x, y) of one record into a pair of axes."""
     (upper, lower), (unit, factor) = axes, SHOWN[si_unit]
     looks = {"measured": {"color": OKABE_ITO["black"], "lw": 1.6},
              "simulated": {"color": OKABE_ITO["vermilion"], "lw": 1.3, "ls": "--"}}  # fmt: skip

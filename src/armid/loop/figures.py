@@ -67,7 +67,6 @@ def record_figure(record: Mapping[str, Any], unit: str) -> Any:
 
 
 def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si_unit: str) -> None:
-    """Draw residuals (x, y) before and after on a band of 2 sigma of noise."""
     unit, factor = SHOWN[si_unit]
     if noise is not None:
         band = 2.0 * noise * factor
@@ -95,7 +94,6 @@ def candidate_figure(residual: Mapping[str, Any], predicted: Mapping[str, Any], 
 
 
 def diagnosis_figure(found: ClosedLoop) -> Any:
-    """Draw the mean square of the residual in units of the noise's, part by part."""
     before, after = found.before.diagnosis, found.after.diagnosis
     kinds = [k for k in KINDS if before.of_kind(k)]
     rows = -(-len(kinds) // 2)
@@ -167,7 +165,6 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]])
 
 
 def autocorrelation_figure(found: ClosedLoop) -> Any:
-    """Draw the autocorrelation of the whitened residual of the train records, with the 95 % band of white noise."""
     figure, axis = pyplot().subplots(figsize=(6.8, 3.6), layout="constrained")
     interval = found.campaign.train[0].manoeuvre.interval
     for judged, (name, colour, _) in zip((found.before, found.after), LOOKS, strict=True):
@@ -193,7 +190,6 @@ def correlation(view: View) -> Array:
 
 
 def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
-    """Draw the shares at the ports, and the signal at the best of them against each variable of the motion."""
     best = found.term.dependence if found.term is not None else missing.dependences[0]
     variables = [best.variable, *(v for v in missing.moved[0].variables if v != best.variable)][:MOST_VARIABLES]
     columns = (len(variables) + 2) // 2
@@ -210,7 +206,6 @@ def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
 
 
 def share_panel(axis: Any, missing: Missing) -> None:
-    """Draw what a free signal removes at each port, and what the best curve there predicts on left-out parts."""
     ports = [s.port for s in missing.signals]
     curves = [max((d.share for d in missing.dependences if d.port == p), default=0.0) for p in ports]
     rows = np.arange(len(ports))
@@ -249,6 +244,5 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
 
 
 def unit_of(variable: str, model: Any) -> str:
-    """Return the unit of a variable of the motion."""
     units = {s.name: s.unit for s in model.plant.states} | {i.name: i.unit for i in model.plant.inputs}
     return str(units.get(variable, "s" if variable == "time" else model.plant.scales.effort_unit))
