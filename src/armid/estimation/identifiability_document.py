@@ -40,14 +40,7 @@ def identifiability_document(
 ) -> Document:
     """Build the document of an examination from identifiability.json.
 
-    Parameters
-    ----------
-    result, details : dict
-        identifiability.json; and `made_by`, where it is known.
-    svgs : dict
-        Name -> SVG of those of `FIGURES` that are stored.
-    again : str
-        The command that makes the page again.
+    details: `made_by`, where it is known; for the others see `identify_document`.
     """
     figures = {name: (Figure(name, *FIGURES[name], svg=svg),) for name, svg in svgs.items()}
     answer, remarks = answer_and_remarks(result)

@@ -94,14 +94,7 @@ def loop_document(
 ) -> Document:
     """Build the document of a closed loop from what is stored of it.
 
-    Parameters
-    ----------
-    report, details : dict
-        report.json and details.json (empty where an earlier version of armid wrote none).
-    svgs : dict
-        Name -> SVG of those of `FIGURES` that are stored.
-    again : str
-        The command that makes the page again.
+    report, details: report.json and details.json; for the others see `identify_document`.
     """
     figures = {name: (Figure(name, *FIGURES[name], svg=svg),) for name, svg in svgs.items()}
     unit = report["unit"]
