@@ -1,4 +1,4 @@
-"""`armid check`: whether a user's own plant, effect, fitness, identifier or campaign keeps the contract."""
+"""`armid check`: whether a user's own plant, effect, fitness, identifier, analysis or campaign keeps the contract."""
 
 import sys
 from pathlib import Path
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 def check_command(thing: str, plugins: tuple[str, ...]) -> None:
     """Run the contract on your own things.
 
-    A plant, an effect, a fitness or an identifier in a Python file, which is run; an effect is tried on every plant
-    that offers its ports, those of --plugin included. A campaign is read, and its model simulated through each record.
-    Every point is printed. Exit code 0 when all hold, 1 when one does not, 2 when there is nothing to try.
+    A plant, an effect, a fitness, an identifier or an analysis in a Python file, which is run; an effect is tried on
+    every plant that offers its ports, those of --plugin included. A campaign is read, and its model simulated through
+    each record. Every point is printed. Exit code 0 when all hold, 1 when one does not, 2 when there is nothing to try.
     """
     kind, name, findings = findings_of(thing, load_registry(plugins))
     print(f"{kind}: {name}")

@@ -168,8 +168,10 @@ def loop_facts(study: dict[str, Any], scored: bool) -> tuple[str, ...]:
     """Return how a study of loops was made; scored: whether a truth was kept from it."""
     candidates = "differ from campaign to campaign" if study["rivals"] else f"{len(study['candidates'])} effects"
     made = f", made by `{study['made_by']}`" if study["made_by"] else ""
-    campaigns = f"Campaigns: those in {study['campaigns']}{made}. Candidates: {candidates}."
-    return (campaigns, *((SCORING,) if scored else ()), versions(study))
+    facts = [f"Campaigns: those in {study['campaigns']}{made}. Candidates: {candidates}."]
+    if study["report"]:
+        facts.insert(0, "Synthetic: records of a simulated arm; no machine was measured.")
+    return (*facts, *((SCORING,) if scored else ()), versions(study))
 
 
 def origin(study: dict[str, Any]) -> str:
