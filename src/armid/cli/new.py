@@ -15,7 +15,8 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.options import NewFiles, chosen, examples
+from armid.cli.options import chosen, examples
+from armid.cli.results import NewFiles
 from armid.errors import ArmidError
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
@@ -45,8 +46,6 @@ def new_command(kind: str, name: str, out: Path) -> None:
     NAME. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
     say so. Nothing that exists is overwritten.
     """
-    pass
-
     chosen(kind, dict.fromkeys(KINDS), "kind")
     taken = set(getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else ())
     if kind == "analysis":
@@ -63,7 +62,6 @@ def new_command(kind: str, name: str, out: Path) -> None:
 
 def write(kind: str, name: str, target: Path) -> None:
     """Write the file or the folder, whole or not at all."""
-    pass
     from armid.record import write_campaign
 
     if kind not in CATALOGUES:

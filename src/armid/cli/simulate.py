@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.cli.options import (
-    NewFiles,
     accuracy_of,
     accuracy_option,
     campaign_argument,
@@ -18,6 +17,7 @@ from armid.cli.options import (
     opened,
     plugin_option,
 )
+from armid.cli.results import NewFiles
 from armid.engine import accuracy_against, calibrate, simulate
 from armid.errors import ArmidError, nearest
 from armid.model import Model
@@ -46,7 +46,7 @@ def simulate_command(
     times are irregular), the states, and the recorded signal, SI. A parameter that is not set takes the value that the
     campaign fixes, else its nominal one.
     """
-    _, read, model = opened(campaign, effects, plugins)
+    _, read, model, *_ = opened(campaign, effects, plugins)
     candidate = candidate_of(model, read, numbers(settings, "--set"))
     wanted = accuracy_of(accuracy)
     with NewFiles(out) as files:

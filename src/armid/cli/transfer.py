@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from armid.cli.options import NewFiles, examples, plugin_option, refuse_unwritable
+from armid.cli.options import examples, plugin_option
+from armid.cli.results import NewFiles, refuse_unwritable
 from armid.errors import ArmidError
 from armid.registry import load_registry
 

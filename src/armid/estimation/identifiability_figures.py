@@ -1,6 +1,6 @@
 """Figures of an examination: the profiles, and what the records see of each parameter."""
 
-from pathlib import Path
+from collections.abc import Callable
 from textwrap import fill
 from typing import Any
 
@@ -11,27 +11,29 @@ from armid.estimation.design import identity
 from armid.estimation.examine import Examination
 from armid.estimation.information import level_weights, sensitivities
 from armid.estimation.profile import THRESHOLD, Profile
-from armid.report.style import GREY, OKABE_ITO, style
+from armid.report.style import GREY, OKABE_ITO, look, pyplot
 from armid.units import SHOWN
 
 Array = NDArray[np.float64]
 CURVE, QUADRATIC, LIMIT = OKABE_ITO["blue"], OKABE_ITO["vermilion"], OKABE_ITO["black"]
-COLOURS = [OKABE_ITO[c] for c in ("blue", "vermilion", "green", "purple", "orange", "sky", "black")]
-DASHES = ("-", "--", "-.", ":")
 # The top of a profile's panel, and by how much its sides go beyond what was tried, as a share.
 TOP, SIDE = 6.5, 0.04
 MOST_RECORDS, MOST_PANELS = 4, 12
 LINE = 60
 
 
-def profile_figure(found: Examination, path: Path) -> None:
+def figures_of(found: Examination) -> dict[str, Callable[[], Any]]:
+    """Return name -> what draws a figure."""
+    return {"profiles": lambda: profile_figure(found), "sensitivities": lambda: sensitivity_figure(found)}
+
+
+def profile_figure(found: Examination) -> Any:
     """Draw the rise of chi2 along each parameter, the 95 % threshold, the parabola, and the bounds of the box."""
-    plt = style()
     shown = found.profiles[:MOST_PANELS]
     columns = min(len(shown), 2 if len(shown) <= 4 else 3)
     rows = -(-len(shown) // columns)
     size = (4.6 * columns, 3.3 * rows + 1.0)
-    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, sharey=True, layout="constrained")
+    figure, axes = pyplot().subplots(rows, columns, figsize=size, squeeze=False, sharey=True, layout="constrained")
     for axis, profile in zip(axes.flat, shown, strict=False):
         draw_profile(axis, profile)
     for axis in axes.flat[len(shown) :]:
@@ -41,8 +43,7 @@ def profile_figure(found: Examination, path: Path) -> None:
     handles = dict(pair for axis in axes.flat for pair in zip(*axis.get_legend_handles_labels()[::-1], strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False)
     figure.suptitle(fill(f"{title(found)}: profile likelihood", LINE * columns // 2 + 15), fontsize="large")
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    return figure
 
 
 def draw_profile(axis: Any, profile: Profile) -> None:
@@ -67,7 +68,6 @@ def draw_profile(axis: Any, profile: Profile) -> None:
     axis.set_xlabel(f"{profile.name} [{unit}]" if unit != "1" else profile.name)
     axis.ticklabel_format(axis="x", useOffset=False, style="plain")
     axis.locator_params(axis="x", nbins=4)
-    axis.spines[["top", "right"]].set_visible(False)
 
 
 def smooth(profile: Profile, factor: float) -> tuple[Array, Array]:
@@ -91,17 +91,18 @@ def view(profile: Profile) -> tuple[float, float]:
     return left - room, right + room
 
 
-def sensitivity_figure(found: Examination, path: Path) -> None:
+def sensitivity_figure(found: Examination) -> Any:
     """Draw correlations, which record tells of which parameter, and the sensitivities of the records that tell most.
 
     With one record its sensitivities stand beside the correlations.
     """
-    plt = style()
-    jacobians = weighed(found)
+    weights = level_weights(found.information.levels)
+    # d signal / d parameter of each record in units of its level, (n_samples, n_free) each
+    jacobians = [w * sensitivities(r, found.space, found.x) for w, r in zip(weights, found.replays, strict=True)]
     order = telling(found, jacobians)
     n = len(found.space.free_names)
     height, rows = max(3.2, 0.55 * n + 1.6), 0 if len(jacobians) == 1 else -(-len(order) // 2)
-    figure = plt.figure(figsize=(11.2, height + 2.6 * rows + 0.8), layout="constrained")
+    figure = pyplot().figure(figsize=(11.2, height + 2.6 * rows + 0.8), layout="constrained")
     parts = figure.subfigures(2, 1, height_ratios=(height, 2.6 * rows)) if rows else [figure]
     left, right = parts[0].subplots(1, 2)
     draw_correlation(left, found)
@@ -114,8 +115,7 @@ def sensitivity_figure(found: Examination, path: Path) -> None:
         axis.set_visible(False)
     parts[-1].legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=min(n, 6), frameon=False)
     figure.suptitle(fill(f"{title(found)}: what the records see", 2 * LINE), fontsize="large")
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    return figure
 
 
 def telling(found: Examination, jacobians: list[Array]) -> list[int]:
@@ -125,12 +125,6 @@ def telling(found: Examination, jacobians: list[Array]) -> list[int]:
     for i in order:
         seen.setdefault(identity(found.replays[i].record.manoeuvre), int(i))
     return list(seen.values())[:MOST_RECORDS]
-
-
-def weighed(found: Examination) -> list[Array]:
-    """Return d signal / d parameter of each record in units of its level, shape (n_samples, n_free) each."""
-    weights = level_weights(found.information.levels)
-    return [w * sensitivities(r, found.space, found.x) for w, r in zip(weights, found.replays, strict=True)]
 
 
 def draw_correlation(axis: Any, found: Examination) -> None:
@@ -178,14 +172,13 @@ def draw_sensitivities(axis: Any, found: Examination, i: int, jacobian: Array) -
     for j, name in enumerate(found.space.free_names):
         largest = float(np.abs(jacobian[:, j]).max())
         curve = jacobian[:, j] / largest if largest > 0.0 else jacobian[:, j]
-        axis.plot(replay.times, curve, color=COLOURS[j % len(COLOURS)], ls=DASHES[j % len(DASHES)], lw=1.7, label=name)
+        axis.plot(replay.times, curve, lw=1.7, label=name, **look(j))
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
     axis.set_title(f"{replay.record.file}: sensitivities, each scaled to 1", fontsize="medium")
     axis.set_xlabel("time [s]")
     axis.set_ylabel("scaled, 1")
     axis.set_ylim(-1.08, 1.08)
     axis.margins(x=0.01)
-    axis.spines[["top", "right"]].set_visible(False)
 
 
 def title(found: Examination) -> str:
