@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armid.study.analyses.analysis import outcomes, truths_of
+from armid.study.analyses.analysis import outcomes
 from armid.study.analyses.success import TOLERANCES
 from armid.study.traces import TARGETS, first_hits, held, histories, remaining_share
 
@@ -18,7 +18,8 @@ def kept(made):
     """Results of 60 runs, the last of which failed, their outcomes and their histories."""
     results = made(seeds=2, failed=1)
     runs = outcomes(results.runs, results.parameters)
-    return results, runs, histories(results, runs, truths_of(runs, results.parameters))
+    truths = {case["name"]: case["truth"] for case in results.study["cases"]}
+    return results, runs, histories(results, runs, truths)
 
 
 @given(SERIES)

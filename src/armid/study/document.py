@@ -1,11 +1,11 @@
 """The document of a study from its stored results: the answer, how it was made, and the sections of its analyses."""
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pandas import DataFrame
 
 from armid.errors import ArmidError
 from armid.report.document import Document, Line, Listing, Part, Section, listing
@@ -58,8 +58,9 @@ def report_of(
         evidence = Evidence(results)
         found = [Section(a.title, tuple(a.parts(evidence))) for a in ANALYSES]
         sections, facts, runs = tuple(s for s in found if s.parts), facts_of(evidence), wide_runs(evidence)
-        answer = nearest(evidence) if evidence.knows_truth else (lowest_fitness(evidence),)
-        main = sections[0].parts[:1]
+        table = main_table(evidence)
+        main = (table,)
+        answer = nearest(table.frame, evidence.settings) if evidence.knows_truth else (lowest_fitness(evidence),)
     else:
         runs = loop_runs(results.loops)
         main = (verdicts(runs),)
@@ -94,24 +95,24 @@ def known_kind(study: dict[str, Any]) -> str:
     return kind
 
 
-def nearest(evidence: Evidence) -> tuple[str, str]:
+def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
     """Return who came nearest to the truth, and how the others (or the paper's result) stand to that."""
+    is_paper = overview["variant"] == PAPER
+    ours, paper = overview[~is_paper], overview[is_paper]
     said = []
-    for setting in evidence.settings[:MOST_SETTINGS]:
-        errors = by_variant(evidence.of(setting))
-        best = min(errors, key=lambda v: quantile(errors[v], 0.5))
-        said.append(f"{setting}: {best}, median largest error of a run {percent(quantile(errors[best], 0.5))}, "
-                    f"95 % of its {len(errors[best])} runs within {percent(quantile(errors[best], 0.95))}")  # fmt: skip
-    more = len(evidence.settings) - MOST_SETTINGS
+    for setting in settings[:MOST_SETTINGS]:
+        own = ours[ours["setting"] == setting]
+        best = own.loc[own["largest_median"].idxmin()]
+        said.append(f"{setting}: {best['variant']}, median largest error of a run {percent(best['largest_median'])}, "
+                    f"95 % of its {best['n']} runs within {percent(best['largest_p95'])}")  # fmt: skip
+    more = len(settings) - MOST_SETTINGS
     first = f"Nearest to the truth: {'; '.join(said)}{f'; {more} more settings below' if more > 0 else ''}."
-    medians = {v: quantile(errors, 0.5) for v, errors in by_variant(evidence.of(evidence.settings[0])).items()}
-    if not evidence.published.empty and evidence.study.get("report") == "table1":
-        paper = float(np.median(evidence.published.groupby("case")["relative_error"].max()))
-        better = sum(value < paper for value in medians.values())
-        return first, (f"{PAPER[0].upper()}{PAPER[1:]}, from its printed values on its own data, has {percent(paper)}; "
-                       f"{better} of {len(medians)} identifiers are below that.")  # fmt: skip
-    worst = max(medians, key=lambda v: medians[v])
-    return first, f"Of {len(medians)} identifiers the furthest is {worst} with {percent(medians[worst])}."
+    medians = ours[ours["setting"] == settings[0]].set_index("variant")["largest_median"]
+    if len(paper):
+        error = float(paper["largest_median"].iloc[0])
+        return first, (f"{PAPER[0].upper()}{PAPER[1:]}, from its printed values on its own data, has {percent(error)}; "
+                       f"{(medians < error).sum()} of {len(medians)} identifiers are below that.")  # fmt: skip
+    return first, f"Of {len(medians)} identifiers the furthest is {medians.idxmax()} with {percent(medians.max())}."
 
 
 def lowest_fitness(evidence: Evidence) -> str:
@@ -122,16 +123,6 @@ def lowest_fitness(evidence: Evidence) -> str:
     medians = done.groupby(["fitness", "variant"], sort=False)["value"].median()
     said = [f"{medians.loc[f].idxmin()}, {medians.loc[f].min():.6g} of {f}" for f in dict.fromkeys(done["fitness"])]
     return f"No truth is known. Lowest median fitness: {'; '.join(said)}."
-
-
-def by_variant(runs: DataFrame) -> dict[str, np.ndarray]:
-    """Return variant -> largest relative error of each run; infinite for a failed one."""
-    return {str(v): g["largest_error"].to_numpy(float) for v, g in runs.groupby("variant", sort=False)}
-
-
-def quantile(values: np.ndarray, share: float) -> float:
-    """Return a quantile as the tables have it: a value that occurs."""
-    return float(np.quantile(values, share, method="inverted_cdf"))
 
 
 def percent(value: float) -> str:

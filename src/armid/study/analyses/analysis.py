@@ -86,7 +86,8 @@ class Evidence:
     @cached_property
     def histories(self) -> Histories:
         """What the traces say."""
-        return histories(self.results, self.runs, truths_of(self.runs, self.parameters))
+        truths = {str(case["name"]): case.get("truth") or {} for case in self.study["cases"]}
+        return histories(self.results, self.runs, truths)
 
     @cached_property
     def used(self) -> NDArray[np.float64]:
@@ -184,16 +185,6 @@ def by_parameter(runs: DataFrame, parameters: DataFrame) -> DataFrame:
     """Return one row a finished run and free parameter, with case, variant, setting and seed beside."""
     keys = runs.loc[runs["status"] == "done", ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]]
     return keys.merge(parameters, on="run", how="inner", sort=False)
-
-
-def truths_of(runs: DataFrame, parameters: DataFrame) -> dict[str, dict[str, float]]:
-    """Return case -> parameter -> truth [SI], of the truths that are known."""
-    known = parameters[parameters["truth"].notna()].merge(runs[["run", "case"]], on="run")
-    rows = known.drop_duplicates(["case", "parameter"])
-    truths: dict[str, dict[str, float]] = {}
-    for case, parameter, truth in zip(rows["case"], rows["parameter"], rows["truth"], strict=True):
-        truths.setdefault(str(case), {})[str(parameter)] = float(truth)
-    return truths
 
 
 def published_values(study: dict[str, Any]) -> DataFrame:

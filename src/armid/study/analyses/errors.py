@@ -1,6 +1,7 @@
 """Where the errors are: by identifier and case, and along the valley of parameters that stand in for each other."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,18 +36,14 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     figures = [Figure("error_map", "Errors by identifier and case", MAP_CAPTION, lambda: error_map_figure(maps))]
     ends = end_points(evidence.estimates)
     if ends.shape[1] > 3 and len(ends) > 1:
-        figures += [valley(ends, s, evidence) for s in evidence.settings]
+        for s in evidence.settings:
+            draw = partial(valley_figure, ends[ends["setting"] == s], evidence.interesting[:MOST_COLOURED])
+            name = slug("valley", s if len(evidence.settings) > 1 else "")
+            figures.append(Figure(name, f"Where runs end, {s}", VALLEY_CAPTION, draw))
     return figures
 
 
 ERRORS = Analysis("errors", "Where the errors are", parts, "largest error by identifier and case; where runs end")
-
-
-def valley(ends: DataFrame, setting: str, evidence: Evidence) -> Figure:
-    """Return the figure of where the runs of one setting end."""
-    own, coloured = ends[ends["setting"] == setting], evidence.interesting[:MOST_COLOURED]
-    name = slug("valley", setting if len(evidence.settings) > 1 else "")
-    return Figure(name, f"Where runs end, {setting}", VALLEY_CAPTION, lambda: valley_figure(own, coloured))
 
 
 def error_map(runs: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
