@@ -14,6 +14,7 @@ from armid.study.analyses.catalogue import ANALYSES, OwnAnalyses, check_names, o
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
 from armid.study.results import StudyResults
+from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
 
 MOST_SETTINGS = 2
 ALONE = "A seed decides the search alone; the noise is the records' own."
@@ -22,7 +23,10 @@ SYNTHETIC = (
     "Synthetic: records are simulated from a known truth by the model that is identified, and white noise of the "
     "stated level (standard deviation) is added; no measured data enters."
 )
-SCORING = "Each loop saw its campaign alone. Against the truth, answers are scored by `python studies/blind/score.py`."
+SCORING = (
+    "Each loop saw its campaign alone; `python studies/blind/score.py RESULTS --key KEY --out DIR` scores its answers "
+    "against the truth."
+)
 
 
 def report_of(
@@ -49,12 +53,12 @@ def report_of(
     """
     study, own = results.study, own or {}
     kind = known_kind(study)
-    if key is not None and kind == "identify":
+    if key is not None and kind == IDENTIFIES:
         raise ArmidError(f"study '{study['name']}' knows its truths, a key is not expected")
     if results.runs.empty:
         raise ArmidError(f"study '{study['name']}' has no finished run: nothing can be reported")
     check_names(own)
-    if kind == "identify":
+    if kind == IDENTIFIES:
         evidence = Evidence(results)
         found = [Section(a.title, tuple(a.parts(evidence))) for a in ANALYSES]
         sections, facts, runs = tuple(s for s in found if s.parts), facts_of(evidence), wide_runs(evidence)
@@ -77,7 +81,7 @@ def report_of(
 
 def summary_of(results: StudyResults) -> Document:
     """Return state and main table alone; no trace is read."""
-    if known_kind(results.study) == "identify":
+    if known_kind(results.study) == IDENTIFIES:
         main = main_table(Evidence(results))
     else:
         main = verdicts(loop_runs(results.loops))
@@ -89,9 +93,9 @@ def known_kind(study: dict[str, Any]) -> str:
 
     Raises ArmidError for one that this version does not know.
     """
-    kind = str(study.get("kind", "identify"))
-    if kind not in ("identify", "close_loop"):
-        raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of identify, close_loop is expected")
+    kind = str(study.get("kind", IDENTIFIES))
+    if kind not in KIND_NAMES:
+        raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of {', '.join(KIND_NAMES)} is expected")
     return kind
 
 
@@ -132,7 +136,7 @@ def percent(value: float) -> str:
 def state_of(study: dict[str, Any]) -> str:
     """Return how much of the study was run."""
     planned, done, failed = (int(study[key]) for key in ("n_planned", "n_done", "n_failed"))
-    what = "campaigns" if study.get("kind") == "close_loop" else "runs"
+    what = "campaigns" if study.get("kind") == CLOSES_LOOP else "runs"
     lost = f", {failed} of them failed" if failed else ""
     if done + failed < planned:
         return f"NOT COMPLETE: {done + failed} of {planned} {what} have ended{lost}; every number below is of these."

@@ -1,15 +1,14 @@
-"""The engine against scipy, against a plain compiled loop, with effects, and on two threads."""
+"""The engine against scipy and a plain compiled loop, with effects, on two threads; and the cost of a fitness."""
 
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from armid.bench.plain import plain_loop, solve_with_scipy
-from armid.bench.row import Bound, Row
-from armid.bench.table import available_cores, load_text
-from armid.bench.task import Array, Task, arm_task
-from armid.bench.timing import WALL, Work, fastest
+from armid.problem.similarity import numerical_similarity, similarity
+from bench.baselines import plain_loop, solve_with_scipy
+from bench.measure import WALL, Bound, Row, Work, available_cores, fastest, load_text
+from bench.samples import Array, Task, arm_task
 
 ALLOWED = 1e-5
 TOLERANCES = (1e-4, 3e-5, 1e-5, 5e-6, 3e-6, 2e-6, 1e-6, 5e-7, 3e-7, 2e-7, 1e-7, 1e-8)
@@ -129,3 +128,19 @@ def threads_row(rounds: int = 20, n_candidates: int = THREADED, attempts: int = 
         best[1] / best[2], wanted, 1 / seconds, task.error(task.run(2).output, task.reference()),
         f"{available_cores()} cores, load {load_text()}; {'the same' if same else 'NOT the same'} bits as 1 thread",
     )  # fmt: skip
+
+
+def fitness_rows(rounds: int = 20, n_candidates: int = 80) -> list[Row]:
+    """Measure the similarity degree S and its numerical part S1, per candidate."""
+    task = arm_task(n_candidates)
+    simulated, interval = task.run().output, task.manoeuvre.interval
+    measured = simulated[0] + np.random.default_rng(3).normal(0.0, np.deg2rad(0.2), simulated.shape[1])
+    works: dict[str, Work] = {
+        "S": partial(similarity, measured, simulated, interval),
+        "S1": partial(numerical_similarity, measured, simulated),
+    }
+    best = fastest(works, rounds)
+    return [
+        Row("fitness: similarity S", best["S"] / n_candidates * 1e6, "us"),
+        Row("fitness: numerical similarity S1", best["S1"] / n_candidates * 1e6, "us"),
+    ]

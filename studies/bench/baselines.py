@@ -25,7 +25,7 @@ THETA_A, THETA_C, THETA_D, DELTA_E = (math.radians(a) for a in (-55.0, -48.0, 22
 
 
 @numba.njit(cache=True)
-def slopes(theta, omega, current, p0, k, eta3, n, inertia, closed):  # type: ignore[no-untyped-def]
+def slopes(theta, omega, current, p0, k, eta3, n, inertia, closed):
     """Right-hand side of Eqs 1-7 as one would write it."""
     if closed:
         u = K_P * (THETA_D - theta) - K_D * k * omega
@@ -42,7 +42,7 @@ def slopes(theta, omega, current, p0, k, eta3, n, inertia, closed):  # type: ign
 
 
 @numba.njit(cache=True)
-def runge_kutta(theta, omega, current, h, p0, k, eta3, n, inertia, closed):  # type: ignore[no-untyped-def]
+def runge_kutta(theta, omega, current, h, p0, k, eta3, n, inertia, closed):
     """One classical step."""
     a1, b1, c1 = slopes(theta, omega, current, p0, k, eta3, n, inertia, closed)
     g = 0.5 * h
@@ -58,13 +58,13 @@ def runge_kutta(theta, omega, current, h, p0, k, eta3, n, inertia, closed):  # t
 
 
 @numba.njit(cache=True)
-def total_inertia(eta3):  # type: ignore[no-untyped-def]
+def total_inertia(eta3):
     """Eq 2."""
     return 2 * I01 * I1**2 * ETA1 * ETA2 * eta3 + I23 * I2**2 * ETA2 * eta3 + I45 * I3**2 * eta3 + I6
 
 
 @numba.njit(cache=True)
-def plain_loop(population, output, h):  # type: ignore[no-untyped-def]
+def plain_loop(population, output, h):
     """Simulate candidate by candidate into output [rad/s], RK4 at the sample interval h [s], only E located.
 
     population: (n_candidates, 4), SI; output: (n_candidates, n_samples).
@@ -103,7 +103,7 @@ def solve_with_scipy(candidate: Array, times: Array, tolerance: float) -> Array:
     def switch(_: float, y: Array) -> float:
         return float(THETA_D - DELTA_E - y[0])
 
-    switch.terminal = True  # type: ignore[attr-defined]
+    switch.terminal = True
     options: dict[str, Any] = {"method": "DOP853", "rtol": tolerance, "atol": tolerance, "dense_output": True}
     # A trial step may run far beyond the travel, where the gas has no volume; it is then rejected.
     with np.errstate(invalid="ignore"):

@@ -11,10 +11,6 @@ from pymoo.algorithms.soo.nonconvex.pso import PSO
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from armid.bench.row import Bound, Row
-from armid.bench.sample import write_sample
-from armid.bench.task import PLANT
-from armid.bench.timing import CPU, Stopwatch
 from armid.engine import STANDARD
 from armid.identifiers import IDENTIFIERS
 from armid.model import PLANTS, Model
@@ -24,6 +20,8 @@ from armid.problem.problem import IdentificationProblem
 from armid.problem.replay import Replay, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
+from bench.measure import CPU, Bound, Row, Stopwatch
+from bench.samples import PLANT, write_sample
 
 N_PARTICLES, N_ITERATIONS = 80, 150
 
@@ -60,7 +58,7 @@ class Watched:
         return self._watch.timed(self._thing, *arguments)
 
 
-class Sphere(Problem):  # type: ignore[misc]
+class Sphere(Problem):
     """The sum of squares in four dimensions: as good as no work, so that what is left is pymoo's own."""
 
     def __init__(self) -> None:
