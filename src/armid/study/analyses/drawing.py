@@ -15,7 +15,6 @@ APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
 
 
 def panel_height(n_lines: int) -> float:
-    """Return how high a panel has to be for the names of its lines [inch]."""
     return max(LEAST_HEIGHT, FRAME_INCH + APART_INCH * n_lines)
 
 

@@ -85,7 +85,6 @@ def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
 
 
 def brief(percent: float) -> str:
-    """Return a number that fits into a cell."""
     if not np.isfinite(percent):
         return "failed"
     return f"{percent:.2g}" if percent >= 1e-3 or percent == 0.0 else f"{percent:.0e}"
@@ -132,13 +131,11 @@ def valley_figure(ends: DataFrame, chosen: list[str]) -> Any:
 
 
 def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:
-    """Draw marks, hollow so that those below stay visible."""
     pyplot().gca().plot(
         x, y, ls="", marker=look["marker"], ms=5, mfc="none", mec=look["color"], mew=0.9, label=look.get("label")
     )
 
 
 def thinned(ends: DataFrame) -> DataFrame:
-    """Return every n-th run of a variant that has very many."""
     parts = [g.iloc[:: -(-len(g) // MOST_POINTS)].index for _, g in ends.groupby("variant", sort=False)]
     return ends.loc[[i for part in parts for i in part]]

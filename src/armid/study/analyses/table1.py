@@ -14,7 +14,7 @@ from armid.study.analyses.drawing import legend_below, row_names
 from armid.units import SHOWN
 
 MEAN_ROW = "mean of the rows"
-AVERAGED = ("published_error", "error_of_median", "median_error", "mean_error")
+AVERAGED = ["published_error", "error_of_median", "median_error", "mean_error"]
 COLUMNS = (
     Column("case", "row"), PARAMETER, Column("unit", "unit"), Column("truth", "truth", ".4f"),
     Column("published", "paper", ".4f"), Column("median", "ours (median)", ".4f"),
@@ -78,20 +78,19 @@ def table1_rows(estimates: DataFrame, published: DataFrame) -> DataFrame:
     """
     beside = published[["case", "parameter", "published", "relative_error"]]
     both = estimates.merge(beside.rename(columns={"relative_error": "published_error"}), on=["case", "parameter"])
-    rows: list[dict[str, Any]] = []
+    rows: list[dict[Any, Any]] = []
     for (setting, variant), own in both.groupby(["setting", "variant"], sort=False):
         names = {"setting": setting, "variant": variant}
         found = [names | {"case": case, "parameter": parameter} | one_row(group)
                  for (case, parameter), group in own.groupby(["case", "parameter"], sort=False)]  # fmt: skip
         rows += found
-        for parameter, group in DataFrame(found).groupby("parameter", sort=False):
-            mean = {key: group[key].mean() for key in AVERAGED} | {"n": group["n"].sum()}
-            rows.append(names | {"case": MEAN_ROW, "parameter": parameter, "unit": ""} | mean)
+        groups = DataFrame(found).groupby("parameter", sort=False)
+        means = groups[AVERAGED].mean().assign(n=groups["n"].sum(), case=MEAN_ROW, unit="").reset_index()
+        rows += [names | mean for mean in means.to_dict("records")]
     return DataFrame(rows)
 
 
 def one_row(group: DataFrame) -> dict[str, object]:
-    """Return the numbers of one case and parameter."""
     errors = group["relative_error"].to_numpy(float)
     truth, published, published_error = group[["truth", "published", "published_error"]].to_numpy(float)[0]
     middle = float(group["value"].median())
