@@ -48,6 +48,13 @@ def study(name: str, *figures: str, before: tuple[tuple[str, str], ...] = ()) ->
     return Recipe((f"armid study studies/{name}.toml --out out/{name}", f"armid report out/{name}"), figures, before)
 
 
+def scored(name: str, *figures: str, before: tuple[tuple[str, str], ...]) -> Recipe:
+    """Return the recipe of a study of blind campaigns: run it, then score it against their key."""
+    campaigns = before[-1][0]
+    score = f"python studies/blind/score.py out/{name} --key {campaigns}.key.json --out out/{name}"
+    return Recipe((f"armid study studies/{name}.toml --out out/{name}", score), figures, before)
+
+
 def loop(name: str, *figures: str, campaign: str = "", more: tuple[str, ...] = ()) -> Recipe:
     """Return the recipe of a closed loop; campaign: its folder (studies/campaigns/NAME where none is given)."""
     return Recipe((f"armid close-loop {campaign or f'studies/campaigns/{name}'} --out out/{name}", *more), figures)
@@ -57,7 +64,7 @@ EMPS = "armid identify out/campaigns/emps --effects coulomb,viscous,torque_offse
 STAND = "python studies/test_stand.py"
 ADVICE, ADVISED = "studies/campaigns/blind_advice", "studies/campaigns/blind_advised"
 RECIPES = {
-    "advised": study("advised", "advice", before=(
+    "advised": scored("advised", "advice", before=(
         (ADVICE, f"{STAND} advice {ADVICE} --seed 7"),
         ("out/advice/reports", "armid study studies/advice.toml --out out/advice"),
         ("out/advice/reports", "armid export reports out/advice out/advice/reports"),
@@ -65,7 +72,7 @@ RECIPES = {
     )),
     "benchmark": study("benchmark", "ecdf", "critical_difference_0_3_deg_s"),
     "best_chain": study("best_chain"),
-    "blind": study("blind", "confusion", "held_out", before=(
+    "blind": scored("blind", "confusion", "held_out", before=(
         ("studies/campaigns/blind", f"{STAND} blind studies/campaigns/blind --seed 53"),
     )),
     "cramer_rao": study("cramer_rao", "cramer_rao"),

@@ -9,7 +9,8 @@
 The stand plays the machine: it simulates the declared arm, with any undeclared effects that are asked for, and measures
 it with a noisy gyro. It shares no code with `src/`, so a campaign is an independent check of what identifies it.
 `blind` makes many campaigns that do not tell their truth; it lies in OUT_FOLDER.key.json, and `score` alone reads it:
-RESULTS_FOLDER holds a folder for each campaign with the report.json of `armid close-loop`.
+RESULTS_FOLDER holds a folder for each campaign with the report.json of `armid close-loop`. It tells
+the judgements alone; `studies/blind/score.py` makes tables, figures and a page of them.
 `advice` makes campaigns of few strokes that leave two effects in doubt, `advised` adds the record that was advised,
 and in its place a random one.
 No machine was measured; the constants of the arm are engineering estimates. `--help` lists every option.

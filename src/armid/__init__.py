@@ -30,7 +30,7 @@ WHERE = {
     "armid.registry": ("Registry", "load_registry"),
     "armid.study.results": ("StudyResults", "load_study"),
     "armid.study.runner": ("run_study",),
-    "armid.study.study": ("Study", "read_study"),
+    "armid.study.tasks": ("Study", "read_study"),
 }  # fmt: skip
 HOME = {name: module for module, names in WHERE.items() for name in names}
 __all__ = sorted(HOME)  # noqa: PLE0605 - the names stand above

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from mutated import mutated, toml_of
 from reading_whatever import ARM_CSV, ARM_TOML, edited, edits, many, outcome
 
-from armid.study.plan import planned_runs
-from armid.study.study import Study, description, read_study
+from armid.study.tasks import Study, read_study
 
 STUDY = """\
 name = "small"
@@ -66,8 +65,8 @@ def study_of(content: bytes) -> bool:
 def checked(file: Path) -> Study:
     """Return a study whose first run is planned."""
     study = read_study(file)
-    assert description(study)["name"] == study.name
-    assert next(iter(planned_runs(study))).run
+    assert study.description()["name"] == study.name
+    assert next(iter(study.plan())).run
     return study
 
 

@@ -1,6 +1,5 @@
-"""The loop closed on a small blind suite by the runner: the key stays shut, a kill loses nothing, the report scores."""
+"""The loop closed on a small blind suite by the runner: the key stays shut, a kill loses nothing, the score is right."""
 
-import json
 import os
 import shutil
 import signal
@@ -11,6 +10,7 @@ import time
 from contextlib import closing
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from loop_suite import STUDY, SUITE, kept_reports
 
@@ -99,31 +99,14 @@ def test_a_kill_loses_nothing(start, closed, without_key):
     assert kept_reports(load_study(out)) == kept_reports(closed)
 
 
-def test_the_report_opens_the_key_and_scores(suite, closed, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["report", str(suite / "out")])
-    assert ended.value.code == 0
-    assert "right name, or a group that holds it" in capsys.readouterr().out
-    page = (suite / "out" / "report.md").read_text(encoding="utf-8")
-    assert "| single effects that move the held-out error by more than 20 % | wrong name alone | 0 %" in page
-    for figure in ("confusion", "named_first", "false_alarms", "held_out", "bias", "groups_and_times", "answers"):
-        assert (suite / "out" / f"{figure}.png").stat().st_size > 5000
-        assert (suite / "out" / f"{figure}.svg").is_file()
-        assert f"({figure}.png)" in page
-
-
-def test_a_report_without_its_key_says_so(closed, without_key, capsys):
-    shutil.copytree(closed.path.parent, without_key / "out", dirs_exist_ok=True)
-    with pytest.raises(SystemExit) as ended:
-        main(["report", str(without_key / "out")])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err.endswith("does not exist: `make suite` makes it with the campaigns\n")
-
-
-def test_both_scorers_agree_on_real_reports(suite, closed, tmp_path):
+def test_the_score_is_right_of_a_store_and_of_exported_reports(suite, closed, tmp_path):
     with pytest.raises(SystemExit) as ended:
         main(["export", "reports", str(suite / "out"), str(tmp_path / "reports")])
     assert ended.value.code == 0
-    the_stand("score", suite / "suite", tmp_path / "reports")
-    told = json.loads((tmp_path / "reports" / "score" / "score.json").read_text())
-    assert [row["judgement"] for row in told["judgements"]] == ["right"] * 3
+    for results in (suite / "out", tmp_path / "reports"):
+        program = [sys.executable, str(ROOT / "studies" / "blind" / "score.py"), str(results)]
+        words = ["--key", str(suite / "suite.key.json"), "--out", str(tmp_path / "score")]
+        said = subprocess.run([*program, *words], check=True, capture_output=True, text=True).stdout
+        assert "Complete: 3 of 3 campaigns" in said
+        assert ("closing one campaign, median" in said) == (results == suite / "out")
+        assert set(pd.read_csv(tmp_path / "score" / "campaigns.csv")["judgement"]) == {"right"}

@@ -10,8 +10,7 @@ from loop_suite import STUDY, fake_campaigns
 from armid.cli.main import main
 from armid.errors import ArmidError
 from armid.model import EFFECTS
-from armid.study.loops import describe_loops, planned_loops
-from armid.study.study import read_study
+from armid.study.tasks import read_study
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,20 +29,20 @@ def write(tmp_path):
 
 def test_a_run_for_each_campaign_and_no_word_of_the_key_in_it(write):
     study = read_study(write("[suite]\nanything = [1, 2]\n"))
-    planned = list(planned_loops(study))
+    planned = list(study.plan())
     assert [p.case for p in planned] == ["c000", "c001"]
     assert len({p.run for p in planned}) == 2
     assert not any("key" in p.settings for p in planned)
 
 
 def test_other_records_and_other_candidates_are_other_runs(write, tmp_path):
-    before = {p.case: p.run for p in planned_loops(read_study(write()))}
-    assert before == {p.case: p.run for p in planned_loops(read_study(write("# a remark\n")))}
+    before = {p.case: p.run for p in read_study(write()).plan()}
+    assert before == {p.case: p.run for p in read_study(write("# a remark\n")).plan()}
     with open(tmp_path / "suite" / "c001" / "lower.csv", "a", encoding="utf-8") as file:
         file.write("0.001,0\n")
-    changed = {p.case: p.run for p in planned_loops(read_study(write()))}
+    changed = {p.case: p.run for p in read_study(write()).plan()}
     assert (changed["c000"] == before["c000"], changed["c001"] == before["c001"]) == (True, False)
-    other = {p.case: p.run for p in planned_loops(read_study(write('without = ["tilt"]\n')))}
+    other = {p.case: p.run for p in read_study(write('without = ["tilt"]\n')).plan()}
     assert not set(other.values()) & set(changed.values())
 
 
@@ -54,9 +53,16 @@ def test_all_effects_are_looked_for_unless_the_study_says_otherwise(write):
 
 
 def test_a_key_is_told_as_seen_from_the_store(write, tmp_path):
-    told = describe_loops(read_study(write()), tmp_path / "results" / "blind")
+    told = read_study(write()).description(tmp_path / "results" / "blind")
     assert told["key"] == "../../suite.key.json"
     assert json.loads(json.dumps(told)) == told
+
+
+def test_rivals_are_looked_for_in_their_campaigns_alone(write):
+    study = read_study(write('[rivals]\n"*0" = ["tilt"]\n'))
+    assert study.candidates_for("c000") == ("tilt",)
+    assert study.candidates_for("c001") == study.candidates
+    assert ['"candidates":["tilt"]' in p.settings for p in study.plan()] == [True, False]
 
 
 def test_some_campaigns_only(write):

@@ -145,9 +145,9 @@ def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(w
     assert not retried.runs["started_at"].equals(first.runs["started_at"]) or retried.runs["seconds"].iloc[-1] > 0
     with open(mine, "a", encoding="utf-8") as text:
         text.write("\n# mended\n")
-    from armid.study.spec import load_known
+    from armid.study.spec import study_registry
 
-    assert load_known(told["plugins"]).own("identifiers", "raises+bobyqa") != {}
+    assert study_registry(told["plugins"]).own("identifiers", "raises+bobyqa") != {}
     changed = run_study(file, **told)
     same = set(changed.runs["run"]) & set(first.runs["run"])
     assert same == set(first.runs[kept]["run"])

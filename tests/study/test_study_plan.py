@@ -8,11 +8,10 @@ import pytest
 from small_study import RUNS_A_SEED, same_results
 
 from armid.study.cases import DEGREE, clean_records
-from armid.study.plan import planned_runs
 from armid.study.results import load_study
-from armid.study.run_cache import Workshop
+from armid.study.run_cache import RunCache
 from armid.study.runner import run_study
-from armid.study.study import read_study
+from armid.study.tasks import read_study
 
 STUDIES = Path(__file__).parents[2] / "studies"
 RANDOM = """\
@@ -27,12 +26,12 @@ FIRST_CASE = '[[cases]]\nname = "row 1"'
 
 def replays_of(study, **wanted):
     """Replays of the first planned run whose words are as wanted."""
-    planned = next(p for p in planned_runs(study) if all(getattr(p, word) == value for word, value in wanted.items()))
-    return Workshop(study.known, study.folder).replays(json.loads(planned.settings))[1]
+    planned = next(p for p in study.plan() if all(getattr(p, word) == value for word, value in wanted.items()))
+    return RunCache(study.registry, study.folder).replays(json.loads(planned.settings))[1]
 
 
 def test_every_combination_is_there_once_seed_by_seed(write_study):
-    planned = list(planned_runs(read_study(write_study(3))))
+    planned = list(read_study(write_study(3)).plan())
     assert len({p.run for p in planned}) == len(planned) == 3 * RUNS_A_SEED
     assert [p.seed for p in planned] == sorted(p.seed for p in planned)
     words = {(p.case, p.identifier, p.fitness, p.noise_deg_s, p.seed) for p in planned}
@@ -77,7 +76,7 @@ def test_simulated_records_agree_with_an_independent_integrator(stand, write_stu
     file = stand(*truth, *told, "--duration", "0.3")
     theirs = np.loadtxt(file / "lower.csv", delimiter=",", skiprows=101)[:, 1]
     study = read_study(write_study(1))
-    settings = json.loads(next(planned_runs(study)).settings)
+    settings = json.loads(next(study.plan()).settings)
     ours = clean_records(settings, study.cases[0].model)[0].measured
     # the file has six decimals
     assert np.abs(np.rad2deg(ours) - theirs).max() < 0.6e-6
@@ -141,7 +140,7 @@ def test_the_studies_of_the_project_can_be_read(file):
     if "identifiers" not in tomllib.loads(file.read_text()):
         pytest.skip("a question of another kind")
     study = read_study(file)
-    assert next(planned_runs(study)).case == study.cases[0].name
+    assert next(study.plan()).case == study.cases[0].name
 
 
 def test_the_store_tells_all_of_a_run(undisturbed):

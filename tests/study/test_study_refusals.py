@@ -4,7 +4,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.study.runner import run_study
-from armid.study.study import read_study
+from armid.study.tasks import read_study
 
 BOX = "[bounds]\n"
 CHAIN = 'name = "pso+least_squares"'

@@ -8,8 +8,7 @@ from contextlib import closing
 import pytest
 
 from armid.errors import ArmidError
-from armid.study.outcome import DONE, Outcome
-from armid.study.plan import Planned
+from armid.study.outcome import DONE, Outcome, Planned
 from armid.study.results import load_study
 from armid.study.store import FILE_NAME, ProcessIdentity, Store, is_gone, start_of, this_place, this_process
 

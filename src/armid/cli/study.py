@@ -45,13 +45,13 @@ def study_command(
     with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
     from armid.study.runner import (
-        Watch,
+        ProgressBar,
         absolute,
         run,
     )
-    from armid.study.study import read_study
+    from armid.study.tasks import read_study
 
-    with Watch() as watch:
+    with ProgressBar() as watch:
         known = read_study(study, absolute(plugins))
         ending = run(known, study, jobs, dask, out, time_limit, only, retry, watch.update)
     for line in words(ending):

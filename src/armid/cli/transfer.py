@@ -90,8 +90,8 @@ def reports_command(folder: Path, out: Path) -> None:
     DIR holds study.sqlite of a study of kind close_loop. Files are the same as those of `armid close-loop`.
     """
     from armid.study.export import export_reports
-    from armid.study.kind import CLOSES_LOOP
     from armid.study.results import load_study
+    from armid.study.spec import CLOSES_LOOP
 
     results = load_study(folder)
     if results.study["kind"] != CLOSES_LOOP:

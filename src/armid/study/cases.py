@@ -1,8 +1,8 @@
-"""Cases out of the study's file: simulated ones, random ones, and campaigns."""
+"""Cases out of the study's file: simulated ones, random ones, and campaigns; and the records of simulated ones."""
 
 import hashlib
 import os.path
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
@@ -19,16 +19,15 @@ from armid.record.pieces import SLACK, is_constant, part, with_window
 from armid.record.reader import campaign_path, record_constants
 from armid.record.resample import FEWEST_SAMPLES
 from armid.record.schema import RecordSheet, unknown_name, validated
-from armid.study.spec import WHOLE, CaseSheet, Known, ManoeuvreSheet, RandomSheet, StudySheet, chosen
+from armid.study.spec import WHOLE, CaseSpec, ManoeuvreSpec, RandomCasesSpec, StudyRegistry, StudySpec, lookup
 
-
-@dataclass(frozen=True)
-class Stroke:
-    """Hold a manoeuvre that is simulated: its constants (SI), length [s] and role."""
-
-    constants: Mapping[str, float]
-    duration_s: float
-    role: str
+Array = NDArray[np.float64]
+DEGREE = np.pi / 180.0
+MOST_SAMPLES = 10**7
+KNOWN = "known"
+# Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
+# fourth power: of the arm it is then about 1e-11 rad/s.
+FINER = 8
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Case:
 
     truth: parameter -> true value, SI, empty where not known; all parameters of the model where the records are
     simulated. published: values of others to stand beside. space: bounds and fixed values.
-    strokes: manoeuvres to simulate, or source: the campaign to read.
+    strokes: manoeuvres to simulate, each with its constants (SI), duration_s and role; or source: the campaign to read.
     """
 
     name: str
@@ -58,7 +57,7 @@ class Case:
     space: Space
     truth: Mapping[str, float] = field(default_factory=dict)
     published: Mapping[str, float] = field(default_factory=dict)
-    strokes: tuple[Stroke, ...] = ()
+    strokes: tuple[dict[str, Any], ...] = ()
     source: Source | None = None
 
     @property
@@ -74,48 +73,79 @@ class Case:
         return {name: float(value) for name, value, free in values if not free}
 
 
-def box_of(
-    model: Model, overrides: Mapping[str, Override], sheet: StudySheet, entry: CaseSheet | None, where: str
-) -> Space:
-    """Return bounds and fixed values; what the case fixes or frees holds against what the study says.
+def cases_of(spec: StudySpec, model: Model, registry: StudyRegistry, folder: Path, where: str) -> tuple[Case, ...]:
+    """Return the cases of a study, random ones last.
 
-    Raises ArmidError for an unknown parameter, impossible bounds, and one both bounded and fixed in the same place.
+    model: the plant with the study's effects. folder: of the study's file.
+
+    Raises ArmidError for a case that asks for what cannot be.
     """
+    cases = []
+    for i, table in enumerate(spec.cases):
+        name = table.get("name")
+        at = f"{where}, case {shown(name) if isinstance(name, str) else i + 1}"
+        cases.append(_case(validated(CaseSpec, table, at), spec, model, registry, folder, at))
+    if spec.random_cases is not None:
+        cases += _random_cases(spec, model, f"{where}, random_cases")
+    if not cases:
+        raise ArmidError(f"{where}: there is no case, a table [[cases]] or [random_cases] is expected")
+    names = [case.name for case in cases]
+    for name in names:
+        if names.count(name) > 1:
+            raise ArmidError(f"{where}: case '{name}' is there twice, each name once is expected")
+        if "/" in name:
+            raise ArmidError(f"{where}: the name of case '{name}' holds '/', which --only needs between case and "
+                             "identifier, another sign is expected")  # fmt: skip
+    return tuple(cases)
+
+
+def _case(
+    entry: CaseSpec, spec: StudySpec, model: Model, registry: StudyRegistry, folder: Path, where: str
+) -> Case:  # fmt: skip
+    if (entry.campaign is None) == (not entry.manoeuvres):
+        both = "both are" if entry.campaign is not None else "neither is"
+        raise ArmidError(f"{where}: manoeuvres to simulate or a campaign to read is expected, {both} given")
+    if entry.campaign is not None:
+        case = _campaign_case(entry, entry.campaign, spec, registry, folder, where)
+        _check_truth(case, where)
+        return case
+    if entry.records is not None:
+        raise ArmidError(f"{where}: 'records' are files of a campaign, and no campaign is given")
+    space = _space(model, {}, spec, entry, where)
+    return _simulated_case(entry.name, entry.truth, entry.published, entry.manoeuvres, space, spec, model, where)
+
+
+def _space(
+    model: Model, overrides: Mapping[str, Override], spec: StudySpec, entry: CaseSpec | None, where: str
+) -> Space:  # fmt: skip
+    """Return bounds and fixed values; what the case fixes or frees holds against what the study says."""
     own_bounds, own_fixed = (entry.bounds, entry.fixed) if entry else ({}, {})
-    fixed = {name: v for name, v in sheet.fixed.items() if name not in own_bounds} | dict(own_fixed)
-    bounds = {name: b for name, b in sheet.bounds.items() if name not in own_fixed} | dict(own_bounds)
+    fixed = {name: v for name, v in spec.fixed.items() if name not in own_bounds} | dict(own_fixed)
+    bounds = {name: b for name, b in spec.bounds.items() if name not in own_fixed} | dict(own_bounds)
     try:
         return space_of(model, overrides, bounds, fixed)
     except ArmidError as error:
         raise ArmidError(f"{where}: {error}") from error
 
 
-def campaign_case(entry: CaseSheet, sheet: StudySheet, known: Known, folder: Path, where: str) -> Case:
-    """Return a case of the train and holdout records of a campaign.
-
-    Raises ArmidError for a campaign that cannot be read, has another plant, or holds no such record.
-    """
-    assert entry.campaign is not None
-    path = campaign_folder(folder, entry.campaign, where)
-    campaign = with_records(read_campaign(path, known.plants, known.effects), entry.records, where)
-    if campaign.plant.name not in {v.name for v in known.plants[sheet.plant].variants} | {sheet.plant}:
-        raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{sheet.plant}' is expected")
+def _campaign_case(
+    entry: CaseSpec, folder_name: str, spec: StudySpec, registry: StudyRegistry, folder: Path, where: str
+) -> Case:
+    path = campaign_folder(folder, folder_name, where)
+    campaign = _with_records(read_campaign(path, registry.plants, registry.effects), entry.records, where)
+    if campaign.plant.name not in {v.name for v in registry.plants[spec.plant].variants} | {spec.plant}:
+        raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{spec.plant}' is expected")
     model = Model(campaign.plant)
-    for name in dict.fromkeys((*campaign.effects, *sheet.effects)):
-        model = model + chosen(known.effects, name, "effect", where)
-    space = box_of(model, campaign.parameters, sheet, entry, where)
-    check_windows_of_campaign(campaign, sheet, where)
-    files = tuple(r.file for r in campaign.records)
-    source = Source(entry.campaign, files, digest_of(path, files))
-    return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source)
-
-
-def check_windows_of_campaign(campaign: Campaign, sheet: StudySheet, where: str) -> None:
-    """Refuse a window that holds too little of a record."""
-    for window in sheet.windows_s:
+    for name in dict.fromkeys((*campaign.effects, *spec.effects)):
+        model = model + lookup(registry.effects, name, "effect", where)
+    space = _space(model, campaign.parameters, spec, entry, where)
+    for window in spec.windows_s:
         if not isinstance(window, str):
             for record in campaign.records:
                 with_window(record, window, f"{where}, windows_s")
+    files = tuple(r.file for r in campaign.records)
+    source = Source(folder_name, files, digest_of(path, ("campaign.toml", *files)))
+    return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source)
 
 
 def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
@@ -137,11 +167,8 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
     return toml.parent
 
 
-def with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -> Campaign:
-    """Return the campaign with some of its records, None: all.
-
-    Raises ArmidError for a file that is none of its records, and where none is left to train on.
-    """
+def _with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -> Campaign:
+    """Return the campaign with some of its records, None: all."""
     if files is None:
         return campaign
     there = [r.file for r in campaign.records]
@@ -154,21 +181,109 @@ def with_records(campaign: Campaign, files: Sequence[str] | None, where: str) ->
     return some
 
 
-def digest_of(folder: Path, files: Sequence[str]) -> str:
-    """Return a hash of campaign.toml and some CSV files of a campaign."""
+def digest_of(folder: Path, files: Iterable[str]) -> str:
+    """Return a hash of some files of a campaign."""
     digest = hashlib.sha256()
-    for name in ("campaign.toml", *files):
+    for name in files:
         content = (folder / name).read_bytes()
         digest.update(f"{name}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
 
 
-Array = NDArray[np.float64]
-DEGREE = np.pi / 180.0
-KNOWN = "known"
-# Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
-# fourth power: of the arm it is then about 1e-11 rad/s.
-FINER = 8
+def _simulated_case(
+    name: str,
+    truth: Mapping[str, float],
+    published: Mapping[str, float],
+    manoeuvres: Sequence[Mapping[str, Any]],
+    space: Space,
+    spec: StudySpec,
+    model: Model,
+    where: str,
+) -> Case:
+    """Return a case whose records the engine makes at the truth."""
+    if model.plant.inputs:
+        raise ArmidError(f"{where}: plant '{model.plant.name}' is driven by {model.plant.inputs[0].name}, which no "
+                         "manoeuvre tells: a campaign is expected")  # fmt: skip
+    strokes = tuple(_stroke(m, spec, model.plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
+    if not any(s["role"] == "train" for s in strokes):
+        raise ArmidError(f"{where}: no manoeuvre has the role 'train', at least one is expected")
+    case = Case(name, model, space, _completed(truth, model, where), dict(published), strokes)
+    _check_truth(case, where)
+    _check_windows(case, spec, where)
+    return case
+
+
+def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, where: str) -> dict[str, Any]:
+    """Return one manoeuvre, its constants laid over those of the study."""
+    manoeuvre = validated(ManoeuvreSpec, table, where, [key.key for key in plant.keys])
+    record = RecordSheet(file="", role=manoeuvre.role, constants=manoeuvre.constants, keys=manoeuvre.keys)
+    constants = record_constants(plant, spec.constants, record, where)
+    if not FEWEST_SAMPLES - 1 <= manoeuvre.duration_s / spec.interval_s <= MOST_SAMPLES:
+        raise ArmidError(f"{where}: duration_s is {manoeuvre.duration_s:g}, {FEWEST_SAMPLES} to {MOST_SAMPLES} samples "
+                         f"of {spec.interval_s:g} s are expected")  # fmt: skip
+    return {"constants": constants, "duration_s": manoeuvre.duration_s, "role": manoeuvre.role}
+
+
+def _completed(truth: Mapping[str, float], model: Model, where: str) -> dict[str, float]:
+    """Return the true value of every parameter: an effect's that is not given is its null value."""
+    for name in truth:
+        if name not in model.parameters:
+            raise unknown_name("parameter of the truth", name, model.parameters, where)
+    known = {name: p.null for name, p in model.parameters.items()} | dict(truth)
+    for name, value in known.items():
+        if value is None:
+            raise ArmidError(f"{where}: the truth does not tell '{name}', a value in SI is expected")
+    return {name: float(value) for name, value in known.items() if value is not None}
+
+
+def _check_truth(case: Case, where: str) -> None:
+    """Refuse a truth that the search cannot find, and published values of what is not in the model."""
+    for name in (*case.truth, *case.published):
+        if name not in case.space.names:
+            raise unknown_name("parameter", name, case.space.names, where)
+    for name, (low, high) in case.bounds.items():
+        value = case.truth.get(name)
+        if value is not None and not low <= value <= high:
+            raise ArmidError(f"{where}: the truth of '{name}' is {value:.10g}, outside its bounds {low:g} to {high:g}")
+    if not case.bounds:
+        raise ArmidError(f"{where}: every parameter is fixed, at least one that is searched is expected")
+
+
+def _check_windows(case: Case, spec: StudySpec, where: str) -> None:
+    """Refuse a window that holds too little of a manoeuvre."""
+    for window in spec.windows_s:
+        if window == WHOLE:
+            continue
+        begin, end = (float(t) for t in window)
+        for stroke in case.strokes:
+            last = round(stroke["duration_s"] / spec.interval_s)
+            first = max(int(np.ceil(begin / spec.interval_s - SLACK)), 0)
+            held = min(int(np.floor(end / spec.interval_s + SLACK)), last) - first + 1
+            if not begin < end or held < FEWEST_SAMPLES:
+                raise ArmidError(f"{where}: window [{begin:g}, {end:g}] holds {max(held, 0)} samples of a manoeuvre of "
+                                 f"{stroke['duration_s']:g} s, at least {FEWEST_SAMPLES} are expected")  # fmt: skip
+
+
+def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:
+    """Return n cases whose truths are a Latin hypercube over the bounds of the free parameters.
+
+    Each range is cut into n equal parts and each part is hit once; the margin is kept free at each side.
+    Written out, as the points that a library draws from a seed change between its versions, and with them the cases.
+    Source: McKay, Beckman, Conover 1979, doi:10.2307/1268522.
+    """
+    wanted = validated(RandomCasesSpec, spec.random_cases, where)
+    if wanted.margin >= 0.5:
+        raise ArmidError(f"{where}: margin is {wanted.margin:g}, a share of the range from 0 to below 0.5 is expected")
+    space, n = _space(model, {}, spec, None, where), wanted.n
+    rng = np.random.default_rng(wanted.seed)
+    low, high = space.low[space.free], space.high[space.free]
+    parts = np.array([rng.permutation(n) for _ in low]).T
+    points = (parts + rng.random(parts.shape)) / n
+    whole = space.complete(low + (high - low) * (wanted.margin + (1.0 - 2.0 * wanted.margin) * points))
+    truths = [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
+    first = _simulated_case("", truths[0], {}, wanted.manoeuvres, space, spec, model, where)
+    names = [f"random {i:0{len(str(n))}d}" for i in range(1, n + 1)]
+    return [replace(first, name=name, truth=_completed(t, model, where)) for name, t in zip(names, truths, strict=True)]
 
 
 def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ...]:
@@ -176,32 +291,26 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
     settings: of a run. Raises ArmidError where the truth diverges or does not move.
     """
-    truth = np.array([settings["truth"][name] for name in model.parameters])
-    return tuple(
-        clean_record(f"manoeuvre {i}", stroke, settings["interval_s"], truth, model)
-        for i, stroke in enumerate(settings["strokes"], 1)
-    )
+    truth = np.array([settings["truth"][name] for name in model.parameters])[np.newaxis]
+    interval, records = settings["interval_s"], []
+    for i, stroke in enumerate(settings["strokes"], 1):
+        name, n_samples = f"manoeuvre {i}", round(stroke["duration_s"] / interval) + 1
+        manoeuvre = Manoeuvre(interval, n_samples, stroke["constants"])
+        coarse = calibrate(model, manoeuvre, truth, FINE, spans=False).schedule
+        run = simulate(model, manoeuvre, truth, Schedule(FINER * coarse.substeps))
+        if run.failed[0]:
+            raise ArmidError(f"{name}: the simulation diverges at the truth, a motion is expected")
+        if is_constant(run.output[0]):
+            raise ArmidError(f"{name}: the machine does not move at the truth, a motion is expected")
+        record = Record(
+            file=name, role=stroke["role"], unit=model.plant.output_unit, manoeuvre=manoeuvre, measured=run.output[0],
+            rest=np.empty(0), noise=Noise(0.0, 0.0, 0.0, 1.0, n_samples, KNOWN), pieces=(), whole_pieces=(),
+        )  # fmt: skip
+        records.append(_with_signal(record, run.output[0]))
+    return tuple(records)
 
 
-def clean_record(name: str, stroke: Mapping[str, Any], interval: float, truth: Array, model: Model) -> Record:
-    """Return one record, simulated at a whole candidate."""
-    n_samples = round(stroke["duration_s"] / interval) + 1
-    manoeuvre = Manoeuvre(interval, n_samples, stroke["constants"])
-    coarse = calibrate(model, manoeuvre, truth[np.newaxis], FINE, spans=False).schedule
-    run = simulate(model, manoeuvre, truth[np.newaxis], Schedule(FINER * coarse.substeps))
-    if run.failed[0]:
-        raise ArmidError(f"{name}: the simulation diverges at the truth, a motion is expected")
-    if is_constant(run.output[0]):
-        raise ArmidError(f"{name}: the machine does not move at the truth, a motion is expected")
-    silence = Noise(0.0, 0.0, 0.0, 1.0, n_samples, KNOWN)
-    record = Record(
-        file=name, role=stroke["role"], unit=model.plant.output_unit, manoeuvre=manoeuvre, measured=run.output[0],
-        rest=np.empty(0), noise=silence, pieces=(), whole_pieces=(),
-    )  # fmt: skip
-    return with_signal(record, run.output[0])
-
-
-def with_signal(record: Record, measured: Array) -> Record:
+def _with_signal(record: Record, measured: Array) -> Record:
     """Return the record with another signal over its whole length, in one piece."""
     pieces = (part(record.manoeuvre, measured, 0, measured.size, {}),)
     return replace(record, measured=measured, pieces=pieces, whole_pieces=pieces)
@@ -217,168 +326,11 @@ def noisy_records(records: Sequence[Record], settings: Mapping[str, Any]) -> tup
 
     The same study seed, case, level and seed give the same noise whoever searches, on whatever fitness and window.
     """
-    rng, rms = noise_generator(settings), DEGREE * settings["noise_deg_s"]
-    noisy = []
+    words = "\0".join(str(settings[word]) for word in ("noise_seed", "case", "noise_deg_s", "seed"))
+    rng = np.random.default_rng(np.frombuffer(hashlib.sha256(words.encode()).digest(), dtype="<u4"))
+    rms, noisy = DEGREE * settings["noise_deg_s"], []
     for record in records:
         known = Noise(rms, 0.0, 0.0, 1.0, record.measured.size, KNOWN)
         signal = record.measured + rms * rng.standard_normal(record.measured.size)
-        noisy.append(with_signal(replace(record, noise=known), signal))
+        noisy.append(_with_signal(replace(record, noise=known), signal))
     return tuple(noisy)
-
-
-def noise_generator(settings: Mapping[str, Any]) -> np.random.Generator:
-    """Return the source of a run's noise: of the study's seed, the case, the level and the run's seed alone."""
-    told = "\0".join(str(settings[word]) for word in ("noise_seed", "case", "noise_deg_s", "seed"))
-    return np.random.default_rng(np.frombuffer(hashlib.sha256(told.encode()).digest(), dtype="<u4"))
-
-
-def spread(space: Space, n: int, seed: int, margin: float) -> list[dict[str, float]]:
-    """Return n truths, parameter -> value in SI: a Latin hypercube over the box of the free parameters.
-
-    Each range is cut into n equal parts and each part is hit once. margin: share of the range kept free at each side.
-    Written out, as the points that a library draws from a seed change between its versions, and with them the cases.
-    Source: McKay, Beckman, Conover 1979, doi:10.2307/1268522.
-    """
-    rng = np.random.default_rng(seed)
-    low, high = space.low[space.free], space.high[space.free]
-    parts = np.array([rng.permutation(n) for _ in low]).T
-    points = (parts + rng.random(parts.shape)) / n
-    whole = space.complete(low + (high - low) * (margin + (1.0 - 2.0 * margin) * points))
-    return [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
-
-
-MOST_SAMPLES = 10**7
-
-
-def cases_of(sheet: StudySheet, model: Model, known: Known, folder: Path, where: str) -> tuple[Case, ...]:
-    """Return the cases of a study, random ones last.
-
-    model: the plant with the study's effects. folder: of the study's file.
-
-    Raises ArmidError for a case that asks for what cannot be.
-    """
-    cases = [case_of(table, i, sheet, model, known, folder, where) for i, table in enumerate(sheet.cases)]
-    if sheet.random_cases is not None:
-        cases += random_cases(sheet, model, where)
-    if not cases:
-        raise ArmidError(f"{where}: there is no case, a table [[cases]] or [random_cases] is expected")
-    names = [case.name for case in cases]
-    for name in names:
-        if names.count(name) > 1:
-            raise ArmidError(f"{where}: case '{name}' is there twice, each name once is expected")
-        if "/" in name:
-            raise ArmidError(f"{where}: the name of case '{name}' holds '/', which --only needs between case and "
-                             "identifier, another sign is expected")  # fmt: skip
-    return tuple(cases)
-
-
-def case_of(
-    table: Mapping[str, Any], index: int, sheet: StudySheet, model: Model, known: Known, folder: Path, where: str
-) -> Case:
-    """Return one [[cases]] entry."""
-    name = table.get("name")
-    at = f"{where}, case {shown(name) if isinstance(name, str) else index + 1}"
-    entry = validated(CaseSheet, table, at)
-    if (entry.campaign is None) == (not entry.manoeuvres):
-        both = "both are" if entry.campaign is not None else "neither is"
-        raise ArmidError(f"{at}: manoeuvres to simulate or a campaign to read is expected, {both} given")
-    if entry.campaign is not None:
-        case = campaign_case(entry, sheet, known, folder, at)
-        check_truth(case, at)
-        return case
-    if entry.records is not None:
-        raise ArmidError(f"{at}: 'records' are files of a campaign, and no campaign is given")
-    space = box_of(model, {}, sheet, entry, at)
-    return simulated_case(entry.name, entry.truth, entry.published, entry.manoeuvres, space, sheet, model, at)
-
-
-def simulated_case(
-    name: str,
-    truth: Mapping[str, float],
-    published: Mapping[str, float],
-    manoeuvres: Sequence[Mapping[str, Any]],
-    space: Space,
-    sheet: StudySheet,
-    model: Model,
-    where: str,
-) -> Case:
-    """Return a case whose records the engine makes at the truth."""
-    if model.plant.inputs:
-        raise ArmidError(f"{where}: plant '{model.plant.name}' is driven by {model.plant.inputs[0].name}, which no "
-                         "manoeuvre tells: a campaign is expected")  # fmt: skip
-    strokes = tuple(stroke_of(m, sheet, model.plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
-    if not any(s.role == "train" for s in strokes):
-        raise ArmidError(f"{where}: no manoeuvre has the role 'train', at least one is expected")
-    case = Case(name, model, space, completed(truth, model, where), dict(published), strokes)
-    check_truth(case, where)
-    check_windows(case, sheet, where)
-    return case
-
-
-def stroke_of(table: Mapping[str, Any], sheet: StudySheet, plant: Plant, where: str) -> Stroke:
-    """Return one manoeuvre, its constants laid over those of the study."""
-    manoeuvre = validated(ManoeuvreSheet, table, where, [key.key for key in plant.keys])
-    record = RecordSheet(file="", role=manoeuvre.role, constants=manoeuvre.constants, keys=manoeuvre.keys)
-    constants = record_constants(plant, sheet.constants, record, where)
-    n_samples = manoeuvre.duration_s / sheet.interval_s
-    if not FEWEST_SAMPLES - 1 <= n_samples <= MOST_SAMPLES:
-        raise ArmidError(f"{where}: duration_s is {manoeuvre.duration_s:g}, {FEWEST_SAMPLES} to {MOST_SAMPLES} samples "
-                         f"of {sheet.interval_s:g} s are expected")  # fmt: skip
-    return Stroke(constants, manoeuvre.duration_s, manoeuvre.role)
-
-
-def completed(truth: Mapping[str, float], model: Model, where: str) -> dict[str, float]:
-    """Return the true value of every parameter: an effect's that is not given is its null value.
-
-    Raises ArmidError for an unknown parameter and for one of the plant that is missing.
-    """
-    for name in truth:
-        if name not in model.parameters:
-            raise unknown_name("parameter of the truth", name, model.parameters, where)
-    known = {name: p.null for name, p in model.parameters.items()} | dict(truth)
-    for name, value in known.items():
-        if value is None:
-            raise ArmidError(f"{where}: the truth does not tell '{name}', a value in SI is expected")
-    return {name: float(value) for name, value in known.items() if value is not None}
-
-
-def check_truth(case: Case, where: str) -> None:
-    """Refuse a truth that the search cannot find, and published values of what is not in the model."""
-    for name in (*case.truth, *case.published):
-        if name not in case.space.names:
-            raise unknown_name("parameter", name, case.space.names, where)
-    for name, (low, high) in case.bounds.items():
-        value = case.truth.get(name)
-        if value is not None and not low <= value <= high:
-            raise ArmidError(f"{where}: the truth of '{name}' is {value:.10g}, outside its bounds {low:g} to {high:g}")
-    if not case.bounds:
-        raise ArmidError(f"{where}: every parameter is fixed, at least one that is searched is expected")
-
-
-def check_windows(case: Case, sheet: StudySheet, where: str) -> None:
-    """Refuse a window that holds too little of a manoeuvre."""
-    for window in sheet.windows_s:
-        if window == WHOLE:
-            continue
-        begin, end = (float(t) for t in window)
-        for stroke in case.strokes:
-            last = round(stroke.duration_s / sheet.interval_s)
-            first = max(int(np.ceil(begin / sheet.interval_s - SLACK)), 0)
-            held = min(int(np.floor(end / sheet.interval_s + SLACK)), last) - first + 1
-            if not begin < end or held < FEWEST_SAMPLES:
-                raise ArmidError(f"{where}: window [{begin:g}, {end:g}] holds {max(held, 0)} samples of a manoeuvre of "
-                                 f"{stroke.duration_s:g} s, at least {FEWEST_SAMPLES} are expected")  # fmt: skip
-
-
-def random_cases(sheet: StudySheet, model: Model, where: str) -> list[Case]:
-    """Return cases whose truths are spread over the box by a Latin hypercube."""
-    at = f"{where}, random_cases"
-    wanted = validated(RandomSheet, sheet.random_cases, at)
-    if wanted.margin >= 0.5:
-        raise ArmidError(f"{at}: margin is {wanted.margin:g}, a share of the range from 0 to below 0.5 is expected")
-    space = box_of(model, {}, sheet, None, at)
-    truths = spread(space, wanted.n, wanted.seed, wanted.margin)
-    digits = len(str(wanted.n))
-    first = simulated_case("", truths[0], {}, wanted.manoeuvres, space, sheet, model, at)
-    known = [completed(truth, model, at) for truth in truths]
-    return [replace(first, name=f"random {i:0{digits}d}", truth=truth) for i, truth in enumerate(known, 1)]

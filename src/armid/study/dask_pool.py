@@ -1,4 +1,4 @@
-"""Who performs the runs of a study: a Dask cluster."""
+"""A Dask cluster that performs runs in place of own worker processes."""
 
 import threading
 from collections.abc import Sequence
@@ -8,56 +8,56 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from armid.errors import ArmidError
-from armid.study.outcome import Outcome, Task
-from armid.study.pool import Lane, Pace, Workplace
+from armid.study.outcome import ClaimedRun, Outcome
+from armid.study.pool import BatchSize, WorkerProcess, WorkerSetup
 
-# Parcels of runs that each thread of the cluster has before it.
+# Batches of runs that each thread of the cluster has before it.
 AHEAD = 2
-# How often a parcel may be sent again after the loss of the workers that had it.
+# How often a batch may be sent again after the loss of the workers that had it.
 MOST_LOSSES = 10
 CONNECT_S = 20.0
 OF_THREAD = threading.local()
 
 
-def perform_parcel(tasks: tuple[Task, ...], workplace: Workplace) -> list[Outcome]:
+def perform_batch(runs: tuple[ClaimedRun, ...], setup: WorkerSetup) -> list[Outcome]:
     """Perform some runs on a worker of the cluster, in a process of their own that can be stopped."""
-    lane = getattr(OF_THREAD, "lane", None)
-    if lane is None or lane.workplace != workplace:
-        if lane is not None:
-            lane.stop()
-        lane = OF_THREAD.lane = Lane(workplace)
-    return lane.perform(list(tasks))
+    process = getattr(OF_THREAD, "process", None)
+    if process is None or process.setup != setup:
+        if process is not None:
+            process.stop()
+        process = OF_THREAD.process = WorkerProcess(setup)
+    return process.perform(list(runs))
 
 
-class DaskCrew:
-    """Perform runs on a Dask cluster; parcels whose worker is lost are sent again.
+class DaskPool:
+    """A pool on a Dask cluster; batches whose worker is lost are sent again.
 
     address: of the scheduler, as tcp://host:8786.
     Raises ArmidError when `distributed` is not installed and when the cluster does not answer.
     """
 
-    def __init__(self, address: str, workplace: Workplace) -> None:
-        self.workplace, self.address = workplace, address
-        self._client, self._killed = connected(address)
-        self._parcels: dict[Any, tuple[tuple[Task, ...], int]] = {}
+    def __init__(self, address: str, setup: WorkerSetup) -> None:
+        self.setup, self.address = setup, address
+        self._client, self._killed = _connected(address)
+        self._batches: dict[Any, tuple[tuple[ClaimedRun, ...], int]] = {}
         self._ended: SimpleQueue[Any] = SimpleQueue()
-        self._pace = Pace()
+        self._size = BatchSize()
 
     @property
     def held(self) -> int:
         """Number of runs that were given and have not come back."""
-        return sum(len(tasks) for tasks, _ in self._parcels.values())
+        return sum(len(runs) for runs, _ in self._batches.values())
 
     def wanted(self) -> int:
         """Return how many further runs to give now."""
-        parcels = AHEAD * max(1, sum(self._client.nthreads().values()))
-        return int(max(0, parcels - len(self._parcels)) * self._pace.batch)
+        batches = AHEAD * max(1, sum(self._client.nthreads().values()))
+        return int(max(0, batches - len(self._batches)) * self._size.n_runs)
 
-    def give(self, tasks: Sequence[Task]) -> None:
+    def give(self, runs: Sequence[ClaimedRun]) -> None:
         """Add runs."""
-        size = self._pace.batch
-        for first in range(0, len(tasks), size):
-            self._submit(tuple(tasks[first : first + size]), 0)
+        size = self._size.n_runs
+        for first in range(0, len(runs), size):
+            self._submit(tuple(runs[first : first + size]), 0)
 
     def wait(self, seconds: float) -> list[Outcome]:
         """Return what is finished, at the latest after so many seconds."""
@@ -65,22 +65,22 @@ class DaskCrew:
             raise ArmidError(f"the Dask cluster at {self.address} has gone: start again to go on")
         with suppress(Empty):
             outcomes = self._finished(self._ended.get(timeout=seconds))
-            self._pace.see(outcomes)
+            self._size.update(outcomes)
             return outcomes
         return []
 
     def close(self) -> None:
         """End at once; what is not finished is lost."""
-        self._client.cancel(list(self._parcels))
+        self._client.cancel(list(self._batches))
         self._client.close()
 
-    def _submit(self, tasks: tuple[Task, ...], losses: int) -> None:
-        future = self._client.submit(perform_parcel, tasks, self.workplace, pure=False)
-        self._parcels[future] = (tasks, losses)
+    def _submit(self, runs: tuple[ClaimedRun, ...], losses: int) -> None:
+        future = self._client.submit(perform_batch, runs, self.setup, pure=False)
+        self._batches[future] = (runs, losses)
         future.add_done_callback(self._ended.put)
 
     def _finished(self, future: Any) -> list[Outcome]:
-        tasks, losses = self._parcels.pop(future)
+        runs, losses = self._batches.pop(future)
         if future.status == "finished":
             outcomes: list[Outcome] = future.result()
             return outcomes
@@ -89,15 +89,12 @@ class DaskCrew:
             raise ArmidError(f"a worker of the Dask cluster fails: {error}") from error
         if losses >= MOST_LOSSES:
             raise ArmidError(f"the Dask cluster at {self.address} has lost {losses} workers over the same runs")
-        self._submit(tasks, losses + 1)
+        self._submit(runs, losses + 1)
         return []
 
 
-def connected(address: str) -> tuple[Any, Any]:
-    """Return a client of a cluster, and the error of a lost worker.
-
-    Raises ArmidError with one sentence where there is none.
-    """
+def _connected(address: str) -> tuple[Any, Any]:
+    """Return a client of a cluster, and the error of a lost worker."""
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:

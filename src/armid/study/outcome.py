@@ -1,5 +1,7 @@
-"""What is left of a run."""
+"""A run as it is planned, handed out and performed, and the trace of its improvements."""
 
+import hashlib
+import json
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,14 +11,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 DONE, FAILED = "done", "failed"
+# Hexadecimal digits of a run's id: two of a million runs share theirs with a probability of 1e-8.
+ID_LENGTH = 16
+# Little-endian on every machine; the values of a trace have few equal bytes, so that a higher level gains nothing.
+COUNTS, VALUES, LEVEL = "<i8", "<f8", 1
 
 
-@dataclass(frozen=True)
-class Task:
-    """Hold a run that is to be performed: its id, and its settings as the store keeps them (JSON)."""
+class Planned(NamedTuple):
+    """A run: its id, its settings (JSON), and the words under which it is reported.
+
+    noise_deg_s: None for records that are read; they keep the noise that they have.
+    """
 
     run: str
     settings: str
+    case: str
+    identifier: str
+    fitness: str
+    noise_deg_s: float | None
+    window: str
+    seed: int
+    budget: int
+
+
+def planned(settings: Mapping[str, Any], *words: Any) -> Planned:
+    """Return a run whose id is a hash of all that decides its result; words: the fields of Planned after settings."""
+    text = json.dumps(settings, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    return Planned(hashlib.sha256(text.encode()).hexdigest()[:ID_LENGTH], text, *words)
+
+
+class ClaimedRun(NamedTuple):
+    """A run that is to be performed: its id, and its settings as the store keeps them (JSON)."""
+
+    run: str
+    settings: str
+
+
+Rows = Mapping[str, Sequence[tuple[Any, ...]]]
+
+
+class Performed(NamedTuple):
+    """What performing a run gave: simulations used, the model's equations, and rows by table of the store."""
+
+    used: int
+    model: str
+    rows: Rows
 
 
 @dataclass(frozen=True)
@@ -36,12 +75,10 @@ class Outcome:
     started_at: str = ""
     model: str = ""
     versions: Mapping[str, str] = field(default_factory=dict)
-    rows: Mapping[str, Sequence[tuple[Any, ...]]] = field(default_factory=dict)
+    rows: Rows = field(default_factory=dict)
 
 
 Array = NDArray[np.float64]
-# Little-endian on every machine; the values of a trace have few equal bytes, so that a higher level gains nothing.
-COUNTS, VALUES, LEVEL = "<i8", "<f8", 1
 
 
 class RunTrace(NamedTuple):

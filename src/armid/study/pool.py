@@ -1,4 +1,8 @@
-"""Who performs the runs of a study: worker processes on this machine."""
+"""Worker processes on this machine that perform runs, each answered for by itself.
+
+A run that takes too long is stopped, and a worker that dies is replaced; both lose no other run. joblib and
+concurrent.futures cannot stop the one run that hangs, and when a worker dies fail with all that was under way.
+"""
 
 import os
 import signal
@@ -12,16 +16,10 @@ from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Protocol
 
 from armid.errors import ArmidError
-from armid.study.outcome import FAILED, Outcome, Task
+from armid.study.outcome import FAILED, ClaimedRun, Outcome
 from armid.study.worker import FINISHED, READY
-
-# One worker process, as the process sees it that hands it runs.
-#
-# joblib and other pools hand back whole batches, cannot stop the one run that hangs, and when a worker dies fail with
-# all that was under way; here each run is answered for by itself.
 
 # Runs that a worker has before it: while it performs one, the next lies ready.
 AHEAD = 2
@@ -29,11 +27,13 @@ AHEAD = 2
 MOST_DEATHS = 2
 # A process that does not even start within this time [s] never will.
 START_S = 300.0
+# Short runs are fetched from the store as many at a time as take about this long [s], but no more than so many.
+BATCH_S, LARGEST_BATCH = 0.5, 64
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
-class Workplace:
+class WorkerSetup:
     """Hold what a worker is told at its start, and how long a run may take [s]."""
 
     kind: str
@@ -42,16 +42,79 @@ class Workplace:
     time_limit: float
 
 
-class Lane:
+class BatchSize:
+    """Follow how long runs take lately, and tell how many of them take about as long as a batch should."""
+
+    def __init__(self) -> None:
+        self._seconds = BATCH_S
+
+    def update(self, outcomes: Sequence[Outcome]) -> None:
+        """Take finished runs into account."""
+        for outcome in outcomes:
+            self._seconds += 0.2 * (outcome.seconds - self._seconds)
+
+    @property
+    def n_runs(self) -> int:
+        """Runs of a batch."""
+        return max(1, min(LARGEST_BATCH, int(BATCH_S / max(self._seconds, 1e-6))))
+
+
+class LocalPool:
+    """Perform runs in worker processes on this machine; given at any time, they come back one by one in any order."""
+
+    def __init__(self, jobs: int, setup: WorkerSetup) -> None:
+        self.workers = [WorkerProcess(setup) for _ in range(jobs)]
+        self._waiting: deque[ClaimedRun] = deque()
+        self._batch = BatchSize()
+
+    @property
+    def held(self) -> int:
+        """Number of runs that were given and have not come back."""
+        return len(self._waiting) + sum(worker.held for worker in self.workers)
+
+    def wanted(self) -> int:
+        """Return how many further runs to give now."""
+        enough = AHEAD * len(self.workers)
+        return enough + self._batch.n_runs if self.held <= enough else 0
+
+    def give(self, runs: Sequence[ClaimedRun]) -> None:
+        """Add runs."""
+        self._waiting.extend(runs)
+        self._hand_out()
+
+    def wait(self, seconds: float) -> list[Outcome]:
+        """Return what is finished, at the latest after so many seconds."""
+        busy = [worker for worker in self.workers if worker.held]
+        connections = [worker.connection for worker in busy]
+        wait(connections, max(0.0, min([seconds, *(worker.seconds_left() for worker in busy)])))
+        outcomes = [outcome for worker in busy for outcome in worker.finished()]
+        self._batch.update(outcomes)
+        self._hand_out()
+        return outcomes
+
+    def close(self) -> None:
+        """End at once; what is not finished is lost."""
+        for worker in self.workers:
+            worker.stop()
+
+    def _hand_out(self) -> None:
+        """Give each worker what it needs to go on, the least busy first."""
+        for n in range(AHEAD):
+            for worker in self.workers:
+                if self._waiting and worker.held <= n:
+                    worker.give([self._waiting.popleft()])
+
+
+class WorkerProcess:
     """Hand runs to a worker process, one after the other; start it anew when it dies or a run takes too long.
 
     Such a run is an outcome too: it has failed. Raises ArmidError when the worker cannot be started.
     """
 
-    def __init__(self, workplace: Workplace, clock: Callable[[], float] = time.monotonic) -> None:
-        self.workplace, self._clock = workplace, clock
-        self.waiting: deque[Task] = deque()
-        self._sent: deque[Task] = deque()
+    def __init__(self, setup: WorkerSetup, clock: Callable[[], float] = time.monotonic) -> None:
+        self.setup, self._clock = setup, clock
+        self.waiting: deque[ClaimedRun] = deque()
+        self._sent: deque[ClaimedRun] = deque()
         self._deaths: dict[str, int] = {}
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
@@ -66,39 +129,42 @@ class Lane:
     def connection(self) -> Connection:
         """The end of the pipe on which the worker is heard, a worker being started where there is none."""
         if self._connection is None:
-            self._start()
-        assert self._connection is not None
+            self._connection = self._start()
         return self._connection
 
-    def give(self, tasks: list[Task]) -> None:
+    def give(self, runs: list[ClaimedRun]) -> None:
         """Add runs."""
-        self.waiting.extend(tasks)
+        self.waiting.extend(runs)
         self._send()
 
     def seconds_left(self) -> float:
         """Return how long the present run may still take [s]."""
-        limit = self.workplace.time_limit if self._ready else START_S
+        limit = self.setup.time_limit if self._ready else START_S
         return self._since + limit - self._clock() if self._sent or not self._ready else limit
 
-    def hear(self) -> list[Outcome]:
+    def finished(self) -> list[Outcome]:
         """Return what the worker has finished, without waiting; a dead worker or one that hangs is dealt with."""
         outcomes: list[Outcome] = []
         try:
             while self.connection.poll():
                 outcomes += self._take(*self.connection.recv())
         except (EOFError, OSError):
-            return outcomes + self._buried()
+            return outcomes + self._after_death()
         if self.held and self.seconds_left() <= 0.0:
-            return outcomes + self._stopped()
+            started = self._ready
+            self.stop()
+            if not started:
+                raise ArmidError(f"a worker process cannot start: it was not ready within {START_S:g} s")
+            outcomes += self._failed(f"stopped at the time limit of {self.setup.time_limit:g} s")
         return outcomes
 
-    def perform(self, tasks: list[Task]) -> list[Outcome]:
+    def perform(self, runs: list[ClaimedRun]) -> list[Outcome]:
         """Perform runs and wait for all of them."""
-        self.give(tasks)
+        self.give(runs)
         outcomes: list[Outcome] = []
         while self.held:
             self.connection.poll(max(0.0, min(self.seconds_left(), 1.0)))
-            outcomes += self.hear()
+            outcomes += self.finished()
         return outcomes
 
     def stop(self) -> None:
@@ -110,7 +176,7 @@ class Lane:
             self._connection.close()
         self._process, self._connection, self._ready = None, None, False
 
-    def _start(self) -> None:
+    def _start(self) -> Connection:
         ours, theirs = Pipe()
         command = [sys.executable, "-P", "-m", "armid.study.worker", str(theirs.fileno()), str(os.getpid())]
         nothing = subprocess.DEVNULL
@@ -120,23 +186,25 @@ class Lane:
                 command, stdin=nothing, stdout=nothing, stderr=nothing, pass_fds=(theirs.fileno(),),
                 start_new_session=True, env=os.environ | dict.fromkeys(THREADS, "1"),
             )  # fmt: skip
-        self._connection, self._ready, self._since = ours, False, self._clock()
-        # one that has died already is found by `hear`
+        self._ready, self._since = False, self._clock()
+        # one that has died already is found by `finished`
         with suppress(OSError):
-            ours.send((self.workplace.kind, self.workplace.plugins, str(self.workplace.folder)))
+            ours.send((self.setup.kind, self.setup.plugins, str(self.setup.folder)))
+        return ours
 
     def _take(self, word: str, content: object) -> list[Outcome]:
         self._since = self._clock()
+        outcomes: list[Outcome] = []
         if word == FINISHED:
             assert isinstance(content, Outcome)
             self._sent.popleft()
-            self._send()
-            return [content]
-        if word != READY:
+            outcomes.append(content)
+        elif word == READY:
+            self._ready = True
+        else:
             raise ArmidError(str(content))
-        self._ready = True
         self._send()
-        return []
+        return outcomes
 
     def _send(self) -> None:
         """Keep the worker supplied; no more than it can hold unread, so that neither side ever waits for the other."""
@@ -147,13 +215,13 @@ class Lane:
                 self.connection.send(self.waiting[0])
                 self._sent.append(self.waiting.popleft())
 
-    def _buried(self) -> list[Outcome]:
-        """Start anew after a death; a run that has taken two workers with it has failed."""
+    def _after_death(self) -> list[Outcome]:
+        """Start anew; a run that has taken two workers with it has failed."""
         assert self._process is not None
         started, code = self._ready, self._process.wait()
         self.stop()
         if not started:
-            raise ArmidError(f"a worker process cannot start: it ends {cause_of(code)}")
+            raise ArmidError(f"a worker process cannot start: it ends {_cause(code)}")
         if not self._sent:
             return []
         run = self._sent[0].run
@@ -161,15 +229,7 @@ class Lane:
         if self._deaths[run] < MOST_DEATHS:
             self._take_back()
             return []
-        return self._failed(f"the worker process ended {cause_of(code)}, {MOST_DEATHS} times")
-
-    def _stopped(self) -> list[Outcome]:
-        """Stop a run at its time limit."""
-        started = self._ready
-        self.stop()
-        if not started:
-            raise ArmidError(f"a worker process cannot start: it was not ready within {START_S:g} s")
-        return self._failed(f"stopped at the time limit of {self.workplace.time_limit:g} s")
+        return self._failed(f"the worker process ended {_cause(code)}, {MOST_DEATHS} times")
 
     def _failed(self, error: str) -> list[Outcome]:
         run = self._sent.popleft().run
@@ -182,7 +242,7 @@ class Lane:
         self._sent.clear()
 
 
-def cause_of(code: int) -> str:
+def _cause(code: int) -> str:
     """Return how a process ended, in words."""
     if code >= 0:
         return f"with code {code}"
@@ -190,95 +250,3 @@ def cause_of(code: int) -> str:
         return f"by {signal.Signals(-code).name}"
     except ValueError:
         return f"by signal {-code}"
-
-
-# Short runs are fetched from the store as many at a time as take about this long [s], but no more than so many.
-BATCH_S, LARGEST_BATCH = 0.5, 64
-
-
-class Crew(Protocol):
-    """Perform runs: given at any time, they come back one by one in any order."""
-
-    @property
-    def held(self) -> int:
-        """Number of runs that were given and have not come back."""
-        ...
-
-    def wanted(self) -> int:
-        """Return how many further runs to give now."""
-        ...
-
-    def give(self, tasks: Sequence[Task]) -> None:
-        """Add runs."""
-        ...
-
-    def wait(self, seconds: float) -> list[Outcome]:
-        """Return what is finished, at the latest after so many seconds."""
-        ...
-
-    def close(self) -> None:
-        """End at once; what is not finished is lost."""
-        ...
-
-
-class Pace:
-    """Follow how long runs take lately."""
-
-    def __init__(self) -> None:
-        self.seconds = BATCH_S
-
-    def see(self, outcomes: Sequence[Outcome]) -> None:
-        """Take finished runs into account."""
-        for outcome in outcomes:
-            self.seconds += 0.2 * (outcome.seconds - self.seconds)
-
-    @property
-    def batch(self) -> int:
-        """How many runs take about as long as a batch should."""
-        return max(1, min(LARGEST_BATCH, int(BATCH_S / max(self.seconds, 1e-6))))
-
-
-class LocalCrew:
-    """Perform runs in worker processes on this machine."""
-
-    def __init__(self, jobs: int, workplace: Workplace) -> None:
-        self.lanes = [Lane(workplace) for _ in range(jobs)]
-        self._waiting: deque[Task] = deque()
-        self._pace = Pace()
-
-    @property
-    def held(self) -> int:
-        """Number of runs that were given and have not come back."""
-        return len(self._waiting) + sum(lane.held for lane in self.lanes)
-
-    def wanted(self) -> int:
-        """Return how many further runs to give now."""
-        enough = AHEAD * len(self.lanes)
-        return enough + self._pace.batch if self.held <= enough else 0
-
-    def give(self, tasks: Sequence[Task]) -> None:
-        """Add runs."""
-        self._waiting.extend(tasks)
-        self._hand_out()
-
-    def wait(self, seconds: float) -> list[Outcome]:
-        """Return what is finished, at the latest after so many seconds."""
-        busy = [lane for lane in self.lanes if lane.held]
-        connections = [lane.connection for lane in busy]
-        wait(connections, max(0.0, min([seconds, *(lane.seconds_left() for lane in busy)])))
-        outcomes = [outcome for lane in busy for outcome in lane.hear()]
-        self._pace.see(outcomes)
-        self._hand_out()
-        return outcomes
-
-    def close(self) -> None:
-        """End at once; what is not finished is lost."""
-        for lane in self.lanes:
-            lane.stop()
-
-    def _hand_out(self) -> None:
-        """Give each worker what it needs to go on, the least busy first."""
-        for n in range(AHEAD):
-            for lane in self.lanes:
-                if self._waiting and lane.held <= n:
-                    lane.give([self._waiting.popleft()])

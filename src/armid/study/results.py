@@ -15,61 +15,7 @@ import pandas as pd
 
 from armid.errors import ArmidError
 from armid.study.outcome import DONE, RunTrace, unpacked
-from armid.study.store import WAIT_S, check_format, description_of, store_path, told, whole
-
-
-@contextmanager
-def reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Give a connection that cannot write.
-
-    A store whose runner was killed has a log beside it, which cannot be read in a read-only folder: it is copied then.
-    Raises ArmidError for what is no store.
-    """
-    with told(path):
-        connection = connected(path)
-        if connection is not None:
-            try:
-                yield connection
-            finally:
-                connection.close()
-            return
-    with told(path), TemporaryDirectory(prefix="armid-") as beside:
-        for file in path.parent.glob(f"{path.name}*"):
-            shutil.copy(file, beside)
-        copied = sqlite3.connect(Path(beside) / path.name, isolation_level=None)
-        try:
-            check_format(copied, path)
-            yield copied
-        finally:
-            copied.close()
-
-
-def connected(path: Path) -> sqlite3.Connection | None:
-    """Return a connection that only reads, None where the log beside the file cannot be read in its place."""
-    connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=WAIT_S, isolation_level=None)
-    try:
-        check_format(connection, path)
-    except sqlite3.OperationalError as error:
-        connection.close()
-        if error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
-            return None
-        raise
-    except BaseException:
-        connection.close()
-        raise
-    return connection
-
-
-def existing_store(path: str | Path) -> Path:
-    """Return the file of a store that is there.
-
-    Raises ArmidError when there is none.
-    """
-    file = store_path(path)
-    if not file.is_file():
-        raise ArmidError(f"there is no store {file}: a folder that `armid study` has written is expected")
-    return file
-
+from armid.study.store import FILE_NAME, WAIT_S, check_format, corruption_guard, description_of, translate_errors
 
 RUNS = """
 SELECT p.run, p."case", p.identifier, p.fitness, p.noise_deg_s, p.window, p.seed, p.budget, i.used, i.n_failed, i.value,
@@ -130,9 +76,9 @@ class StudyResults:
     @property
     def loops(self) -> pd.DataFrame:
         """One row a campaign that was closed: run, case, verdict, seconds, cpu_seconds, report (a dict)."""
-        with reading(self.path) as connection:
+        with _reading(self.path) as connection:
             found = pd.read_sql_query(LOOPS, connection)
-        with whole(self.path, "the report of a campaign"):
+        with corruption_guard(self.path, "the report of a campaign"):
             return found.assign(report=[json.loads(text) for text in found["report"]])
 
     def settings_of(self, run: str) -> dict[str, Any]:
@@ -140,11 +86,11 @@ class StudyResults:
 
         Raises ArmidError for a run that is not there.
         """
-        with reading(self.path) as connection:
+        with _reading(self.path) as connection:
             row = connection.execute("SELECT settings FROM settings WHERE run = ?", (run,)).fetchone()
         if row is None:
             raise ArmidError(f"{self.path} holds no run '{run}'")
-        with whole(self.path, f"the settings of run '{run}'"):
+        with corruption_guard(self.path, f"the settings of run '{run}'"):
             settings: dict[str, Any] = json.loads(row[0])
         return settings
 
@@ -153,16 +99,16 @@ class StudyResults:
 
         Raises ArmidError for a hash that is not there.
         """
-        with reading(self.path) as connection:
+        with _reading(self.path) as connection:
             row = connection.execute("SELECT text FROM texts WHERE hash = ?", (digest,)).fetchone()
         if row is None:
             raise ArmidError(f"{self.path} holds no text of hash '{digest}'")
         return str(row[0])
 
     def _traces(self, query: str, values: tuple[str, ...]) -> Iterator[RunTrace]:
-        with reading(self.path) as connection:
+        with _reading(self.path) as connection:
             for run, names, content in connection.execute(query, values):
-                with whole(self.path, f"the trace of run '{run}'"):
+                with corruption_guard(self.path, f"the trace of run '{run}'"):
                     trace = unpacked(run, content, tuple(json.loads(names)))
                 yield trace
 
@@ -182,28 +128,34 @@ def load_study(path: str | Path) -> StudyResults:
 
     Raises ArmidError for what is no store of a study.
     """
-    file = existing_store(path)
-    with reading(file) as connection:
+    file = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
+    if not file.is_file():
+        raise ArmidError(f"there is no store {file}: a folder that `armid study` has written is expected")
+    with _reading(file) as connection:
         # one transaction: a runner that is at work changes nothing between the tables
         connection.execute("BEGIN")
         row = connection.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
         if row is None:
             raise ArmidError(f"{file} holds no study yet: let `armid study` begin it")
         study = description_of(file, str(row[0]))
-        study |= counted(connection) | {"versions": versions(connection), "folder": str(file.parent)}
+        status = "SELECT status, count(*) FROM plan JOIN runs USING (run) GROUP BY status"
+        ended = dict(connection.execute(status).fetchall())
+        study["n_planned"] = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
+        study["n_done"] = ended.get(DONE, 0)
+        study["n_failed"] = sum(ended.values()) - study["n_done"]
+        study |= {"versions": _versions(connection), "folder": str(file.parent)}
         study["parameters"] = list(dict.fromkeys(name for case in study["cases"] for name in case["bounds"]))
-        return StudyResults(file, study, runs_in(connection), parameters_in(connection, study))
+        return StudyResults(file, study, _runs(connection), _parameters(connection, study))
 
 
-def runs_in(connection: sqlite3.Connection) -> pd.DataFrame:
-    """Return one row a finished run."""
+def _runs(connection: sqlite3.Connection) -> pd.DataFrame:
     runs = pd.read_sql_query(RUNS, connection)
     runs[list(NUMBERS)] = runs[list(NUMBERS)].astype(np.float64)
     runs[list(COUNTED)] = runs[list(COUNTED)].fillna(0).astype(np.int64)
     return runs.fillna({"stopped": ""})
 
 
-def parameters_in(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:
+def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:
     """Return one row a run and free parameter, with the truth of its case beside."""
     found = pd.read_sql_query(PARAMETERS, connection)
     truths = {(case["name"], name): v for case in study["cases"] for name, v in case["truth"].items()}
@@ -218,16 +170,7 @@ def parameters_in(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.D
     return found.astype({"at_bound": bool})
 
 
-def counted(connection: sqlite3.Connection) -> dict[str, int]:
-    """Return how many runs are planned, done and failed."""
-    planned = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
-    status = "SELECT status, count(*) FROM plan JOIN runs USING (run) GROUP BY status"
-    ended = dict(connection.execute(status).fetchall())
-    done = ended.get(DONE, 0)
-    return {"n_planned": planned, "n_done": done, "n_failed": sum(ended.values()) - done}
-
-
-def versions(connection: sqlite3.Connection) -> dict[str, str]:
+def _versions(connection: sqlite3.Connection) -> dict[str, str]:
     """Return package -> version; several where runs were made on several."""
     query = "SELECT DISTINCT t.text FROM plan JOIN runs r USING (run) JOIN texts t ON t.hash = r.versions"
     found: dict[str, list[str]] = {}
@@ -235,3 +178,45 @@ def versions(connection: sqlite3.Connection) -> dict[str, str]:
         for package, version in json.loads(text).items():
             found.setdefault(package, []).append(version)
     return {package: ", ".join(sorted(set(those))) for package, those in found.items()}
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[sqlite3.Connection]:
+    """Give a connection that cannot write.
+
+    A store whose runner was killed has a log beside it, which cannot be read in a read-only folder: it is copied then.
+    Raises ArmidError for what is no store.
+    """
+    with translate_errors(path):
+        connection = _connected(path)
+        if connection is not None:
+            try:
+                yield connection
+            finally:
+                connection.close()
+            return
+    with translate_errors(path), TemporaryDirectory(prefix="armid-") as beside:
+        for file in path.parent.glob(f"{path.name}*"):
+            shutil.copy(file, beside)
+        copied = sqlite3.connect(Path(beside) / path.name, isolation_level=None)
+        try:
+            check_format(copied, path)
+            yield copied
+        finally:
+            copied.close()
+
+
+def _connected(path: Path) -> sqlite3.Connection | None:
+    """Return a connection that only reads, None where the log beside the file cannot be read in its place."""
+    connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=WAIT_S, isolation_level=None)
+    try:
+        check_format(connection, path)
+    except sqlite3.OperationalError as error:
+        connection.close()
+        if error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
+            return None
+        raise
+    except BaseException:
+        connection.close()
+        raise
+    return connection

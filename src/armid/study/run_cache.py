@@ -11,9 +11,9 @@ from armid.errors import ArmidError
 from armid.model import Model
 from armid.problem.replay import Replay, replay_of
 from armid.problem.space import Space, space_of
-from armid.record import Campaign, Record, read_campaign
+from armid.record import Record, read_campaign
 from armid.study.cases import DEGREE, campaign_folder, clean_records, digest_of, in_window, noisy_records
-from armid.study.spec import Known, chosen
+from armid.study.spec import StudyRegistry, lookup
 
 # How many cases, each at one level of noise and in one window, are kept ready in a process.
 MOST_KEPT = 512
@@ -21,7 +21,7 @@ SHARED = ("plant", "effects", "bounds", "fixed", "accuracy", "window_s", "truth"
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class PreparedCase:
     """Hold a case ready to run on: whole records without noise, and replays of them in a window.
 
     equations: of the model. records: whole ones that noise is added to, empty for records that are read.
@@ -33,59 +33,59 @@ class Bench:
     replays: tuple[Replay, ...]
 
 
-class Workshop:
+class RunCache:
     """Make what runs need, and keep it for the next run.
 
-    known: what settings may name. folder: of the study's file, where campaigns are read from.
+    registry: what settings may name. folder: of the study's file, where campaigns are read from.
     What is kept changes no result: it depends on the settings alone.
     """
 
-    def __init__(self, known: Known, folder: Path) -> None:
-        self.known, self.folder = known, folder
+    def __init__(self, registry: StudyRegistry, folder: Path) -> None:
+        self.registry, self.folder = registry, folder
         self._kept: OrderedDict[str, Any] = OrderedDict()
 
-    def replays(self, settings: Mapping[str, Any]) -> tuple[Bench, tuple[Replay, ...]]:
-        """Return the bench of a run, and its records with the run's own noise, ready to be simulated."""
+    def replays(self, settings: Mapping[str, Any]) -> tuple[PreparedCase, tuple[Replay, ...]]:
+        """Return the case of a run, and its records with the run's own noise, ready to be simulated."""
         shared = {word: settings[word] for word in SHARED if word in settings}
         level = settings["noise_deg_s"] or 0.0
-        bench = self._once("bench", shared | {"noise": level}, lambda: self._bench(settings, level))
+        case = self._once("case", shared | {"noise": level}, lambda: self._prepared(settings, level))
         if level == 0.0:
-            return bench, bench.replays
-        noisy = [in_window(r, settings["window_s"]) for r in noisy_records(bench.records, settings)]
-        return bench, tuple(measured_again(r, record) for r, record in zip(bench.replays, noisy, strict=True))
+            return case, case.replays
+        noisy = [in_window(r, settings["window_s"]) for r in noisy_records(case.records, settings)]
+        return case, tuple(_measured_again(r, record) for r, record in zip(case.replays, noisy, strict=True))
 
-    def _bench(self, settings: Mapping[str, Any], level: float) -> Bench:
+    def _prepared(self, settings: Mapping[str, Any], level: float) -> PreparedCase:
         model, whole = self._source(settings)
         bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
         space = space_of(model, {}, bounds, settings["fixed"])
-        shown = [in_window(record, settings["window_s"]) for record in whole]
+        records = [in_window(record, settings["window_s"]) for record in whole]
         accuracy = None if settings["accuracy"] == "auto" else settings["accuracy"]
         if level:
             # the accuracy that is enough depends on how loud the noise is, not on how it turns out
-            shown = [replace(r, noise=replace(r.noise, rms=DEGREE * level)) for r in shown]
-        replays = tuple(replay_of(record, model, space, accuracy) for record in shown)
-        return Bench(str(model), space, () if "campaign" in settings else tuple(whole), replays)
+            records = [replace(r, noise=replace(r.noise, rms=DEGREE * level)) for r in records]
+        replays = tuple(replay_of(record, model, space, accuracy) for record in records)
+        return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), replays)
 
     def _source(self, settings: Mapping[str, Any]) -> tuple[Model, tuple[Record, ...]]:
-        if "campaign" in settings:
-            campaign = self._once("campaign", settings["campaign"], lambda: self._campaign(settings["campaign"]))
-            named = [r for r in campaign.records if r.file in settings["campaign"]["records"]]
-            return self._model(campaign.plant, settings["effects"]), tuple(named)
-        model = self._model(chosen(self.known.plants, settings["plant"], "plant", "settings"), settings["effects"])
+        source = settings.get("campaign")
+        if source is None:
+            plant = lookup(self.registry.plants, settings["plant"], "plant", "settings")
+        else:
+            campaign = self._once("campaign", source, lambda: self._campaign(source))
+            plant = campaign.plant
+        model = Model(plant)
+        for name in settings["effects"]:
+            model = model + lookup(self.registry.effects, name, "effect", "settings")
+        if source is not None:
+            return model, tuple(r for r in campaign.records if r.file in source["records"])
         parts = {word: settings[word] for word in ("plant", "effects", "truth", "strokes", "interval_s")}
         return model, self._once("clean", parts, lambda: clean_records(settings, model))
 
-    def _model(self, plant: Any, effects: list[str]) -> Model:
-        model = Model(plant)
-        for name in effects:
-            model = model + chosen(self.known.effects, name, "effect", "settings")
-        return model
-
-    def _campaign(self, source: Mapping[str, Any]) -> Campaign:
+    def _campaign(self, source: Mapping[str, Any]) -> Any:
         path = campaign_folder(self.folder, source["campaign"], "settings")
-        if digest_of(path, source["records"]) != source["digest"]:
+        if digest_of(path, ("campaign.toml", *source["records"])) != source["digest"]:
             raise ArmidError(f"campaign {source['campaign']} has changed since the study was started: start it again")
-        return read_campaign(path, self.known.plants, self.known.effects)
+        return read_campaign(path, self.registry.plants, self.registry.effects)
 
     def _once(self, what: str, of: Mapping[str, Any], make: Callable[[], Any]) -> Any:
         """Return what was made of some settings before, or make it."""
@@ -98,7 +98,7 @@ class Workshop:
         return self._kept[key]
 
 
-def measured_again(replay: Replay, record: Record) -> Replay:
+def _measured_again(replay: Replay, record: Record) -> Replay:
     """Return a replay of the same manoeuvre with another measurement, on the schedule that it has."""
     pieces = tuple(p.until_window_end() for p in record.pieces)
     assert [p.window for p in replay.pieces] == [p.window for p in pieces]

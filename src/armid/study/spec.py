@@ -1,4 +1,4 @@
-"""The shape of a study's TOML file: which keys there are and of what kind."""
+"""What a study's TOML file may hold, key by key, and the registered things that it may name."""
 
 import hashlib
 import re
@@ -27,13 +27,18 @@ from armid.record.schema import (
 )
 from armid.registry import Registry, load_plugin, load_registry
 
-PLAIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+IDENTIFIES, CLOSES_LOOP = KIND_NAMES = ("identify", "close_loop")
 REPORTS = ("", "table1", "table2", "benchmark", "fitness")
+LOOP_REPORTS = ("", "blind", "advice")
 WHOLE = "whole"
+PLAIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 # Neither key nor number of a study may be larger: what it asks for has to fit into memory and a lifetime.
 LARGEST_COUNT = 10**9
 # Seeds and cases are held in memory, one by one.
 MOST_HELD = 10**6
+
+
+# Kinds of values, see `armid.record.schema`: each returns a value as it is wanted, or raises KindError.
 
 
 def plain_name(value: object) -> str:
@@ -44,52 +49,45 @@ def plain_name(value: object) -> str:
 
 
 def line_of_text(value: object) -> str:
-    """Return a text that fits on one line."""
     if text(value).isprintable() and text(value) == text(value).strip():
         return text(value)
     raise KindError(value)
 
 
 def any_text(value: object) -> str:
-    """Return a text, also an empty one."""
     if isinstance(value, str):
         return value
     raise KindError(value)
 
 
-def whole_number(value: object, least: int = 0) -> int:
-    """Return a whole number of at least 0."""
-    if isinstance(value, int) and not isinstance(value, bool) and least <= value <= LARGEST_COUNT:
+def whole_number(value: object, least: int = 0, most: int = LARGEST_COUNT) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and least <= value <= most:
         return value
     raise KindError(value)
 
 
 def count(value: object) -> int:
-    """Return a whole number above 0."""
     return whole_number(value, 1)
+
+
+def held_count(value: object) -> int:
+    """Return a number of things that are all held in memory."""
+    return whole_number(value, 1, MOST_HELD)
 
 
 def seeds(value: object) -> tuple[int, ...]:
     """Return seeds: n stands for 1 to n."""
     if isinstance(value, list):
         return tuple(list_of(whole_number, 1)(value))
-    return tuple(range(1, some(value) + 1))
+    return tuple(range(1, held_count(value) + 1))
 
 
-def some(value: object) -> int:
-    """Return a number of things that are all held in memory."""
-    if count(value) <= MOST_HELD:
-        return count(value)
-    raise KindError(value)
-
-
-def one_or_more(value: object) -> tuple[str, ...]:
+def names(value: object) -> tuple[str, ...]:
     """Return names: one name stands for a list of it."""
     return (text(value),) if isinstance(value, str) else tuple(list_of(text, 1)(value))
 
 
 def at_least_zero(value: object) -> float:
-    """Return a number of at least 0."""
     if number(value) < 0.0:
         raise KindError(value)
     # -0.0 is 0 and is to be written like it
@@ -101,23 +99,21 @@ def levels(value: object) -> tuple[float, ...]:
     return tuple(list_of(at_least_zero, 1)(value)) if isinstance(value, list) else (at_least_zero(value),)
 
 
-def window(value: object) -> tuple[float, ...] | str:
-    """Return [begin, end], or the word for all of a record."""
-    return WHOLE if value == WHOLE else tuple(list_of(number, 2, 2)(value))
-
-
 def windows(value: object) -> tuple[tuple[float, ...] | str, ...]:
-    """Return windows: the word alone stands for a list of it."""
+    """Return windows, each [begin, end] or the word for all of a record; the word alone stands for a list of it."""
+
+    def window(each: object) -> tuple[float, ...] | str:
+        return WHOLE if each == WHOLE else tuple(list_of(number, 2, 2)(each))
+
     return (WHOLE,) if value == WHOLE else tuple(list_of(window, 1)(value))
 
 
-def option(value: object) -> float | int | str | bool:
-    """Return the value of an identifier's option."""
-    return value if isinstance(value, bool | int | str) else number(value)
-
-
 def options(value: object) -> dict[str, float | int | str | bool]:
-    """Return options by name; those of a part of a chain, which TOML nests, as `pso.velocity_limit`."""
+    """Return an identifier's options by name; those of a part of a chain, which TOML nests, as `pso.velocity_limit`."""
+
+    def option(each: object) -> float | int | str | bool:
+        return each if isinstance(each, bool | int | str) else number(each)
+
     found: dict[str, float | int | str | bool] = {}
     for name, inner in any_table(value).items():
         if isinstance(inner, dict):
@@ -129,13 +125,20 @@ def options(value: object) -> dict[str, float | int | str | bool]:
 
 NUMBERS = key(table_of(number), "a finite number in SI")
 BOUNDS = key(table_of(list_of(number, 2, 2)), "[low, high] in SI")
-NAMES = key(one_or_more, "a name or a list of names")
+NAMES = key(names, "a name or a list of names")
+EFFECT_NAMES = key(list_of(text, 1), "a list of names of effects")
 LEVELS = key(levels, "a number of at least 0 in deg/s, or a list of such")
 TABLES = key(list_of(any_table, 1), "a list of at least one table")
+STUDY_NAME = key(plain_name, "a plain name of letters, digits, '_', '-' and '.'")
+LINE = key(line_of_text, "a text on one line")
+QUESTION = key(any_text, "a text")
+KIND = key(text, "the kind of a study")
+SEEDS = key(seeds, "at most 1,000,000 seeds or a list")
+SEED = key(whole_number, "a whole number of at least 0")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ManoeuvreSheet:
+class ManoeuvreSpec:
     """Declare a manoeuvre that is simulated; `keys` holds those of the plant, still as they were found."""
 
     duration_s: float = field(metadata=key(above_zero, "a length in seconds above 0"))
@@ -145,10 +148,10 @@ class ManoeuvreSheet:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CaseSheet:
+class CaseSpec:
     """Declare a [[cases]] entry: a truth with manoeuvres, or a campaign."""
 
-    name: str = field(metadata=key(line_of_text, "a text on one line"))
+    name: str = field(metadata=LINE)
     truth: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
     published: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
@@ -161,45 +164,45 @@ class CaseSheet:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RandomSheet:
-    """Declare [random_cases]: truths spread over the box."""
+class RandomCasesSpec:
+    """Declare [random_cases]: truths spread over the bounds."""
 
-    n: int = field(metadata=key(some, "a whole number above 0, up to 1,000,000"))
-    seed: int = field(metadata=key(whole_number, "a whole number of at least 0"))
+    n: int = field(metadata=key(held_count, "a whole number above 0, up to 1,000,000"))
+    seed: int = field(metadata=SEED)
     manoeuvres: tuple[dict[str, Any], ...] = field(metadata=TABLES)
     margin: float = field(default=0.0, metadata=key(at_least_zero, "a share of the range from 0 to below 0.5"))
 
 
 @dataclass(frozen=True, kw_only=True)
-class EntrySheet:
+class EntrySpec:
     """Declare an [[identifiers]] entry; what is not given is the study's."""
 
     name: str = field(metadata=key(text, "the name of an identifier"))
-    label: str | None = field(default=None, metadata=key(line_of_text, "a text on one line"))
+    label: str | None = field(default=None, metadata=LINE)
     budget: int | None = field(default=None, metadata=key(count, "a whole number above 0"))
     fitness: tuple[str, ...] | None = field(default=None, metadata=NAMES)
     noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=LEVELS)
-    seeds: tuple[int, ...] | None = field(default=None, metadata=key(seeds, "at most 1,000,000 seeds or a list"))
+    seeds: tuple[int, ...] | None = field(default=None, metadata=SEEDS)
     options: Mapping[str, Any] = field(default_factory=dict, metadata=key(options, "a number, a text, true or false"))
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudySheet:
-    """Declare a study; cases and identifiers are looked into one by one."""
+class StudySpec:
+    """Declare a study that identifies; cases and identifiers are looked into one by one."""
 
-    name: str = field(metadata=key(plain_name, "a plain name of letters, digits, '_', '-' and '.'"))
+    name: str = field(metadata=STUDY_NAME)
     plant: str = field(metadata=key(text, "the name of a plant"))
     identifiers: tuple[dict[str, Any], ...] = field(
         metadata=key(list_of(any_table, 1), "at least one table headed [[identifiers]]")
     )
     budget: int = field(metadata=key(count, "a whole number of simulations above 0"))
-    seeds: tuple[int, ...] = field(metadata=key(seeds, "at most 1,000,000 seeds or a list"))
-    question: str = field(default="", metadata=key(any_text, "a text"))
-    kind: str = field(default="identify", metadata=key(text, "the kind of a study"))
+    seeds: tuple[int, ...] = field(metadata=SEEDS)
+    question: str = field(default="", metadata=QUESTION)
+    kind: str = field(default=IDENTIFIES, metadata=KIND)
     report: str = field(default="", metadata=key(any_text, f"one of {', '.join(map(repr, REPORTS))}"))
     fitness: tuple[str, ...] = field(default=("similarity",), metadata=NAMES)
     noise_deg_s: tuple[float, ...] = field(default=(0.0,), metadata=LEVELS)
-    noise_seed: int = field(default=1, metadata=key(whole_number, "a whole number of at least 0"))
+    noise_seed: int = field(default=1, metadata=SEED)
     windows_s: tuple[tuple[float, float] | str, ...] = field(
         default=(WHOLE,), metadata=key(windows, f"'{WHOLE}', or a list of [begin, end] in seconds and '{WHOLE}'")
     )
@@ -215,24 +218,55 @@ class StudySheet:
     random_cases: dict[str, Any] | None = field(default=None, metadata=key(any_table, "a table"))
 
 
-@dataclass(frozen=True, eq=False)
-class Known:
-    """Hold the registered things by name.
+@dataclass(frozen=True, kw_only=True)
+class LoopSpec:
+    """Declare a study that closes the loop on every campaign of a folder.
 
-    plugins: `FILE.py:attribute` of the user's own. digests: (kind, name) -> hash of the file that it was read from, so
-    that what an older text of it gave is not taken for what the present one gives.
+    campaigns: folder of campaigns, relative to the study's file. made_by: the command that makes it, for people. key:
+    file that holds the truth, for who scores; neither study nor report opens it. report: for who scores too. only:
+    patterns of names of campaigns. candidates: effects to look for, empty: all; without: those that are left out.
+    rivals: patterns of names of campaigns -> the effects that are looked for there, in place of the candidates.
+    suite: what the campaigns are made of, for who makes them; the study does not read it.
+    """
+
+    name: str = field(metadata=STUDY_NAME)
+    campaigns: str = field(metadata=key(line_of_text, "a folder of campaigns, relative to this file"))
+    kind: str = field(default=CLOSES_LOOP, metadata=KIND)
+    question: str = field(default="", metadata=QUESTION)
+    report: str = field(default="", metadata=key(any_text, f"one of {', '.join(map(repr, LOOP_REPORTS))}"))
+    made_by: str = field(default="", metadata=key(line_of_text, "the command that makes the campaigns"))
+    only: tuple[str, ...] = field(default=("*",), metadata=key(list_of(text, 1), "a list of names of campaigns"))
+    candidates: tuple[str, ...] = field(default=(), metadata=EFFECT_NAMES)
+    without: tuple[str, ...] = field(default=(), metadata=EFFECT_NAMES)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
+    fixed: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
+    seed: int = field(default=1, metadata=SEED)
+    rivals: Mapping[str, tuple[str, ...]] = field(
+        default_factory=dict, metadata=key(table_of(list_of(text, 1)), "lists of effects by names of campaigns")
+    )
+    suite: Mapping[str, Any] = field(default_factory=dict, metadata=key(any_table, "a table"))
+    # last: from here on the name stands for this field
+    key: str = field(default="", metadata=key(line_of_text, "the file that holds the truth, relative to this file"))
+
+
+@dataclass(frozen=True, eq=False)
+class StudyRegistry:
+    """Hold what a study may name, by name.
+
+    plugins: `FILE.py:attribute` of the user's own. digests: (kind, name) -> hash of the file that it was read from; it
+    is part of a run's settings, so that results of an older version of that file are not taken for the present one's.
     """
 
     registry: Registry
     plugins: tuple[str, ...]
     digests: Mapping[tuple[str, str], str]
 
-    @cached_property
+    @property
     def plants(self) -> dict[str, Plant]:
         """Name -> Plant."""
         return self.registry.plants
 
-    @cached_property
+    @property
     def effects(self) -> dict[str, Effect]:
         """Name -> Effect."""
         return self.registry.effects
@@ -263,7 +297,7 @@ class Known:
         return {f"{kind} {part}": self.digests[kind, part] for part in parts if (kind, part) in self.digests}
 
 
-def load_known(plugins: Iterable[str] = ()) -> Known:
+def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
     """Return what may be named: catalogues, entry points, and the user's own. This runs the code of the plug-ins.
 
     Raises ArmidError for a plug-in that cannot be used.
@@ -275,14 +309,14 @@ def load_known(plugins: Iterable[str] = ()) -> Known:
         kind, name, _ = load_plugin(plugin)
         with open(plugin.rpartition(":")[0], "rb") as file:
             digests[kind, name] = hashlib.sha256(file.read()).hexdigest()
-    return Known(registry, named, digests)
+    return StudyRegistry(registry, named, digests)
 
 
-def chosen(known: Mapping[str, Any], name: str, what: str, where: str) -> Any:
+def lookup(there: Mapping[str, Any], name: str, what: str, where: str) -> Any:
     """Return what is registered under a name.
 
     Raises ArmidError with the nearest name for an unknown one.
     """
-    if name not in known:
-        raise unknown_name(what, name, known, where)
-    return known[name]
+    if name not in there:
+        raise unknown_name(what, name, there, where)
+    return there[name]

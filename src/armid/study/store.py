@@ -12,211 +12,44 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from armid.errors import ArmidError
-from armid.study.kind import KINDS, Table
-from armid.study.outcome import FAILED, Outcome, Task
-from armid.study.plan import Planned
+from armid.study.outcome import FAILED, ClaimedRun, Outcome, Planned
 
 FILE_NAME = "study.sqlite"
 # "armd" in ASCII: a file of another program is recognised before anything is written to it.
 APPLICATION, FORMAT = 0x61726D64, 1
 WAIT_S = 60.0
-
-TABLES = """
-CREATE TABLE study (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE settings (run TEXT PRIMARY KEY, settings TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE plan (
-    place INTEGER PRIMARY KEY, run TEXT NOT NULL UNIQUE, "case" TEXT NOT NULL, identifier TEXT NOT NULL,
-    fitness TEXT NOT NULL, noise_deg_s REAL, window TEXT NOT NULL, seed INTEGER NOT NULL, budget INTEGER NOT NULL
-);
-CREATE TABLE runs (
-    run TEXT PRIMARY KEY, status TEXT NOT NULL, error TEXT NOT NULL, seconds REAL NOT NULL, started_at TEXT NOT NULL,
-    model TEXT NOT NULL, versions TEXT NOT NULL
-) WITHOUT ROWID;
-CREATE TABLE texts (hash TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE claims (
-    run TEXT PRIMARY KEY, place TEXT NOT NULL, pid INTEGER NOT NULL, start TEXT NOT NULL
-) WITHOUT ROWID;
-"""
-
-
-def table_text(name: str, table: Table) -> str:
-    """Return the SQL that makes a table of a kind."""
-    key = f"PRIMARY KEY (run, {table.rows_by})" if table.rows_by else "PRIMARY KEY (run)"
-    return f"CREATE TABLE {name} (run TEXT NOT NULL, {', '.join(table.columns)}, {key})"
-
-
-def store_path(path: str | Path) -> Path:
-    """Return the file that a folder of results or the file itself stands for."""
-    return Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
-
-
-@contextmanager
-def told(path: Path) -> Iterator[None]:
-    """Turn what SQLite cannot do into one sentence."""
-    try:
-        yield
-    except sqlite3.Error as error:
-        raise ArmidError(f"{path} cannot be used: {error}; what was finished before is kept") from error
-    except OSError as error:
-        raise ArmidError(f"{error.filename or path} cannot be used: {error.strerror or error}") from error
-
-
-def opened(path: Path) -> sqlite3.Connection:
-    """Return a connection that writes, to a new file or to one of ours.
-
-    A write-ahead log is kept: a process that is killed at any moment leaves every finished transaction and no half one.
-
-    Raises ArmidError for a file of another program or of a newer version.
-    """
-    with told(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
-        try:
-            check_format(connection, path, may_be_new=True)
-            connection.execute("PRAGMA journal_mode = WAL")
-            connection.execute("PRAGMA synchronous = NORMAL")
-            make_tables(connection)
-        except BaseException:
-            connection.close()
-            raise
-    return connection
-
-
-def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = False) -> None:
-    """Refuse a file that is no store of this version."""
-    try:
-        # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
-        is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        found = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
-    except sqlite3.DatabaseError as error:
-        if error.sqlite_errorname != "SQLITE_NOTADB":
-            raise
-        raise ArmidError(f"{path} is no store of a study: another file has its name") from error
-    if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
-        return
-    if found[0] != APPLICATION:
-        raise ArmidError(f"{path} is no store of a study: another program's data, or nothing, is in it")
-    raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
-
-
-def make_tables(connection: sqlite3.Connection) -> None:
-    """Make what is missing, whole or not at all."""
-    with transaction(connection):
-        there = {row[0] for row in connection.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")}
-        if not there:
-            for statement in filter(str.strip, TABLES.split(";")):
-                connection.execute(statement)
-            connection.execute(f"PRAGMA application_id = {APPLICATION}")
-            connection.execute(f"PRAGMA user_version = {FORMAT}")
-        for kind in KINDS.values():
-            for name, table in kind.tables.items():
-                if name not in there:
-                    connection.execute(table_text(name, table))
-
-
-@contextmanager
-def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """Do all or nothing; other writers wait from the beginning on."""
-    connection.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-        connection.execute("COMMIT")
-    except BaseException:
-        # SQLite has rolled back by itself after some errors, such as a full disk
-        with suppress(sqlite3.Error):
-            connection.execute("ROLLBACK")
-        raise
-
-
-def closed(connection: sqlite3.Connection) -> None:
-    """Close a connection; the last one leaves a single file that can be read in any place, also a read-only one."""
-    with suppress(sqlite3.Error):
-        connection.execute("PRAGMA busy_timeout = 0")
-        connection.execute("PRAGMA journal_mode = DELETE")
-    with suppress(sqlite3.Error):
-        connection.close()
-
-
 # What the description of a study holds in every version of this format.
 WORDS = ("name", "cases")
 
-
-@contextmanager
-def whole(file: Path, what: str) -> Iterator[None]:
-    """Turn content that cannot be decoded into one sentence.
-
-    Raises ArmidError naming the file and what of it is damaged.
-    """
-    try:
-        yield
-    except (json.JSONDecodeError, UnicodeDecodeError, zlib.error) as error:
-        raise ArmidError(f"{file} is damaged: {what} cannot be read ({error})") from error
-
-
-def description_of(file: Path, text: str) -> dict[str, Any]:
-    """Return the description of a study.
-
-    Raises ArmidError when it is none.
-    """
-    with whole(file, "the description of the study"):
-        found = json.loads(text)
-    missing = [word for word in WORDS if not isinstance(found, dict) or word not in found]
-    if missing:
-        raise ArmidError(f"{file} is damaged: the description of the study lacks '{missing[0]}'")
-    return dict(found)
-
-
-class ProcessIdentity(NamedTuple):
-    """Name a process.
-
-    place: machine, its boot, and the space in which its numbers count (a container has its own). pid: its number.
-    start: when it started, in ticks since that boot, "" where the system does not tell: numbers are used again.
-    """
-
-    place: str
-    pid: int
-    start: str
-
-
-def this_process() -> ProcessIdentity:
-    """Return the identity of the running process."""
-    return ProcessIdentity(this_place(), os.getpid(), start_of(os.getpid()))
-
-
-def this_place() -> str:
-    """Return what the numbers of processes count in."""
-    boot, space = "", ""
-    with suppress(OSError), open("/proc/sys/kernel/random/boot_id", encoding="ascii") as file:
-        boot = file.read().strip()
-    with suppress(OSError):
-        space = os.readlink("/proc/self/ns/pid")
-    return "/".join((platform.node(), boot, space))
-
-
-def start_of(pid: int) -> str:
-    """Return when a process started, "" where it does not live or the system does not tell."""
-    try:
-        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
-            # the name of the program stands in brackets and may hold anything; the start is 20 fields behind it
-            fields = file.read().rpartition(")")[2].split()
-    except OSError:
-        return ""
-    return "" if fields[0] in "ZX" else fields[19]
-
-
-def is_gone(process: ProcessIdentity) -> bool:
-    """Tell whether a process of this place has surely ended; one of another place never surely has."""
-    if process.place != this_place():
-        return False
-    if process.start:
-        return start_of(process.pid) != process.start
-    try:
-        os.kill(process.pid, 0)
-    except ProcessLookupError:
-        return True
-    except OSError:
-        return False
-    return False
+# The last four hold what a run gave: one that identifies fills three, one that closes the loop the fourth.
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS study (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS settings (run TEXT PRIMARY KEY, settings TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS plan (
+    place INTEGER PRIMARY KEY, run TEXT NOT NULL UNIQUE, "case" TEXT NOT NULL, identifier TEXT NOT NULL,
+    fitness TEXT NOT NULL, noise_deg_s REAL, window TEXT NOT NULL, seed INTEGER NOT NULL, budget INTEGER NOT NULL
+);
+CREATE TABLE IF NOT EXISTS runs (
+    run TEXT PRIMARY KEY, status TEXT NOT NULL, error TEXT NOT NULL, seconds REAL NOT NULL, started_at TEXT NOT NULL,
+    model TEXT NOT NULL, versions TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS texts (hash TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS claims (
+    run TEXT PRIMARY KEY, place TEXT NOT NULL, pid INTEGER NOT NULL, start TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS identified (
+    run TEXT NOT NULL PRIMARY KEY, used INTEGER, n_failed INTEGER, value REAL, stopped TEXT, train_rmse REAL,
+    train_s REAL, train_s1 REAL, train_s2 REAL, holdout_rmse REAL
+);
+CREATE TABLE IF NOT EXISTS parameters (
+    run TEXT NOT NULL, parameter TEXT NOT NULL, unit TEXT, value REAL, low REAL, high REAL, deviation REAL,
+    correlation_max REAL, at_bound INTEGER, PRIMARY KEY (run, parameter)
+);
+CREATE TABLE IF NOT EXISTS traces (run TEXT NOT NULL PRIMARY KEY, names TEXT, trace BLOB);
+CREATE TABLE IF NOT EXISTS loops (
+    run TEXT NOT NULL PRIMARY KEY, verdict TEXT NOT NULL, cpu_seconds REAL NOT NULL, report TEXT NOT NULL
+);
+"""
 
 
 # Runs that this runner looks at, those of them that are not finished, and those that nobody is at.
@@ -287,8 +120,11 @@ class Store:
 
         Raises ArmidError when the file holds another study.
         """
-        with told(self.path), transaction(self._connection):
-            self._refuse_other(str(description["name"]))
+        with translate_errors(self.path), transaction(self._connection):
+            name, before = str(description["name"]), self._kept("description")
+            other = description_of(self.path, before)["name"] if before else name
+            if other != name:
+                raise ArmidError(f"{self.path} holds the study '{other}', another folder is expected for '{name}'")
             digest = hashlib.sha256()
             self._connection.execute("CREATE TEMP TABLE IF NOT EXISTS wanted AS SELECT * FROM plan LIMIT 0")
             self._connection.executemany(
@@ -296,7 +132,10 @@ class Store:
             )
             self._plan = digest.hexdigest()
             if self._plan != self._kept("plan"):
-                self._replace_plan()
+                self._connection.execute("DELETE FROM plan")
+                self._connection.execute("INSERT INTO plan SELECT * FROM wanted")
+                kept = "SELECT run FROM plan UNION SELECT run FROM runs"
+                self._connection.execute(f"DELETE FROM settings WHERE run NOT IN ({kept})")
             self._connection.execute("DROP TABLE wanted")
             self._keep("plan", self._plan)
             self._keep("description", json.dumps(description, ensure_ascii=False))
@@ -309,18 +148,6 @@ class Store:
             digest.update(repr((place, row)).encode())
             yield (place, *row, each.budget)
 
-    def _replace_plan(self) -> None:
-        self._connection.execute("DELETE FROM plan")
-        self._connection.execute("INSERT INTO plan SELECT * FROM wanted")
-        kept = "SELECT run FROM plan UNION SELECT run FROM runs"
-        self._connection.execute(f"DELETE FROM settings WHERE run NOT IN ({kept})")
-
-    def _refuse_other(self, name: str) -> None:
-        kept = self._kept("description")
-        other = description_of(self.path, kept)["name"] if kept else name
-        if other != name:
-            raise ArmidError(f"{self.path} holds the study '{other}', another folder is expected for '{name}'")
-
     def _kept(self, key: str) -> str:
         row = self._connection.execute("SELECT value FROM study WHERE key = ?", (key,)).fetchone()
         return str(row[0]) if row else ""
@@ -330,58 +157,49 @@ class Store:
 
     def forget_failed(self) -> None:
         """Take out the failed runs that this runner looks at, so that they are performed anew."""
-        with told(self.path), transaction(self._connection):
+        with translate_errors(self.path), transaction(self._connection):
             self._connection.execute(f"DELETE FROM runs WHERE run IN (SELECT p.run {FAILURES})", self._chosen)
 
-    def claim(self, n: int) -> list[Task]:
+    def claim(self, n: int) -> list[ClaimedRun]:
         """Return up to n runs that nobody has finished or is at, and mark them as this process's.
 
         When there is none left, claims of processes that have ended are void, and those of other machines too: at worst
         a run is then made twice, and kept once.
         Raises ArmidError when another runner has changed the plan.
         """
-        with told(self.path), transaction(self._connection):
+        with translate_errors(self.path), transaction(self._connection):
             if self._kept("plan") != self._plan:
                 raise ArmidError(f"{self.path} was given another plan by another runner: start again to go on with it")
             rows = self._next(n)
             if not rows:
                 self._place = -1
-                self._void_claims()
+                claims = self._connection.execute("SELECT DISTINCT place, pid, start FROM claims").fetchall()
+                for process in (ProcessIdentity(*row) for row in claims):
+                    if process.place != self._process.place or is_gone(process):
+                        self._connection.execute(VOID, process)
                 rows = self._next(n)
             mine = [(run, *self._process) for _, run, _ in rows]
             self._connection.executemany("INSERT INTO claims VALUES (?, ?, ?, ?)", mine)
         self._place = rows[-1][0] if rows else -1
-        return [Task(run, settings) for _, run, settings in rows]
+        return [ClaimedRun(run, settings) for _, run, settings in rows]
 
     def _next(self, n: int) -> list[tuple[int, str, str]]:
         return self._connection.execute(NEXT, {**self._chosen, "after": self._place, "n": n}).fetchall()
 
-    def _void_claims(self) -> None:
-        """Delete the claims of processes that have ended, and of other machines."""
-        rows = self._connection.execute("SELECT DISTINCT place, pid, start FROM claims").fetchall()
-        for process in (ProcessIdentity(*row) for row in rows):
-            if process.place != self._process.place or is_gone(process):
-                self._connection.execute(VOID, process)
-
     def save(self, outcome: Outcome) -> bool:
         """Keep a finished run; tell whether it was not there yet."""
         versions = json.dumps(dict(outcome.versions), sort_keys=True)
-        with told(self.path), transaction(self._connection):
+        with translate_errors(self.path), transaction(self._connection):
             row = (outcome.run, outcome.status, outcome.error, outcome.seconds, outcome.started_at,
                    self._text(outcome.model), self._text(versions))  # fmt: skip
             cursor = self._connection.execute("INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?)", row)
             is_new = cursor.rowcount == 1
-            if is_new:
-                self._save_rows(outcome)
+            for table, rows in outcome.rows.items() if is_new else ():
+                for each in rows:
+                    marks = ", ".join("?" * (1 + len(each)))
+                    self._connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", (outcome.run, *each))
             self._connection.execute("DELETE FROM claims WHERE run = ?", (outcome.run,))
         return is_new
-
-    def _save_rows(self, outcome: Outcome) -> None:
-        tables = {name: table for kind in KINDS.values() for name, table in kind.tables.items()}
-        for name, rows in outcome.rows.items():
-            marks = ", ".join("?" * (1 + len(tables[name].columns)))
-            text = f"INSERT OR REPLACE INTO {name} VALUES ({marks})"
-            self._connection.executemany(text, [(outcome.run, *row) for row in rows])
 
     def _text(self, text: str) -> str:
         """Keep a text once, and return its hash."""
@@ -391,13 +209,13 @@ class Store:
 
     def counts(self) -> Counts:
         """Return how far the runs are that this runner looks at."""
-        with told(self.path):
+        with translate_errors(self.path):
             planned, finished, failed, left = self._connection.execute(COUNTS, self._chosen).fetchone()
         return Counts(planned, finished - failed, failed, left)
 
     def first_error(self) -> str:
         """Return what the first failed run says, "" when none has failed."""
-        with told(self.path):
+        with translate_errors(self.path):
             text = f"SELECT r.error {FAILURES} ORDER BY p.place LIMIT 1"
             row = self._connection.execute(text, self._chosen).fetchone()
         return str(row[0]) if row else ""
@@ -405,6 +223,161 @@ class Store:
     def others(self) -> list[int]:
         """Return the processes of this machine that are at runs which this runner looks at."""
         here = {"here": self._process.place, "pid": self._process.pid}
-        with told(self.path):
+        with translate_errors(self.path):
             rows = self._connection.execute(OTHERS, {**self._chosen, **here}).fetchall()
         return [int(row[0]) for row in rows]
+
+
+@contextmanager
+def translate_errors(path: Path) -> Iterator[None]:
+    """Turn what SQLite cannot do into one sentence."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise ArmidError(f"{path} cannot be used: {error}; what was finished before is kept") from error
+    except OSError as error:
+        raise ArmidError(f"{error.filename or path} cannot be used: {error.strerror or error}") from error
+
+
+def opened(path: Path) -> sqlite3.Connection:
+    """Return a connection that writes, to a new file or to one of ours.
+
+    A write-ahead log is kept: a process that is killed at any moment leaves every finished transaction and no half one.
+
+    Raises ArmidError for a file of another program or of a newer version.
+    """
+    with translate_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
+        try:
+            check_format(connection, path, may_be_new=True)
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = NORMAL")
+            with transaction(connection):
+                for statement in filter(str.strip, SCHEMA.split(";")):
+                    connection.execute(statement)
+                if not connection.execute("PRAGMA user_version").fetchone()[0]:
+                    connection.execute(f"PRAGMA application_id = {APPLICATION}")
+                    connection.execute(f"PRAGMA user_version = {FORMAT}")
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = False) -> None:
+    """Refuse a file that is no store of this version."""
+    try:
+        # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
+        is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
+        found = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
+    except sqlite3.DatabaseError as error:
+        if error.sqlite_errorname != "SQLITE_NOTADB":
+            raise
+        raise ArmidError(f"{path} is no store of a study: another file has its name") from error
+    if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
+        return
+    if found[0] != APPLICATION:
+        raise ArmidError(f"{path} is no store of a study: another program's data, or nothing, is in it")
+    raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """Do all or nothing; other writers wait from the beginning on."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        # SQLite has rolled back by itself after some errors, such as a full disk
+        with suppress(sqlite3.Error):
+            connection.execute("ROLLBACK")
+        raise
+
+
+def closed(connection: sqlite3.Connection) -> None:
+    """Close a connection; the last one leaves a single file that can be read in any place, also a read-only one."""
+    with suppress(sqlite3.Error):
+        connection.execute("PRAGMA busy_timeout = 0")
+        connection.execute("PRAGMA journal_mode = DELETE")
+    with suppress(sqlite3.Error):
+        connection.close()
+
+
+@contextmanager
+def corruption_guard(file: Path, what: str) -> Iterator[None]:
+    """Turn content that cannot be decoded into one sentence.
+
+    Raises ArmidError naming the file and what of it is damaged.
+    """
+    try:
+        yield
+    except (json.JSONDecodeError, UnicodeDecodeError, zlib.error) as error:
+        raise ArmidError(f"{file} is damaged: {what} cannot be read ({error})") from error
+
+
+def description_of(file: Path, text: str) -> dict[str, Any]:
+    """Return the description of a study.
+
+    Raises ArmidError when it is none.
+    """
+    with corruption_guard(file, "the description of the study"):
+        found = json.loads(text)
+    missing = [word for word in WORDS if not isinstance(found, dict) or word not in found]
+    if missing:
+        raise ArmidError(f"{file} is damaged: the description of the study lacks '{missing[0]}'")
+    return dict(found)
+
+
+class ProcessIdentity(NamedTuple):
+    """Name a process.
+
+    place: machine, its boot, and the space in which its numbers count (a container has its own). pid: its number.
+    start: when it started, in ticks since that boot, "" where the system does not tell: numbers are used again.
+    """
+
+    place: str
+    pid: int
+    start: str
+
+
+def this_process() -> ProcessIdentity:
+    """Return the identity of the running process."""
+    return ProcessIdentity(this_place(), os.getpid(), start_of(os.getpid()))
+
+
+def this_place() -> str:
+    """Return what the numbers of processes count in."""
+    boot, space = "", ""
+    with suppress(OSError), open("/proc/sys/kernel/random/boot_id", encoding="ascii") as file:
+        boot = file.read().strip()
+    with suppress(OSError):
+        space = os.readlink("/proc/self/ns/pid")
+    return "/".join((platform.node(), boot, space))
+
+
+def start_of(pid: int) -> str:
+    """Return when a process started, "" where it does not live or the system does not tell."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+            # the name of the program stands in brackets and may hold anything; the start is 20 fields behind it
+            fields = file.read().rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return "" if fields[0] in "ZX" else fields[19]
+
+
+def is_gone(process: ProcessIdentity) -> bool:
+    """Tell whether a process of this place has surely ended; one of another place never surely has."""
+    if process.place != this_place():
+        return False
+    if process.start:
+        return start_of(process.pid) != process.start
+    try:
+        os.kill(process.pid, 0)
+    except ProcessLookupError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -1,4 +1,4 @@
-"""A process that performs runs for another one: `python -m armid.study.worker FILE_DESCRIPTOR`."""
+"""A process that performs runs for another one: `python -m armid.study.worker FILE_DESCRIPTOR PARENT`."""
 
 import os
 import sys
@@ -8,46 +8,41 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from armid.errors import ArmidError
-from armid.study.kind import KINDS
-from armid.study.run import perform
-from armid.study.run_cache import Workshop
-from armid.study.spec import load_known
+from armid.study.run_cache import RunCache
+from armid.study.spec import study_registry
+from armid.study.tasks import perform, task_type
 
 READY, REFUSED, FINISHED = "ready", "refused", "finished"
 # How often a worker looks whether the process that it works for still lives [s].
 LOOKS_EVERY_S = 1.0
 
 
-def work(connection: Connection) -> None:
-    """Receive kind, plug-ins and folder, then perform one task after the other until the other end is closed."""
-    kind, plugins, folder = connection.recv()
-    # what runs need is imported before the first: where that fails no worker starts, and no run is to blame
-    KINDS[kind].perform()
+def main(descriptor: int, parent: int) -> None:
+    """Receive kind, plug-ins and folder, then perform one run after the other until the other end is closed."""
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    connection = Connection(descriptor)
     try:
-        workshop = Workshop(load_known(plugins), Path(folder))
-    except ArmidError as error:
-        connection.send((REFUSED, str(error)))
-        return
-    connection.send((READY, None))
-    while True:
-        connection.send((FINISHED, perform(connection.recv(), workshop)))
+        kind, plugins, folder = connection.recv()
+        # what runs need is imported before the first: where that fails no worker starts, and no run is to blame
+        task_type(kind)
+        try:
+            cache = RunCache(study_registry(plugins), Path(folder))
+        except ArmidError as error:
+            connection.send((REFUSED, str(error)))
+            return
+        connection.send((READY, None))
+        while True:
+            connection.send((FINISHED, perform(connection.recv(), cache)))
+    except (EOFError, OSError):
+        # the process that we work for has closed its end, or has ended
+        os._exit(0)
 
 
-def end_with(parent: int) -> None:
+def _end_with(parent: int) -> None:
     """End this process soon after the one that it works for has ended, also in the middle of a run."""
     while os.getppid() == parent:
         time.sleep(LOOKS_EVERY_S)
     os._exit(1)
-
-
-def main(descriptor: int, parent: int) -> None:
-    """Work until the other end is closed."""
-    threading.Thread(target=end_with, args=(parent,), daemon=True).start()
-    try:
-        work(Connection(descriptor))
-    except (EOFError, OSError):
-        # the process that we work for has closed its end, or has ended
-        os._exit(0)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import csv
 import io
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,12 @@ def main(words: Sequence[str]) -> int:
     """Score a suite as the command line says; give the exit code, 2 with a sentence on stderr when refused."""
     try:
         options = _parser().parse_args(words)
-        rows, missing = _judge_all(_read(key_path(options.folder)), options.results)
+        key = read_json(key_path(options.folder))
+        if not options.results.is_dir():
+            raise RefusalError(f"{options.results} is no folder, one with a folder for each campaign is expected")
+        files = {name: options.results / name / "report.json" for name in key["campaigns"]}
+        reports = {name: read_json(file) for name, file in files.items() if file.is_file()}
+        rows, missing = judge_all(key["campaigns"], reports)
         targets = targets_of(rows, len(missing))
         _write(options.out or options.results / "score", rows, missing, targets)
     except RefusalError as refusal:
@@ -32,24 +37,23 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-def _judge_all(key: Any, results: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def judge_all(key: Mapping[str, Any], reports: Mapping[str, Any]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Judge every campaign of the key; those without a report come second."""
-    if not results.is_dir():
-        raise RefusalError(f"{results} is no folder, one with a folder for each campaign is expected")
     rows, missing = [], []
-    for campaign, entry in key["campaigns"].items():
-        file = results / campaign / "report.json"
-        if not file.is_file():
+    for campaign, entry in key.items():
+        if campaign not in reports:
             missing.append(told(campaign, entry) | {"judgement": "missing"})
             continue
         try:
-            rows.append(judge(campaign, entry, _read(file)))
+            rows.append(judge(campaign, entry, reports[campaign]))
         except (KeyError, TypeError) as error:
-            raise RefusalError(f"{file} is no report of a closed loop: {error} is not as expected") from error
+            told_of = f"the report of {campaign} is no report of a closed loop"
+            raise RefusalError(f"{told_of}: {error} is not as expected") from error
     return rows, missing
 
 
-def _read(file: Path) -> Any:
+def read_json(file: Path) -> Any:
+    """Read a JSON file."""
     try:
         return json.loads(file.read_text())
     except OSError as error:

@@ -111,11 +111,13 @@ def judge(campaign: str, entry: Entry, report: Entry) -> dict[str, Any]:
         **told(campaign, entry),
         "verdict": claim.verdict,
         "named": claim.said,
+        "first": next(iter((*claim.groups, *claim.empirical)), "nothing"),
         "judgement": judgement(entry["class"], truths, claim, matched),
         "wrong_alone": 1 in wrong,
         "wrong_group": any(size > 1 for size in wrong),
         "largest_group": max((len(group) for group in claim.groups.values()), default=0),
         "group_of_truth": max(own, default=0),
+        "has_empirical": bool(claim.empirical),
     }
     return row | _errors(entry, report) | _parameters(entry, report)
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import Any
 
@@ -16,7 +16,8 @@ RIGHT = ("right", "group")
 class Target:
     """Hold one line: what is asked, what was found among how many, the limit, and whether it is met.
 
-    `met` is None for a line that informs only, and for a target that no campaign of the suite can tell of.
+    `is_share`: `found` is a share of those campaigns. `met` is None for a line that informs only, and for a target that
+    no campaign of the suite can tell of.
     """
 
     question: str
@@ -24,6 +25,7 @@ class Target:
     among: int
     limit: str = ""
     met: bool | None = None
+    is_share: bool = False
 
 
 def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
@@ -51,7 +53,7 @@ def _singles(rows: Sequence[Row]) -> list[Target]:
         _most(f"{held}: wrong name alone", weighty, _is_wrong_alone, 0.02),
     ]
     for word, count in sorted(Counter(row["judgement"] for row in weighty).items()):
-        lines.append(Target(f"{held}: judged {word}", count / len(weighty), len(weighty)))
+        lines.append(Target(f"{held}: judged {word}", count / len(weighty), len(weighty), is_share=True))
     for matching in (True, False):
         some = [row for row in weighty if row["matching"] == matching]
         form = "matching" if matching else "non-matching"
@@ -134,16 +136,18 @@ def _biases(rows: Iterable[Row], when: str) -> list[float]:
 
 def _share(question: str, rows: Sequence[Row], test: Callable[[Row], bool]) -> Target:
     found = sum(map(test, rows)) / len(rows) if rows else None
-    return Target(question, found, len(rows))
+    return Target(question, found, len(rows), is_share=True)
 
 
 def _least(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
-    found = _share(question, rows, test).found
-    return Target(question, found, len(rows), f">= {limit:g}", None if found is None else found >= limit)
+    share = _share(question, rows, test)
+    met = None if share.found is None else share.found >= limit
+    return replace(share, limit=f">= {limit:g}", met=met)
 
 
 def _most(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
-    return _limited(question, _share(question, rows, test).found, len(rows), limit)
+    share = _share(question, rows, test)
+    return replace(share, limit=f"<= {limit:g}", met=None if share.found is None else share.found <= limit)
 
 
 def _middle(question: str, rows: Sequence[Row], column: str, limit: float | None = None) -> Target:

@@ -1,1 +1,0 @@
-"""The blind suite: what closed loops said, held against the truth."""

@@ -1,0 +1,381 @@
+"""What a study can be: a task that plans its runs and performs one of them.
+
+There are two: `Study` identifies parameters, here below, and `LoopStudy` (see loops) closes the loop on campaigns. Both
+have name, kind, folder of their file, registry, case_names (what they are tried on) and labels (who tries), and
+
+- check(): refuse what cannot be run, before anything is written
+- description(out): what a report needs to know, as JSON can hold it; out: folder of the store
+- plan(): every run, in the order in which they are performed
+- perform(settings, cache): perform one, in a worker; what it raises is kept as the run's error
+"""
+
+import json
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+
+import numpy as np
+
+from armid.errors import ArmidError, shown
+from armid.estimation.identify import AT_BOUND, campaign_errors, search, versions_of
+from armid.estimation.information import information_at
+from armid.model import Model
+from armid.problem.meter import Meter
+from armid.problem.problem import IdentificationProblem
+from armid.problem.replay import Replay
+from armid.problem.space import Space
+from armid.record.reader import load_toml
+from armid.record.schema import unknown_name, validated
+from armid.registry import place_in_plugin
+from armid.study.cases import Case, cases_of, clean_records
+from armid.study.outcome import DONE, FAILED, ClaimedRun, Outcome, Performed, Planned, packed, planned
+from armid.study.run_cache import RunCache
+from armid.study.spec import (
+    CLOSES_LOOP,
+    IDENTIFIES,
+    KIND_NAMES,
+    REPORTS,
+    EntrySpec,
+    StudyRegistry,
+    StudySpec,
+    lookup,
+    study_registry,
+)
+
+if TYPE_CHECKING:
+    from armid.study.loops import LoopStudy
+
+Task: TypeAlias = "Study | LoopStudy"
+SUFFIX = ".toml"
+LONGEST_ERROR = 2000
+PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
+
+
+def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
+    """Read a study's TOML file; nothing is simulated.
+
+    Parameters
+    ----------
+    path
+        The file.
+    plugins
+        `FILE.py:attribute` of the user's own things that it names; this runs their code.
+
+    Raises
+    ------
+    ArmidError
+        With one sentence (file, key, found, expected) for whatever cannot be run: an unknown key or name, impossible
+        bounds, a truth outside them, an option that an identifier refuses, a fitness that it cannot use.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise ArmidError(f"study {file} does not exist, a file that ends in {SUFFIX} is expected")
+    table = load_toml(file)
+    kind = table.get("kind", IDENTIFIES)
+    # what is no text is refused with the other keys
+    if not isinstance(kind, str) or not kind:
+        kind = IDENTIFIES
+    if kind not in KIND_NAMES:
+        raise unknown_name("kind", kind, KIND_NAMES, file.name)
+    text = file.read_text(encoding="utf-8-sig")
+    return task_type(kind).read(table, text, file.resolve().parent, file.name, study_registry(plugins))
+
+
+def task_type(kind: str) -> "type[Task]":
+    """Return the task of a kind; the closed loop is imported for its own studies alone."""
+    if kind == CLOSES_LOOP:
+        from armid.study.loops import LoopStudy
+
+        return LoopStudy
+    return Study
+
+
+def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
+    """Perform a run of any kind; one that fails is an outcome too, so that the others go on."""
+    began, started_at = time.perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
+    try:
+        settings = json.loads(run.settings)
+        made = task_type(settings["kind"]).perform(settings, cache)
+    except (Exception, SystemExit) as error:
+        seconds = time.perf_counter() - began
+        return Outcome(run.run, FAILED, sentence(error), seconds=seconds, started_at=started_at)
+    seconds = time.perf_counter() - began
+    return Outcome(run.run, DONE, "", made.used, seconds, started_at, made.model, versions(), made.rows)
+
+
+def sentence(error: BaseException) -> str:
+    """Return what an error says, with its kind and its place in a plug-in where it is none of ours."""
+    if isinstance(error, ArmidError):
+        return str(error)[:LONGEST_ERROR]
+    place = place_in_plugin(error)
+    where = "" if place is None else f"plug-in {place}: "
+    return f"{where}{type(error).__name__}: {error}"[:LONGEST_ERROR]
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Return package -> version, of Python too."""
+    return versions_of(PACKAGES)
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """Hold one identifier of a study with all that was left to the study filled in.
+
+    label: how reports call it. noise_deg_s: levels it is tried at. seeds: of its search and of the noise.
+    """
+
+    label: str
+    name: str
+    options: Mapping[str, Any]
+    budget: int
+    fitness: tuple[str, ...]
+    noise_deg_s: tuple[float, ...]
+    seeds: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Hold a study that identifies, read and found possible.
+
+    text: the file as it was read. folder: where it lies; campaigns are looked for there. registry: what it may name.
+    """
+
+    kind: ClassVar[str] = IDENTIFIES
+
+    spec: StudySpec
+    text: str
+    folder: Path
+    cases: tuple[Case, ...]
+    entries: tuple[Entry, ...]
+    registry: StudyRegistry
+
+    @property
+    def name(self) -> str:
+        """Name of the study and of its folder of results."""
+        return self.spec.name
+
+    @property
+    def case_names(self) -> list[str]:
+        """Names of the cases."""
+        return [case.name for case in self.cases]
+
+    @property
+    def labels(self) -> list[str]:
+        """Labels of the identifiers, each as often as it is there."""
+        return [entry.label for entry in self.entries]
+
+    @classmethod
+    def read(cls, table: Mapping[str, Any], text: str, folder: Path, where: str, registry: StudyRegistry) -> "Study":
+        """Return the study of a TOML table; errors as `read_study`."""
+        spec = validated(StudySpec, table, where)
+        if spec.report not in REPORTS:
+            raise unknown_name("report", spec.report, REPORTS[1:], where)
+        model = Model(lookup(registry.plants, spec.plant, "plant", where))
+        for name in spec.effects:
+            model = model + lookup(registry.effects, name, "effect", where)
+        entries = _entries(spec, registry, where)
+        cases = cases_of(spec, model, registry, folder, where)
+        for entry in entries:
+            _check_noise(entry, cases, registry, where)
+        return cls(spec, text, folder, cases, entries, registry)
+
+    def check(self) -> None:
+        """Simulate each case's truth once: the model is compiled and the machine moves.
+
+        Raises ArmidError for a truth at which it does not.
+        """
+        for case in self.cases:
+            if case.source is None:
+                try:
+                    clean_records(self._case_settings(case), case.model)
+                except ArmidError as error:
+                    raise ArmidError(f"case '{case.name}', {error}") from error
+
+    def description(self, _: Path = Path()) -> dict[str, Any]:
+        """Return what a report needs to know, as JSON can hold it, wherever the store is."""
+        spec, entries = self.spec, self.entries
+        return {
+            "name": self.name,
+            "question": spec.question,
+            "kind": self.kind,
+            "report": spec.report,
+            "text": self.text,
+            "plant": spec.plant,
+            "unit": self.cases[0].model.plant.output_unit,
+            "effects": list(spec.effects),
+            "budget": spec.budget,
+            "fitness": list(dict.fromkeys(f for e in entries for f in e.fitness)),
+            "identifiers": list(dict.fromkeys(self.labels)),
+            "noise_deg_s": list(dict.fromkeys(n for e in entries for n in e.noise_deg_s)),
+            "seeds": list(dict.fromkeys(s for e in entries for s in e.seeds)),
+            "windows": [window_text(w) for w in spec.windows_s],
+            "plugins": list(self.registry.plugins),
+            "cases": [_case_description(case) for case in self.cases],
+            "published": {case.name: dict(case.published) for case in self.cases if case.published},
+        }
+
+    def plan(self) -> Iterator[Planned]:
+        """Yield the runs, seed by seed, so that a study that is broken off has tried everything about equally often."""
+        shared = {case.name: self._case_settings(case) for case in self.cases}
+        for seed in sorted({seed for entry in self.entries for seed in entry.seeds}):
+            for case in self.cases:
+                for entry in self.entries:
+                    if seed in entry.seeds:
+                        yield from self._runs(case, shared[case.name], entry, seed)
+
+    def _runs(self, case: Case, shared: dict[str, Any], entry: Entry, seed: int) -> Iterator[Planned]:
+        """Yield the runs of one entry on one case with one seed."""
+        for window in self.spec.windows_s:
+            for noise in entry.noise_deg_s if case.source is None else (None,):
+                for fitness in entry.fitness:
+                    own = self.registry.own("fitness", fitness) | self.registry.own("identifiers", entry.name)
+                    settings = shared | {
+                        "identifier": entry.name, "options": dict(entry.options), "budget": entry.budget,
+                        "fitness": fitness, "noise_deg_s": noise, "window_s": window, "seed": seed,
+                        "own": shared["own"] | own,
+                    }  # fmt: skip
+                    words = (case.name, entry.label, fitness, noise, window_text(window))
+                    yield planned(settings, *words, seed, entry.budget)
+
+    def _case_settings(self, case: Case) -> dict[str, Any]:
+        """Return the settings that the runs on a case have in common: all that decides their results."""
+        plant, effects = self.spec.plant, [e.name for e in case.model.effects]
+        settings: dict[str, Any] = {
+            "kind": self.kind, "case": case.name, "plant": plant, "effects": effects, "bounds": case.bounds,
+            "fixed": case.fixed, "accuracy": self.spec.accuracy,
+            "own": self.registry.own("plants", plant) | self.registry.own("effects", *effects),
+        }  # fmt: skip
+        if case.source is not None:
+            return settings | {"campaign": asdict(case.source)}
+        return settings | {
+            "truth": case.truth, "strokes": case.strokes, "interval_s": self.spec.interval_s,
+            "noise_seed": self.spec.noise_seed,
+        }  # fmt: skip
+
+    @staticmethod
+    def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
+        """Identify once.
+
+        Raises ArmidError when no candidate has a fitness, and whatever an identifier raises.
+        """
+        case, replays = cache.replays(settings)
+        train = tuple(r for r in replays if r.record.role == "train")
+        holdout = tuple(r for r in replays if r.record.role == "holdout")
+        identifier = cache.registry.identifier(settings["identifier"], "settings").with_options(settings["options"])
+        meter = Meter(settings["budget"])
+        problem = IdentificationProblem(case.space, train, cache.registry.fitness[settings["fitness"]], meter)
+        stopped = search(problem, meter, identifier, settings["seed"], None)
+        if meter.best_x is None:
+            raise ArmidError(
+                f"none of {meter.used} candidates has a fitness: each diverged, or it was no finite number"
+            )
+        candidate = case.space.complete(meter.best_x[np.newaxis])[0]
+        near, far = campaign_errors(train, candidate), campaign_errors(holdout, candidate)
+        assert near is not None
+        errors = (near.rmse, near.s, near.s1, near.s2, None if far is None else far.rmse)
+        improvements, log = meter.trace(), meter.log()
+        trace = packed(improvements.evaluation, improvements.value, log.X[improvements.evaluation - 1])
+        return Performed(meter.used, case.equations, {
+            "identified": [(meter.used, meter.n_failed, meter.best_f, stopped, *errors)],
+            "parameters": _parameter_rows(case.space, meter.best_x, train),
+            "traces": [(json.dumps(case.space.free_names), trace)],
+        })  # fmt: skip
+
+
+def _entries(spec: StudySpec, registry: StudyRegistry, where: str) -> tuple[Entry, ...]:
+    """Return the identifiers of a study, each built once with its budget to see that it can be."""
+    entries: list[Entry] = []
+    for i, table in enumerate(spec.identifiers):
+        name = table.get("label", table.get("name"))
+        at = f"{where}, identifier {shown(name) if isinstance(name, str) else i + 1}"
+        own = validated(EntrySpec, table, at)
+        noise = spec.noise_deg_s if own.noise_deg_s is None else own.noise_deg_s
+        entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
+                      own.fitness or spec.fitness, noise, own.seeds or spec.seeds)  # fmt: skip
+        _check_built(entry, registry, at)
+        entries.append(entry)
+    for i, entry in enumerate(entries):
+        for other in entries[:i]:
+            _check_apart(entry, other, where)
+    return tuple(entries)
+
+
+def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
+    """Refuse an identifier that cannot be built with its options and budget, or cannot minimise its fitness."""
+    identifier = registry.identifier(entry.name, where)
+    try:
+        for fitness in entry.fitness:
+            identifier.refuse(lookup(registry.fitness, fitness, "fitness", where))
+        identifier.with_options(entry.options).build(entry.budget)
+    except ArmidError as error:
+        raise ArmidError(f"{where}: {error}") from error
+    except Exception as error:
+        raise ArmidError(f"{where}: it cannot be built: {type(error).__name__}: {error}") from error
+
+
+def _check_apart(entry: Entry, other: Entry, where: str) -> None:
+    """Refuse a label that stands for two things, and a run that two entries ask for."""
+    same_label = other.label == entry.label
+    same_thing = (other.name, other.options) == (entry.name, entry.options)
+    if same_label and not same_thing:
+        raise ArmidError(f"{where}: label '{entry.label}' stands for identifiers of other name or options, "
+                         "a label of its own is expected for each")  # fmt: skip
+    shared = (entry.fitness, other.fitness), (entry.noise_deg_s, other.noise_deg_s), (entry.seeds, other.seeds)
+    same_run = all(set(one) & set(two) for one, two in shared)
+    if same_run and (same_label or (same_thing and other.budget == entry.budget)):
+        raise ArmidError(f"{where}: identifier '{entry.label}' is there twice with the same fitness, noise and "
+                         "seeds, each run once is expected")  # fmt: skip
+
+
+def _check_noise(entry: Entry, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
+    """Refuse a fitness that needs noise where there is none, and noise that the plant's speed cannot have."""
+    at = f"{where}, identifier '{entry.label}'"
+    simulated = any(case.source is None for case in cases)
+    for fitness in entry.fitness:
+        if "noise" in registry.fitness[fitness].asks and 0.0 in entry.noise_deg_s and simulated:
+            raise ArmidError(f"{at}: fitness '{fitness}' needs noise, but noise_deg_s holds 0, levels of its own that "
+                             "are above 0 are expected")  # fmt: skip
+    if any(entry.noise_deg_s) and any(case.model.plant.output_unit != "rad/s" for case in cases):
+        raise ArmidError(f"{at}: noise_deg_s is given, but the plant's speed is no angular one, 0 is expected")
+
+
+def _case_description(case: Case) -> dict[str, Any]:
+    """Return what a report needs to know of a case; units by parameter, all values SI."""
+    return {
+        "name": case.name,
+        "truth": dict(case.truth),
+        "published": dict(case.published),
+        "bounds": {name: list(b) for name, b in case.bounds.items()},
+        "fixed": case.fixed,
+        "units": dict(zip(case.space.names, case.space.units, strict=True)),
+        "effects": [e.name for e in case.model.effects],
+        "campaign": case.source.campaign if case.source else None,
+        "records": list(case.source.records) if case.source else len(case.strokes),
+    }
+
+
+def window_text(window: Sequence[float] | str) -> str:
+    """Return how a window is spelt: "0-0.7 s" or "whole"."""
+    return window if isinstance(window, str) else f"{window[0]:g}-{window[1]:g} s"
+
+
+def _parameter_rows(space: Space, x: np.ndarray, train: tuple[Replay, ...]) -> list[tuple[Any, ...]]:
+    """Return value, bounds, Cramer-Rao deviation, largest correlation and flag of each free parameter."""
+    information = information_at(train, space, x)
+    low, high = space.low[space.free], space.high[space.free]
+    units = [u for u, f in zip(space.units, space.free, strict=True) if f]
+    margin = AT_BOUND * (high - low)
+    at_bound = (x <= low + margin) | (x >= high - margin)
+    largest: list[float | None] = []
+    for i, row in enumerate(information.correlation):
+        others = np.abs(np.delete(row, i))
+        known = others[np.isfinite(others)]
+        largest.append(float(known.max()) if known.size else None)
+    columns = (space.free_names, units, x.tolist(), low.tolist(), high.tolist(), information.deviation.tolist(),
+               largest, at_bound.tolist())  # fmt: skip
+    return list(zip(*columns, strict=True))

@@ -1,0 +1,120 @@
+"""What one identification spends on simulation, on fitness, and on everything around them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.algorithms.soo.nonconvex.pso import PSO
+from pymoo.core.problem import Problem
+from pymoo.optimize import minimize
+
+from armid.engine import STANDARD
+from armid.identifiers import IDENTIFIERS
+from armid.model import PLANTS, Model
+from armid.problem.fitness import FITNESS, Fitness
+from armid.problem.meter import Meter, MeterTermination
+from armid.problem.problem import IdentificationProblem
+from armid.problem.replay import Replay, replays
+from armid.problem.space import space_of
+from armid.record import read_campaign
+from bench.measure import CPU, Bound, Row, Stopwatch
+from bench.samples import PLANT, write_sample
+
+N_PARTICLES, N_ITERATIONS = 80, 150
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Hold where the time of one identification went [s], and how many simulations it made."""
+
+    simulation: float
+    fitness: float
+    framework: float
+    used: int
+
+    @property
+    def total(self) -> float:
+        """The whole time [s]."""
+        return self.simulation + self.fitness + self.framework
+
+
+class Watched:
+    """Stand in for a replay or a fitness, and time its work."""
+
+    def __init__(self, thing: Any, watch: Stopwatch) -> None:
+        self._thing, self._watch = thing, watch
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._thing, name)
+
+    def signal(self, candidates: NDArray[np.float64]) -> Any:
+        """Simulate, as a replay does."""
+        return self._watch.timed(self._thing.signal, candidates)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._watch.timed(self._thing, *arguments)
+
+
+class Sphere(Problem):
+    """The sum of squares in four dimensions: as good as no work, so that what is left is pymoo's own."""
+
+    def __init__(self) -> None:
+        super().__init__(n_var=4, n_obj=1, xl=-1.0, xu=1.0)
+        self.watch = Stopwatch()
+
+    def _evaluate(self, X: NDArray[np.float64], out: dict[str, Any], *_: Any, **__: Any) -> None:
+        out["F"] = self.watch.timed(np.sum, X**2, axis=1, keepdims=True)
+
+
+def sample_replays(n_samples: int = 701) -> tuple[Replay, ...]:
+    """Return the bench's small campaign, read back and ready to be simulated on the standard schedule."""
+    with TemporaryDirectory(prefix="armid-bench-") as folder:
+        campaign = read_campaign(write_sample(Path(folder) / "campaign", n_samples))
+    model = Model(PLANTS[PLANT])
+    return replays(campaign.train, model, space_of(model), STANDARD)
+
+
+def identification(made_ready: tuple[Replay, ...], n_iterations: int, seed: int = 1) -> Spent:
+    """Identify with the paper's swarm as `armid identify` does, and tell where the time went."""
+    simulation, fitness = Stopwatch(), Stopwatch()
+    watched = tuple(cast(Replay, Watched(r, simulation)) for r in made_ready)
+    measure = cast(Fitness, Watched(FITNESS["similarity"], fitness))
+    meter = Meter(N_PARTICLES * n_iterations)
+    start = CPU()
+    problem = IdentificationProblem(space_of(made_ready[0].model), watched, measure, meter)
+    algorithm = IDENTIFIERS["pso"].build(meter.budget)
+    minimize(problem, algorithm, MeterTermination(meter), seed=seed, copy_algorithm=False)
+    framework = CPU() - start - simulation.spent - fitness.spent
+    return Spent(simulation.spent, fitness.spent, framework, meter.used)
+
+
+def pymoo_framework(n_iterations: int, seed: int = 1) -> float:
+    """Return what pymoo's own swarm spends on the sphere at the same budget, outside the function [s]."""
+    problem = Sphere()
+    start = CPU()
+    algorithm = PSO(pop_size=N_PARTICLES)
+    minimize(problem, algorithm, ("n_eval", N_PARTICLES * n_iterations), seed=seed, copy_algorithm=False)
+    return CPU() - start - problem.watch.spent
+
+
+def framework_rows(rounds: int = 6, n_iterations: int = N_ITERATIONS, n_samples: int = 701) -> list[Row]:
+    """Measure one identification and pymoo's swarm on the sphere in turn."""
+    made_ready = sample_replays(n_samples)
+    identification(made_ready, 2)
+    pymoo_framework(2)
+    pairs = [(identification(made_ready, n_iterations), pymoo_framework(n_iterations)) for _ in range(rounds)]
+    ours, theirs = min(s.framework for s, _ in pairs), min(t for _, t in pairs)
+    whole = min((s for s, _ in pairs), key=lambda s: s.total)
+    parts = {"simulation": whole.simulation, "fitness": whole.fitness, "framework": whole.framework}
+    shares = ", ".join(f"{name} {seconds / whole.total:.0%}" for name, seconds in parts.items())
+    size = f"{N_PARTICLES} x {n_iterations}"
+    return [
+        Row(f"framework of one identification, {size}", ours * 1e3, "ms", "pymoo's PSO on the sphere",
+            ours / theirs, Bound(0.5, at_least=False),
+            note=f"all but simulation and fitness; pymoo's PSO spends {theirs * 1e3:.0f} ms"),
+        Row(f"one identification, {size}", whole.total * 1e3, "ms",
+            simulations_per_s=whole.used / whole.total, note=shares),
+    ]  # fmt: skip

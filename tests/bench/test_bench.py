@@ -1,0 +1,252 @@
+"""The benchmarks at tiny sizes: right numbers and tables, no claims about time."""
+
+import sys
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armid.errors import ArmidError
+from armid.record import read_campaign
+from bench import __main__ as bench
+from bench import processes
+from bench.baselines import plain_loop, solve_with_scipy
+from bench.engine import (
+    ALLOWED,
+    effects_row,
+    engine_rows,
+    fitness_rows,
+    loosest_tolerance,
+    scipy_outputs,
+    threads_row,
+)
+from bench.framework import framework_rows, identification, pymoo_framework, sample_replays
+from bench.measure import Bound, Row, Stopwatch, bench_table, fastest, number
+from bench.processes import (
+    beyond_output,
+    forget_peak,
+    grown,
+    measured_apart,
+    memory_rows,
+    peak_memory,
+    scale_rows,
+    startup_row,
+)
+from bench.samples import NOISE, arm_task, child_environment, write_sample
+
+ROWS = [
+    Row("engine", 3.84, "us", simulations_per_s=260_150.0, error=3.04e-6, note="on one core"),
+    Row("scipy", 9756.0, "us", "the engine's time", 2538.0, Bound(2000), 102.5, 4.4e-6),
+    Row("second start", 0.9, "s", "the imports", 2.9, Bound(2.5, at_least=False)),
+    Row("memory", None, "MB"),
+]
+
+
+STAND_IN = (sys.executable, "-c", "import sys; assert sys.argv[1] == 'simulate' and sys.argv[3] == '--out'")
+
+
+def test_a_bound_is_met_or_not() -> None:
+    assert [row.met for row in ROWS] == [None, True, False, None]
+    assert Bound(2000).text == "at least 2,000"
+    assert Bound(0.5, at_least=False).text == "at most 0.5"
+    assert Bound(2.5, at_least=False).holds(2.5)
+
+
+def test_the_table_prints_every_row_on_a_line_of_its_own() -> None:
+    lines = bench_table(ROWS).splitlines()
+    for row, line in zip(ROWS, lines[2:], strict=False):
+        assert line.startswith(row.what)
+    assert "3.84 us" in lines[2]
+    assert "260,150" in lines[2]
+    assert "3.0e-06" in lines[2]
+    assert all(text in lines[3] for text in ("9,756 us", "2,538", "the engine's time", "at least 2,000", "yes"))
+    assert "NO" in lines[4]
+    assert "not known" in lines[5]
+
+
+def test_the_table_says_in_words_what_falls_short_and_what_else_to_know() -> None:
+    text = bench_table(ROWS)
+    assert "Falls short: second start has a ratio of 2.9, at most 2.5 is wanted." in text
+    assert "engine: on one core." in text
+    assert "cores" in text
+    assert "All 1 ratios that have a bound are within it." in bench_table(ROWS[:2])
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(123456.7, "123,457"), (38.42, "38.4"), (0.61749, "0.617"), (0.0, "0.00"), (0.00002, "2.0e-05")],
+)
+def test_numbers_have_three_digits(value: float, text: str) -> None:
+    assert number(value) == text
+
+
+def test_works_run_in_turn_and_the_shortest_time_counts() -> None:
+    calls: list[str] = []
+    ticks = count()
+    best = fastest({n: lambda n=n: calls.append(n) for n in "ab"}, 3, lambda: float(next(ticks)), slot=0.0)
+    assert calls == list("ab" * 4)
+    assert best == {"a": 1.0, "b": 1.0}
+
+
+def test_a_short_work_is_repeated() -> None:
+    calls = []
+    fastest({"a": lambda: calls.append(1)}, 1, slot=0.01)
+    assert len(calls) > 2
+
+
+def test_a_stopwatch_adds_up() -> None:
+    ticks = count()
+    watch = Stopwatch(lambda: float(next(ticks)))
+    assert watch.timed(max, 3, 4) == 4
+    watch.timed(sum, [1, 2])
+    assert watch.spent == 2.0
+
+
+def test_a_run_measures_every_part_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "bench_parts", lambda *_: {"first": lambda: ROWS[:2], "second": lambda: ROWS[2]})
+    told: list[str] = []
+    assert bench.run_bench(told.append) == ROWS[:3]
+    assert told == ["first", "second"]
+    assert bench.run_bench() == ROWS[:3]
+
+
+def test_quick_has_the_same_parts() -> None:
+    assert list(bench.bench_parts(quick=True)) == list(bench.bench_parts())
+
+
+def assert_measured(row: Row) -> None:
+    numbers = [row.measured, row.ratio, row.simulations_per_s]
+    assert all(n is None or (np.isfinite(n) and n > 0) for n in numbers)
+    assert row.measured is not None
+    assert (row.ratio is None) == (row.wanted is None) == (row.met is None)
+
+
+def test_engine_scipy_and_plain_loop_are_measured_with_their_errors() -> None:
+    engine, scipy, plain = rows = engine_rows(rounds=1, n_candidates=16, n_scipy=2)
+    for row in rows:
+        assert_measured(row)
+        assert row.simulations_per_s == pytest.approx(1e6 / row.measured)
+        assert row.error is not None
+    assert engine.ratio is None
+    assert max(engine.error, scipy.error) <= ALLOWED
+    assert plain.error <= 2e-3
+    assert [r.wanted.number for r in (scipy, plain)] == [2000, 12]
+
+
+def test_effects_are_measured_on_candidates_that_reach_their_switch() -> None:
+    row = effects_row(rounds=1, n_candidates=16)
+    assert_measured(row)
+    assert row.error <= ALLOWED
+    assert "16 of 16 candidates reach their switch" in row.note
+
+
+def test_threads_give_the_same_bits() -> None:
+    row = threads_row(rounds=1, n_candidates=32, attempts=1)
+    assert_measured(row)
+    assert row.error <= ALLOWED
+    assert "the same bits" in row.note
+
+
+def test_fitness_is_measured() -> None:
+    for row in fitness_rows(rounds=1, n_candidates=4):
+        assert_measured(row)
+
+
+def test_reference_scipy_and_plain_loop_solve_the_same_equations() -> None:
+    task = arm_task(2)
+    reference, plain = task.reference(), np.empty((2, 701))
+    plain_loop(task.population, plain, task.manoeuvre.interval)
+    assert task.error(scipy_outputs(task, 2, 1e-11), reference) < 1e-9
+    assert task.error(plain, reference) < 2e-3
+    found = loosest_tolerance(task, reference, 2)
+    assert found.error <= ALLOWED
+    assert found.tolerance > 1e-8
+
+
+def test_plain_baselines_agree_while_the_switch_is_never_reached() -> None:
+    task = arm_task(1, 50)
+    plain = np.empty((1, 50))
+    plain_loop(task.population, plain, task.manoeuvre.interval)
+    solved = solve_with_scipy(task.population[0], task.manoeuvre.times(), 1e-10)
+    np.testing.assert_allclose(solved, plain[0], rtol=0, atol=1e-3)
+
+
+def test_the_sample_campaign_can_be_read_and_has_its_noise(tmp_path: Path) -> None:
+    campaign = read_campaign(write_sample(tmp_path / "c"))
+    (record,) = campaign.train
+    assert record.measured.shape == (701,)
+    assert record.noise.source == "rest"
+    assert record.noise.rms == pytest.approx(NOISE, rel=0.3)
+
+
+def test_an_identification_uses_its_whole_budget_and_its_time_is_split() -> None:
+    spent = identification(sample_replays(101), 2)
+    assert spent.used == 160
+    parts = (spent.simulation, spent.fitness, spent.framework)
+    assert all(np.isfinite(p) and p > 0 for p in parts)
+    assert spent.total == pytest.approx(sum(parts))
+    assert pymoo_framework(2) > 0
+
+
+def test_framework_rows() -> None:
+    framework, whole = framework_rows(rounds=1, n_iterations=2, n_samples=101)
+    assert framework.ratio > 0
+    assert framework.wanted.text == "at most 0.5"
+    assert whole.simulations_per_s > 0
+    assert all(word in whole.note for word in ("simulation", "fitness", "framework"))
+
+
+def test_memory_is_measured_in_another_process() -> None:
+    assert measured_apart(8, 60) >= 0 or peak_memory() is None
+    assert beyond_output(8, 60) >= 0 or peak_memory() is None
+
+
+def test_memory_rows_compare_ten_times_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "measured_apart", lambda n, s: n * s)
+    candidates, samples = memory_rows(10, 100)
+    for row in (candidates, samples):
+        assert row.ratio == pytest.approx(1 / 8)
+        assert row.met is False
+    assert "10 to 100" in candidates.what
+    assert "100 to 1,000 samples" in samples.what
+
+
+def test_memory_that_shrinks_counts_as_flat_and_unknown_memory_as_unknown() -> None:
+    assert grown("memory", 10, 5, 100).ratio == 0
+    unknown = grown("memory", -1, 5, 100)
+    assert unknown.measured is None
+    assert unknown.met is None
+
+
+@pytest.mark.skipif(peak_memory() is None, reason="the system does not tell the peak memory of a process")
+def test_the_peak_sees_what_is_taken() -> None:
+    forget_peak()
+    before = peak_memory()
+    taken = np.ones(60_000_000 // 8)
+    assert peak_memory() - before > 0.5 * taken.nbytes
+
+
+def test_start_up_calls_the_command_with_a_campaign() -> None:
+    row = startup_row(rounds=1, command=STAND_IN, n_samples=60)
+    assert 0 < row.ratio < np.inf
+    assert "compiled nothing" in row.note
+
+
+def test_start_up_says_why_the_command_failed() -> None:
+    command = (sys.executable, "-c", "raise SystemExit('no such thing')")
+    with pytest.raises(ArmidError, match="no such thing"):
+        startup_row(rounds=1, command=command, n_samples=60)
+
+
+def test_a_child_finds_this_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", "elsewhere")
+    assert child_environment()["PYTHONPATH"].endswith("elsewhere")
+
+
+@pytest.mark.slow
+def test_large_campaigns_are_identified_in_memory_that_is_told() -> None:
+    long, many = scale_rows(20_000, 10)
+    assert (long.what, many.what) == ("identify, 20,000 samples", "identify, 10 records")
+    for row in (long, many):
+        assert row.measured is None or row.measured > 50.0

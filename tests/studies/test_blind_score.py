@@ -1,0 +1,161 @@
+"""The page of the blind suite: tables and figures of a made-up suite, and whether a record more told a pair apart."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_up import made_entry, made_report
+
+from blind import advice, score, tables
+from blind.figures import advice_figure
+from stand.refusal import RefusalError
+from stand.score.judge import Claim
+
+PAIR = ["coulomb", "brush_drop"]
+
+
+def claim(verdict="explained", empirical=(), **groups):
+    return Claim({name: frozenset((name, *others)) for name, others in groups.items()}, empirical, verdict)
+
+
+@pytest.mark.parametrize(
+    ("said", "answer"),
+    [
+        (claim(coulomb=()), "told apart"),
+        (claim("partly_explained", coulomb=()), "told apart"),
+        (claim("cannot_tell_apart", coulomb=("brush_drop",)), "still together"),
+        (claim("cannot_tell_apart", coulomb=()), "still together"),
+        (claim(coulomb=(), brush_drop=()), "still together"),
+        (claim(brush_drop=()), "wrong one"),
+        (claim("partly_explained", ("unnamed:torque",), coulomb=()), "still together"),
+        (claim("no_discrepancy"), "neither"),
+        (None, "missing"),
+    ],
+)
+def test_one_answer_for_each_claim(said, answer):
+    assert advice.answer("coulomb", said) == answer
+
+
+def made(advised, random):
+    """Return key and reports of campaigns in which the true effect stood alone or not, by choice and place."""
+    reports, key = {}, {}
+    for choice, found in (("advised", advised), ("random", random)):
+        for i, good in enumerate(found):
+            name = f"a{i:02d}_{choice}"
+            alternatives = [] if good else ["brush_drop"]
+            steps = [{"effect": "coulomb", "alternatives": alternatives, "empirical": False}]
+            verdict = "explained" if good else "cannot_tell_apart"
+            reports[name] = {"verdict": verdict, "effects": ["coulomb"], "steps": steps}
+            key[name] = {"class": "pair", "pair": PAIR, "choice": choice, "base": f"a{i:02d}", "power": 0.9, "rank": 1,
+                         "tried": 9, "in_doubt": 7, "effects": [{"name": "coulomb"}], "noise": {"kind": "white"},
+                         "next": {"shell": True}}  # fmt: skip
+    return key, reports
+
+
+def judged_pairs(*choices):
+    """Return the rows of made campaigns, their rates, and question -> target."""
+    rows = advice.separations(*made(*choices))
+    rates = advice.rates(rows)
+    return rates.to_dict("records"), {t.question: t for t in advice.targets_of(rows, rates)}
+
+
+def test_rates_and_the_test_of_pairs():
+    (first, whole), aims = judged_pairs([1, 1, 1, 1, 0], [1, 0, 0, 0, 0])
+    assert (first["pair"], first["n"], first["tried"], first["in_doubt"]) == ("coulomb / brush_drop", 5, 9, 7)
+    assert (first["advised"], first["random"], whole["advised"]) == (0.8, 0.2, 0.8)
+    assert first["p"] == pytest.approx(0.5**3)
+    assert aims["all pairs: told apart by the advised record"].met
+    assert aims["all pairs: lead over a random record"].met
+
+
+def test_no_lead_is_no_lead():
+    (first, _), aims = judged_pairs([1, 0], [0, 1])
+    lead = aims["all pairs: lead over a random record"]
+    assert (lead.found, lead.met) == (0.0, False)
+    assert judged_pairs([1], [1])[0][0]["p"] == 1.0
+
+
+def test_a_campaign_that_was_closed_for_one_choice_alone_does_not_count(tmp_path):
+    key, reports = made([1, 1, 1], [0, 0, 0])
+    del reports["a02_random"]
+    targets, sections = score.advice_parts(key, reports, {}, tmp_path)
+    assert targets[0].met is False
+    rates, campaigns = (part for part in sections["Pairs"] if not isinstance(part, str))
+    assert rates.frame["n"].tolist() == [2, 2]
+    assert len(campaigns.frame) == 6
+    assert (tmp_path / "advice.png").stat().st_size > 5_000
+
+
+def test_a_key_of_other_campaigns_is_refused():
+    key, reports = made([1], [1])
+    del key["a00_random"]["choice"]
+    with pytest.raises(RefusalError, match="does not tell of campaign 'a00_random' who chose"):
+        advice.separations(key, reports)
+
+
+def test_the_figure_shows_each_pair_with_both_records():
+    found = pd.DataFrame({
+        "pair": ["viscous / quadratic_drag", "winding_heating / worm_direction"], "n": [20, 18],
+        "advised": [0.9, 1.0], "advised_low": [0.7, 0.84], "advised_high": [0.97, 1.0],
+        "random": [0.7, 0.5], "random_low": [0.48, 0.3], "random_high": [0.85, 0.7],
+    })  # fmt: skip
+    figure = advice_figure(found, 0.8)
+    (axis,) = figure.axes
+    labels = ["viscous / quadratic_drag (20)", "winding_heating / worm_direction (18)"]
+    assert [t.get_text() for t in axis.get_yticklabels()] == labels
+    drawn = [container.lines[0].get_xdata() for container in axis.containers]
+    assert np.allclose(drawn, [[90.0, 100.0], [70.0, 50.0]])
+    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["target 80 %", "advised record", "random record"]
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory):
+    """A key of 120 made-up campaigns, the reports of all but one, and the page of them: folder, printed text."""
+    folder, rng = tmp_path_factory.mktemp("scored"), np.random.default_rng(5)
+    key = {f"c{i:03d}": made_entry(rng) for i in range(120)}
+    for name, entry in [*key.items()][:-1]:
+        (folder / "reports" / name).mkdir(parents=True)
+        (folder / "reports" / name / "report.json").write_text(json.dumps(made_report(rng, entry)))
+    (folder / "key.json").write_text(json.dumps({"campaigns": key}))
+    assert score.main([str(folder / "reports"), "--key", str(folder / "key.json"), "--out", str(folder / "out")]) == 0
+    return folder / "out"
+
+
+def test_the_page_shows_every_table_and_figure(suite):
+    page = (suite / "report.md").read_text()
+    assert "NOT COMPLETE: 119 of 120 campaigns" in page
+    assert "| campaigns without a report | 1 | = 0 | 120 | missed |" in page
+    for figure in ("answers", "confusion", "named_first", "false_alarms", "held_out", "bias", "groups_and_times"):
+        assert f"({figure}.png)" in page
+        assert (suite / f"{figure}.png").stat().st_size > 5_000
+    for table in ("targets", "answers", "effects", "false_alarms", "two", "unlisted", "one_stroke", "held_out", "bias"):
+        assert len(pd.read_csv(suite / f"{table}.csv")) > 0
+
+
+def test_the_tables_agree_with_the_judgements(suite):
+    rows = pd.read_csv(suite / "campaigns.csv")
+    single = rows[(rows["class"] == "single") & (rows["judgement"] != "missing")]
+    assert set(single["answer"]) <= {*tables.ANSWERS}
+    effects = pd.read_csv(suite / "effects.csv")
+    assert effects["n"].sum() == len(single)
+    held = single[single["matters"].astype(str) == "True"]
+    assert effects["right"].sum() == held["judgement"].isin(["right", "group"]).sum()
+    answers = pd.read_csv(suite / "answers.csv").set_index("class")
+    assert (
+        answers.loc["control", "false_alarm"] == (rows[rows["class"] == "control"]["judgement"] == "false_alarm").sum()
+    )
+    listed = rows[rows["class"].isin(["single", "two"]) & rows["matching"].astype(bool)].dropna(subset=["after"])
+    bias = pd.read_csv(suite / "bias.csv").set_index(["form", "parameter"])
+    expected = np.median(np.abs(listed[[f"bias_after_{p}" for p in ("p0", "k", "eta3", "n")]].to_numpy()))
+    assert bias.loc[("matching", "all"), "after"] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("key", "words"), [("{", "is no JSON"), ("{}", "'campaigns' of"), (None, "cannot be read")])
+def test_a_key_that_is_none_is_refused_with_one_sentence(key, words, tmp_path, capsys):
+    if key is not None:
+        (tmp_path / "key.json").write_text(key)
+    assert score.main([str(tmp_path), "--key", str(tmp_path / "key.json"), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
