@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from armid.loop import close_loop, report_of
-from armid.loop.document import markdown
+from armid.loop.document import conclusion, details_of
 from armid.loop.figures import figures_of
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
+from armid.report.style import save
 
 pytestmark = pytest.mark.slow
 CANDIDATES = {n: EFFECTS[n] for n in ("supply_sag", "tilt")}
@@ -45,13 +46,12 @@ def test_no_name_and_no_full_explanation_is_claimed(found):
     report = json.loads(json.dumps(report_of(found), allow_nan=False))
     assert report["effects"][-1] == "unnamed:torque"
     assert any(n.startswith("unnamed:torque.h") for n in report["parameters"]["after"])
-    assert "no physical name" in markdown(found, [])
+    assert "no physical name" in conclusion(found)
 
 
 def test_the_missing_signal_is_drawn(found, tmp_path):
-    figures = figures_of(found)
-    assert "missing.png" in figures
-    figures["missing.png"](found, tmp_path / "missing.png")
+    figures = figures_of(found, report_of(found), details_of(found))
+    save(figures["missing"](), tmp_path / "missing.png")
     assert (tmp_path / "missing.png").stat().st_size > 10_000
 
 

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from pandas import DataFrame
 
-from armid.study.analyses.table import Column, Table
-from armid.study.report import Report
-from armid.study.report import ReportSection as Section
+from armid.report.document import Column, Document, Section, Table, listing
 
-EVIL = '<script>document.title="broken"</script><img src=x onerror=alert(1)>"\'&'
+EVIL = '<script>document.title="broken"</script><img src=x onerror=alert(1)>"\'&[x](javascript:alert(1)) [/x]'
 SVG = """<?xml version="1.0"?>
 <!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">
 <svg xmlns:xlink="http://www.w3.org/1999/xlink" width="450pt" height="225pt" viewBox="0 0 450 225"
@@ -92,11 +90,13 @@ def write_loop(folder: Path, name: str = "arm", details: bool = True, figures: b
     return folder
 
 
-def study_report(name: str = "made_up") -> Report:
-    """Return a report of a study with a table of numbers and texts, some of them missing or infinite."""
+def study_document(name: str = "made_up") -> Document:
+    """Return the document of a study with a table of numbers and texts, some of them missing or infinite."""
     frame = DataFrame({"who": [f"{name} {w}" for w in "bcad"], "error": [0.02, np.inf, np.nan, 3e-9],
                        "cost": ["90 (1 %)", "inf (0 %)", "", "1200 (7 %)"]})  # fmt: skip
     columns = Column("who", "identifier"), Column("error", "error [%]", ".3g", 100.0), Column("cost", "cost")
-    table = Table("overview", f"Errors of {name}", f"Words of {name}.", frame, columns)
-    return Report(name, f"Is {name} right?", "Complete: 4 of 4 runs.", (f"Made of {name}.",), table,
-                  (Section("Overview", f"Of {name}.", (table,)),), (f"Yes, {name}.",))  # fmt: skip
+    table = Table("overview", f"Errors of {name}", f"Words of {name}.", frame, columns, grouped=True)
+    made = listing("Commands", f"armid study x\nname = '{name}'")
+    return Document(name, "Study", f"Is {name} right?", (f"Yes, {name}.", "Complete: 4 of 4 runs."),
+                    (Section("Overview", (table,), f"Of {name}."), Section("How it was made", (made,))),
+                    facts=(f"Made of {name}.",), main=(table,))  # fmt: skip

@@ -5,11 +5,10 @@ import re
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from stored import EVIL, SVG, study_report, write_loop
+from stored import EVIL, SVG, study_document, write_loop
 
-from armid.cli.report import LOOP, page_of_folder
+from armid.cli.results import LOOP, document_of
 from armid.report.html import html
-from armid.study.document import study_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -19,9 +18,8 @@ def pages(tmp_path_factory):
     """A closed loop and a study, and both with names that would break a careless page."""
     folder, made = tmp_path_factory.mktemp("pages"), {}
     for kind, name in (("plain", "arm"), ("evil", EVIL)):
-        made[f"{kind} loop"] = html(page_of_folder(write_loop(folder / kind, name), LOOP, name))
-        report = study_report(name)
-        made[f"{kind} study"] = html(study_page(report, {}, name, [name], [name]))
+        made[f"{kind} loop"] = html(document_of(write_loop(folder / kind, name), LOOP, name))
+        made[f"{kind} study"] = html(study_document(name))
     for name, text in made.items():
         (folder / f"{name}.html").write_text(text, encoding="utf-8")
     return {name: folder / f"{name}.html" for name in made}
@@ -118,7 +116,7 @@ def test_a_stored_figure_cannot_run_anything(opened, tmp_path):
     folder = write_loop(tmp_path / "loop")
     script = "<script>document.title='broken'</script><use onload='x()'"
     (folder / "ranking.svg").write_text(SVG.replace("<use", script))
-    (tmp_path / "page.html").write_text(html(page_of_folder(folder, LOOP, "x")))
+    (tmp_path / "page.html").write_text(html(document_of(folder, LOOP, "x")))
     page = opened(tmp_path / "page.html")
     assert page.title == "arm: Closed loop"
     assert page.get_log("browser") == []

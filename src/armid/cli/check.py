@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 def check_command(thing: str, plugins: tuple[str, ...]) -> None:
     """Run the contract on your own things.
 
-    A plant, an effect, a fitness or an identifier in a Python file, which is run; an effect is tried on every plant
-    that offers its ports, those of --plugin included. A campaign is read, and its model simulated through each record.
-    Every point is printed. Exit code 0 when all hold, 1 when one does not, 2 when there is nothing to try.
+    A plant, an effect, a fitness, an identifier or an analysis in a Python file, which is run; an effect is tried on
+    every plant that offers its ports, those of --plugin included. A campaign is read, and its model simulated through
+    each record. Every point is printed. Exit code 0 when all hold, 1 when one does not, 2 when there is nothing to try.
     """
     kind, name, findings = findings_of(thing, load_registry(plugins))
     print(f"{kind}: {name}")
@@ -36,7 +36,6 @@ def check_command(thing: str, plugins: tuple[str, ...]) -> None:
 
 
 def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[Finding]"]:
-    """Return kind and name of a thing, and what its contract finds."""
     # simulations and pymoo, which other commands do not need
     from armid.contract.check import check_campaign, check_thing
     from armid.record import read_campaign

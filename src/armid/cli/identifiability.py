@@ -1,7 +1,6 @@
 """`armid identifiability`: how well the records of a campaign pin down the parameters."""
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,26 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.cli.options import (
-    NewFiles,
     accuracy_of,
     accuracy_option,
     assignments,
-    campaign_argument,
-    effects_option,
     examples,
-    fixed_values,
-    intervals,
     number,
     opened,
-    plugin_option,
-    refuse_unwritable,
+    out_option,
+    problem_options,
 )
+from armid.cli.results import IDENTIFIABILITY, refuse_unwritable, show_and_write
 from armid.errors import ArmidError, nearest
 
 if TYPE_CHECKING:
-    from armid.estimation.examine import Examination
     from armid.problem.space import Space
-
 
 Array = NDArray[np.float64]
 # The rounding of a speed is larger.
@@ -40,41 +33,24 @@ LEAST_NOISE = 1e-15
     "armid identifiability studies/campaigns/paper_arm --window 0:0.7 --out results/identifiability",
     "armid identifiability CAMPAIGN --from results/paper_arm/result.json --rank worst",
 ))  # fmt: skip
-@campaign_argument
-@effects_option
-@click.option(
-    "--bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable."
-)
-@click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
+@problem_options
 @click.option(
     "--at", default="", metavar="NAME=VALUE,...", help="Examine this point, SI, instead of the least-squares estimate."
 )
 @click.option(
-    "--from",
-    "source",
-    type=click.Path(path_type=Path),
-    metavar="RESULT.json",
+    "--from", "source", type=click.Path(path_type=Path), metavar="RESULT.json",
     help="Examine the point that `armid identify` found.",
-)
-@click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
+)  # fmt: skip
 @click.option(
-    "--noise",
-    type=float,
-    metavar="RMS",
+    "--noise", type=float, metavar="RMS",
     help="White noise to assume for every record, rad/s or m/s, in place of what was measured.",
-)
+)  # fmt: skip
 @click.option(
-    "--rank",
-    default="volume",
-    show_default=True,
-    metavar="volume|worst|shrinkage",
+    "--rank", default="volume", show_default=True, metavar="volume|worst|shrinkage",
     help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.",
-)
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for identifiability.json and the figures."
-)
+)  # fmt: skip
+@out_option("Folder for identifiability.html, identifiability.json and the figures.")
 @accuracy_option
-@plugin_option
 def identifiability_command(
     campaign: Path, effects: str, bounds: tuple[str, ...], fix: tuple[str, ...], at: str, source: Path | None,
     window: str, noise: float | None, rank: str, out: Path | None, accuracy: str, plugins: tuple[str, ...],
@@ -86,7 +62,8 @@ def identifiability_command(
     """
     from armid.estimation.design import SHRINKAGE, VOLUME, WORST
     from armid.estimation.examine import examine
-    from armid.problem.space import space_of
+    from armid.estimation.identifiability_document import result_of
+    from armid.estimation.identifiability_figures import figures_of
 
     if rank not in (VOLUME, WORST, SHRINKAGE):
         raise ArmidError(f"--rank '{rank}': {nearest(rank, (VOLUME, WORST, SHRINKAGE))}")
@@ -95,15 +72,12 @@ def identifiability_command(
         raise ArmidError(f"--noise is {noise:g}, {expected}")
     if at and source is not None:
         raise ArmidError("--at and --from are both given: one point is expected")
-    _, read, model = opened(campaign, effects, plugins, window)
-    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), fixed_values(fix, model))
+    given = opened(campaign, effects, plugins, window, bounds, fix)
+    space = given.space()
     point = point_of(space, at, source)
-    if out is not None:
-        refuse_unwritable(out)
-    found = examine(read, model, space, point, noise, rank, accuracy_of(accuracy))
-    report(found)
-    if out is not None:
-        write(found, out)
+    refuse_unwritable(out)
+    found = examine(given.campaign, given.model, space, point, noise, rank, accuracy_of(accuracy))
+    show_and_write(IDENTIFIABILITY, result_of(found), {}, out, figures_of(found))
 
 
 def point_of(space: "Space", at: str, source: Path | None) -> Array | None:
@@ -136,33 +110,3 @@ def free_values(space: "Space", given: dict[str, float], where: str) -> Array:
     if missing:
         raise ArmidError(f"{where}: parameter '{missing[0]}' is free and has no value there: one is expected")
     return np.array([given[name] for name in space.free_names])
-
-
-def report(found: "Examination") -> None:
-    """Print tables and remarks."""
-    from rich.console import Console
-
-    from armid.estimation.identifiability_document import (
-        offer_table,
-        parameter_table,
-        remarks,
-    )
-
-    console = Console(width=None if sys.stdout.isatty() else 132)
-    console.print(parameter_table(found))
-    console.print(offer_table(found))
-    for remark in remarks(found):
-        console.print(f"- {remark}", highlight=False, markup=False)
-
-
-def write(found: "Examination", out: Path) -> None:
-    """Write identifiability.json and the figures, all or none."""
-    from armid.estimation.identifiability_document import result_of
-    from armid.estimation.identifiability_figures import profile_figure, sensitivity_figure
-
-    with NewFiles(out) as files:
-        text = json.dumps(result_of(found), indent=2, allow_nan=False) + "\n"
-        files.path("identifiability.json").write_text(text)
-        profile_figure(found, files.path("profiles.png"))
-        sensitivity_figure(found, files.path("sensitivities.png"))
-    print(f"wrote {', '.join(files.names)} to {out}")

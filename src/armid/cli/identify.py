@@ -1,32 +1,26 @@
 """`armid identify`: parameters from the records of a campaign."""
 
-import json
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from armid.cli.options import (
-    NewFiles,
     accuracy_of,
     accuracy_option,
     assignments,
-    campaign_argument,
     chosen,
-    effects_option,
     examples,
-    fixed_values,
-    intervals,
-    made_by,
     opened,
-    plugin_option,
-    refuse_unwritable,
+    out_option,
+    problem_options,
+    seed_option,
     value_of,
 )
-
-if TYPE_CHECKING:
-    from armid.estimation.identify import Identification
+from armid.cli.results import IDENTIFICATION, refuse_unwritable, show_and_write
 
 
 @click.command("identify", epilog=examples(
@@ -34,51 +28,28 @@ if TYPE_CHECKING:
     "armid identify CAMPAIGN --identifier pso+least_squares --fitness rmse --budget 3000",
     "armid identify CAMPAIGN --effects coulomb --bounds coulomb.level=0:80 --fix n=1.4",
 ))  # fmt: skip
-@campaign_argument
+@problem_options
 @click.option(
-    "--identifier",
-    default="pso",
-    show_default=True,
+    "--identifier", default="pso", show_default=True,
     help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.",
-)
+)  # fmt: skip
 @click.option(
-    "--option",
-    "options",
-    multiple=True,
-    metavar="NAME=VALUE",
+    "--option", "options", multiple=True, metavar="NAME=VALUE",
     help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
     "0.5:0.3 for three phases), pso.velocity_limit=0.2. Repeatable.",
-)
+)  # fmt: skip
 @click.option("--fitness", default="similarity", show_default=True, help="What is minimised: see `armid list fitness`.")
-@effects_option
 @click.option(
-    "--bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable."
-)
-@click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
-@click.option("--window", default="", metavar="A:B", help="What fitness and errors see of every record, s.")
-@click.option(
-    "--budget",
-    default=12_000,
-    show_default=True,
+    "--budget", default=12_000, show_default=True,
     help="Simulations: one candidate through all train records counts as one.",
-)
+)  # fmt: skip
 @click.option(
-    "--target",
-    type=float,
+    "--target", type=float,
     help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.",
-)
-@click.option(
-    "--seed",
-    default=1,
-    show_default=True,
-    type=click.IntRange(0),
-    help="Seed of everything random; the same gives the same result.",
-)
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for report.html, result.json and the figures."
-)
+)  # fmt: skip
+@seed_option
+@out_option("Folder for report.html, result.json and the figures.")
 @accuracy_option
-@plugin_option
 def identify_command(
     campaign: Path, identifier: str, options: tuple[str, ...], fitness: str, effects: str, bounds: tuple[str, ...],
     fix: tuple[str, ...], window: str, budget: int, target: float | None, seed: int, out: Path | None, accuracy: str,
@@ -92,93 +63,38 @@ def identify_command(
     """
     from armid.estimation.identify import INTERRUPTED
     from armid.estimation.identify import identify as run
+    from armid.estimation.identify_document import details_of, result_of
+    from armid.estimation.identify_figures import figures_of
     from armid.problem.fitness import SIMILARITIES
-    from armid.problem.space import space_of
 
-    registry, read, model = opened(campaign, effects, plugins, window)
-    space = space_of(model, read.parameters, intervals(bounds, "--bounds"), fixed_values(fix, model))
-    distance: Any = chosen(fitness, registry.fitness, "fitness")
-    searcher = registry.identifier_of(identifier)
+    given = opened(campaign, effects, plugins, window, bounds, fix)
+    space = given.space()
+    distance = chosen(fitness, given.registry.fitness, "fitness")
+    searcher = given.registry.identifier_of(identifier)
     searcher = searcher.with_options({n: value_of(v) for n, v in assignments(options, "--option").items()})
     goal = 1.0 - target if target is not None and fitness in SIMILARITIES else target
-    if out is not None:
-        refuse_unwritable(out)
-    with Progress(budget) as progress:
-        found = run(read, model, space, distance, searcher, budget, seed, goal, accuracy_of(accuracy), progress.update)
-    report(found)
-    if out is not None:
-        write(found, out)
+    refuse_unwritable(out)
+    with progress_bar(budget) as update:
+        found = run(given.campaign, given.model, space, distance, searcher, budget, seed, goal, accuracy_of(accuracy),
+                    update)  # fmt: skip
+    show_and_write(IDENTIFICATION, result_of(found), details_of(found), out, figures_of(found))
     if found.stopped == INTERRUPTED:
         sys.exit(130)
 
 
-def report(found: "Identification") -> None:
-    """Print tables and remarks."""
+@contextmanager
+def progress_bar(budget: int) -> Iterator[Callable[[Any], None]]:
+    """Yield what shows the state of a search, with rate and time left, on a terminal; nothing is shown elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda meter: None
+        return
     from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from armid.estimation.identify_document import (
-        error_table,
-        parameter_table,
-        remarks,
-    )
-
-    console = Console(width=None if sys.stdout.isatty() else 120)
-    console.print(parameter_table(found))
-    console.print(error_table(found))
-    for remark in remarks(found):
-        console.print(f"- {remark}", highlight=False, markup=False)
-    last = f"{found.used} of {found.budget} simulations used, {found.stopped}; seed {found.seed}."
-    console.print(last, highlight=False)
-
-
-def write(found: "Identification", out: Path) -> None:
-    """Write report.html, result.json, details.json and the figures, all or none."""
-    from armid.cli.report import IDENTIFICATION, write_page
-    from armid.estimation.identify_document import (
-        details_of,
-        result_of,
-    )
-    from armid.estimation.identify_figures import convergence_figure, fit_figure
-
-    with NewFiles(out) as files:
-        files.path("result.json").write_text(json.dumps(result_of(found), indent=2, allow_nan=False) + "\n")
-        fit_figure(found, files.path("fit.png"))
-        if len(found.trace[0]):
-            convergence_figure(found, files.path("convergence.png"))
-            convergence_figure(found, files.path("convergence.svg"))
-        files.path("details.json").write_text(json.dumps(details_of(found, made_by()), allow_nan=False) + "\n")
-        write_page(files, IDENTIFICATION, out)
-    print(f"wrote {', '.join(files.names)} to {out}")
-
-
-class Progress:
-    """Show a bar with rate and time left on a terminal, nothing elsewhere."""
-
-    def __init__(self, budget: int) -> None:
-        self.budget = budget
-        self.bar: Any = None
-
-    def __enter__(self) -> "Progress":
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-            self.bar = Progress(
-                TextColumn("{task.completed:.0f}/{task.total:.0f} simulations"), BarColumn(),
-                TextColumn("{task.fields[rate]:.0f}/s"), TimeRemainingColumn(),
-                TextColumn("best {task.fields[best]:.6g}"), console=Console(stderr=True),
-            )  # fmt: skip
-            self.task = self.bar.add_task("", total=self.budget, best=float("inf"), rate=0.0)
-            self.bar.start()
-        return self
-
-    def update(self, meter: Any) -> None:
-        """Move the bar."""
-        if self.bar is not None:
-            # rich does not know a speed until it has seen two steps
-            rate = self.bar.tasks[0].speed or 0.0
-            self.bar.update(self.task, completed=meter.used, best=meter.best_f, rate=rate)
-
-    def __exit__(self, *_: object) -> None:
-        if self.bar is not None:
-            self.bar.stop()
+    columns = (TextColumn("{task.completed:.0f}/{task.total:.0f} simulations"), BarColumn(),
+               TextColumn("{task.fields[rate]:.0f}/s"), TimeRemainingColumn(),
+               TextColumn("best {task.fields[best]:.6g}"))  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=budget, best=float("inf"), rate=0.0)
+        # rich does not know a speed until it has seen two steps
+        yield lambda m: bar.update(task, completed=m.used, best=m.best_f, rate=bar.tasks[0].speed or 0.0)

@@ -1,22 +1,19 @@
 """Options that several commands share, and how their texts become values."""
 
-import os
-import shlex
 import warnings
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping
 from math import isfinite
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from armid.errors import ArmidError, nearest
-from armid.model import Model
+from armid.model import Effect, Model
 from armid.registry import Registry, load_registry
 
 if TYPE_CHECKING:
+    from armid.problem.space import Space
     from armid.record import Campaign
 
 
@@ -38,16 +35,54 @@ accuracy_option = click.option(
 )  # fmt: skip
 
 
+bounds_option = click.option(
+    "--bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable."
+)
+fix_option = click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
+seed_option = click.option(
+    "--seed", default=1, show_default=True, type=click.IntRange(0),
+    help="Seed of everything random; the same gives the same result.",
+)  # fmt: skip
+window_option = click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
+
+
+def out_option(text: str, required: bool = False) -> Callable[[Any], Any]:
+    """Return --out DIR with its help."""
+    return click.option("--out", required=required, type=click.Path(path_type=Path), metavar="DIR", help=text)
+
+
+def problem_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command CAMPAIGN and the options that say which model is fitted to what of it, see `opened`."""
+    options = (campaign_argument, effects_option, bounds_option, fix_option, window_option, plugin_option)
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
 class Opened(NamedTuple):
-    """What a command on a campaign works with: all that is registered, the records, the declared model."""
+    """What a command on a campaign works with: all that is registered, the records, the declared model, overrides.
+
+    bounds, fixed: name -> (low, high) of --bounds, and value of --fix, SI.
+    """
 
     registry: Registry
     campaign: "Campaign"
     model: Model
+    bounds: dict[str, tuple[float, float]]
+    fixed: dict[str, float]
+
+    def space(self) -> "Space":
+        """Return the space that is searched."""
+        from armid.problem.space import space_of
+
+        return space_of(self.model, self.campaign.parameters, self.bounds, self.fixed)
 
 
-def opened(campaign: Path, effects: str, plugins: Iterable[str], window: str = "") -> Opened:
-    """Return what CAMPAIGN, --effects, --plugin and --window stand for; plug-ins run their code.
+def opened(
+    campaign: Path, effects: str, plugins: Iterable[str], window: str = "", bounds: Iterable[str] = (),
+    fix: Iterable[str] = (),
+) -> Opened:  # fmt: skip
+    """Return what CAMPAIGN, --effects, --plugin, --window, --bounds and --fix stand for; plug-ins run their code.
 
     Raises ArmidError for whatever of them cannot be used.
     """
@@ -57,7 +92,12 @@ def opened(campaign: Path, effects: str, plugins: Iterable[str], window: str = "
     read = read_campaign(campaign, registry.plants, registry.effects)
     if window:
         read = read.with_window(*interval(window, "--window"))
-    return Opened(registry, read, model_of(read, effects, registry))
+    model = Model(read.plant)
+    for text in [*read.effects, *(name.strip() for name in effects.split(",") if name.strip())]:
+        name, _, form = text.partition(":")
+        effect: Effect = chosen(name, registry.effects, "effect")
+        model = model + (effect.in_form(form) if form else effect)
+    return Opened(registry, read, model, intervals(bounds, "--bounds"), fixed_values(fix, model))
 
 
 def examples(*lines: str) -> str:
@@ -134,7 +174,7 @@ def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float
     return {name: interval(value, f"{option} {name}") for name, value in found.items()}
 
 
-def chosen(name: str, known: dict[str, object], what: str) -> object:
+def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
     """Return what is registered under a name.
 
     Raises ArmidError with the nearest valid name.
@@ -149,87 +189,3 @@ def accuracy_of(text: str) -> str | None:
     if text not in ("standard", "fine", "auto"):
         raise ArmidError(f"--accuracy '{text}': {nearest(text, ('standard', 'fine', 'auto'))}")
     return None if text == "auto" else text
-
-
-def model_of(campaign: "Campaign", effects: str, registry: Registry) -> Model:
-    """Return the campaign's model with further effects added."""
-    model = campaign.model(registry.effects)
-    for text in (name.strip() for name in effects.split(",") if name.strip()):
-        name, _, form = text.partition(":")
-        effect = registry.effects.get(name)
-        if effect is None:
-            raise ArmidError(f"effect '{name}' is not known: {nearest(name, registry.effects)}")
-        model = model + (effect.in_form(form) if form else effect)
-    return model
-
-
-def made_by() -> dict[str, Any]:
-    """Return the command that is running, as a shell takes it, and the value of each of its options."""
-    context = click.get_current_context()
-    words = [str(word) for word in context.find_root().obj or ()]
-    return {
-        "command": shlex.join(["armid", *words]),
-        "settings": {name: plain(value) for name, value in context.params.items()},
-    }
-
-
-def plain(value: Any) -> Any:
-    """Return an option as JSON can hold it."""
-    if isinstance(value, tuple | list):
-        return [plain(v) for v in value]
-    return str(value) if isinstance(value, Path) else value
-
-
-class NewFiles:
-    """Write files beside a folder and move them in when all are there, so that nothing half-written is found.
-
-    names: the files so far. A folder that is made for them goes again when nothing comes into it.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.names: list[str] = []
-
-    def __enter__(self) -> "NewFiles":
-        if self.folder.exists() and not self.folder.is_dir():
-            raise ArmidError(f"--out {self.folder} is a file: a folder is expected")
-        self._is_new = not self.folder.exists()
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._beside = TemporaryDirectory(dir=self.folder, prefix=".armid-")
-        return self
-
-    @property
-    def place(self) -> Path:
-        """Where the files are until all are there."""
-        return Path(self._beside.name)
-
-    def path(self, name: str) -> Path:
-        """Return where to write a file for now.
-
-        Raises ArmidError when a folder has its name.
-        """
-        if (self.folder / name).is_dir():
-            raise ArmidError(f"--out {self.folder} holds a folder {name}: a place for a file of that name is expected")
-        self.names.append(name)
-        path = self.place / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        if kind is None:
-            for name in self.names:
-                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                os.replace(self.place / name, self.folder / name)
-        self._beside.cleanup()
-        if self._is_new:
-            with suppress(OSError):
-                self.folder.rmdir()
-
-
-def refuse_unwritable(folder: Path) -> None:
-    """Refuse a folder before the work, not after it.
-
-    Raises ArmidError for a file, OSError for a place where nothing can be written.
-    """
-    with NewFiles(folder):
-        pass

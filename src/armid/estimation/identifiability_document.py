@@ -1,37 +1,103 @@
-"""What an examination found, as numbers for other programs."""
+"""The document of an examination, and what is stored of it: identifiability.json."""
 
-import platform
-from importlib.metadata import version
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from rich.table import Table
+from numpy.typing import NDArray
 
 from armid.estimation.collinearity import Group, collinearity_index, normalised
 from armid.estimation.design import Offer
 from armid.estimation.examine import Examination
+from armid.estimation.identify import versions_of
+from armid.estimation.identify_document import correlation_table
 from armid.estimation.information import Level
 from armid.estimation.profile import Profile
 from armid.problem.space import Space
+from armid.report.common import finite, listed, made_section
+from armid.report.document import Column, Document, Figure, Section, Sentences, Table, table
 from armid.units import SHOWN, shown
 
-MOST_OFFERS, MOST_COLUMNS = 8, 5
+Array = NDArray[np.float64]
+PACKAGES = ("armid", "numpy", "scipy", "numba")
+MOST_OFFERS, MOST_COLUMNS, MOST_NAMED = 8, 5, 6
+# The point that was given is away from the minimum when a step there is more standard deviations than this.
+AWAY = 1.0
+# The noise of a measured start is told of when it widens an interval by more than this factor.
+WIDENS = 1.2
+FIGURES = {
+    "profiles": ("Profile likelihood", "Rise of chi2 when one parameter is held and the others are fitted again. A "
+                 "95 % interval ends where the curve meets the dotted threshold; where it leaves the parabola, the "
+                 "interval by curvature is not to be believed."),
+    "sensitivities": ("What the records see", "Correlation of the estimates, the share of the information on each "
+                      "parameter that comes from each record, and d speed / d parameter against time, each scaled to "
+                      "its largest value: curves that look alike are collinear."),
+}  # fmt: skip
 
 
-def parameter_table(found: Examination) -> Table:
-    """Return the table of parameters: value, deviation, intervals by curvature and by profile, where it is bounded."""
-    table = Table("parameter", "value", "unit", "deviation", "95 % by curvature", "95 % by profile", "bounded", "",
-                  title="What the records say")  # fmt: skip
-    for i, profile in enumerate(found.profiles):
-        value, unit = shown(float(found.x[i]), profile.unit)
-        factor = SHOWN.get(profile.unit, ("", 1.0))[1]
-        half = float(found.information.half_width[i]) * factor
-        told = interval_text(value - half, value + half) if np.isfinite(half) else "not determined"
-        deviation = deviation_text(found.space, i, float(found.information.deviation[i]), float(found.x[i]))
-        flag = "AT ITS BOUND" if found.at_bound[i] else "" if profile.agrees else "THEY DIFFER"
-        table.add_row(profile.name, f"{value:.6g}", unit, deviation, told, profile_text(profile, factor),
-                      bounded_text(profile), flag)  # fmt: skip
-    return table
+def identifiability_document(
+    result: Mapping[str, Any], details: Mapping[str, Any], svgs: Mapping[str, str], again: str
+) -> Document:
+    """Build the document of an examination from identifiability.json.
+
+    details: `made_by`, where it is known; for the others see `identify_document`.
+    """
+    figures = {name: (Figure(name, *FIGURES[name], svg=svg),) for name, svg in svgs.items()}
+    answer, remarks = answer_and_remarks(result)
+    parameters, offers = parameter_table(result), offer_table(result)
+    rest = (Sentences(remarks),) if remarks else ()
+    correlated = (correlation_table(result["correlation"]),) if len(result["correlation"]) > 1 else ()
+    sections: tuple[Section, ...] = (
+        Section("Parameters", (parameters, *figures.get("profiles", ()))),
+        Section("What must be known", rest),
+        Section("What the records see", (*correlated, *figures.get("sensitivities", ()))),
+        Section("The next record", (offers,)),
+        made_section(details.get("made_by", {}), result["versions"], again),
+    )
+    sections = tuple(s for s in sections if s.parts)
+    question = (
+        f"How well do these records pin down the parameters of {' + '.join([result['plant'], *result['effects']])}?"
+    )
+    return Document(result["campaign"], "Identifiability", question, answer, sections, main=(parameters, offers, *rest))
+
+
+def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return which parameters are bounded, which move together and the best offer; and the other remarks."""
+    bounded, unbounded = [], []
+    for name, p in result["parameters"].items():
+        if p["profile"]["bounded_low"] and p["profile"]["bounded_high"]:
+            bounded.append(f"{name} ({deviation_of(result, name, p['deviation'])})")
+        else:
+            unbounded.append(name)
+    said = [f"Bounded on both sides at 95 %, with this standard deviation: {', '.join(bounded)}."] if bounded else []
+    said += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
+    n = len(result["groups"])
+    *others, best = result["remarks"][n:]
+    return (" ".join(said) or "No parameter is free.", *result["remarks"][:n], best), tuple(others)
+
+
+def deviation_of(result: Mapping[str, Any], name: str, deviation: float | None) -> str:
+    """Return a stored deviation of a parameter, None for one that is not determined, in words."""
+    p = result["parameters"][name]
+    value = np.inf if deviation is None else deviation
+    return scaled_text(name, p["unit"], p["bound_high"] - p["bound_low"], value, p["value"])
+
+
+def parameter_table(result: Mapping[str, Any]) -> Table:
+    """Return the parameters: value, deviation, intervals by curvature and by profile, where it is bounded."""
+    rows = []
+    for name, p in result["parameters"].items():
+        unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
+        curved = "not determined" if p["low"] is None else interval_text(factor * p["low"], factor * p["high"])
+        profile = p["profile"]
+        bounded = {(True, True): "yes", (True, False): "below only", (False, True): "above only"}.get(
+            (profile["bounded_low"], profile["bounded_high"]), "NO")  # fmt: skip
+        flag = "AT ITS BOUND" if p["bound_active"] else "" if profile["agrees_with_curvature"] else "THEY DIFFER"
+        rows.append((name, factor * p["value"], unit, deviation_of(result, name, p["deviation"]), curved,
+                     profile_text(profile, factor), bounded, flag))  # fmt: skip
+    columns = ["parameter", Column("value", "value", ".6g"), "unit", "deviation", "95 % by curvature",
+               "95 % by profile", "bounded", Column("remark", "")]  # fmt: skip
+    return table("What the records say", columns, rows)
 
 
 def interval_text(low: float, high: float) -> str:
@@ -41,112 +107,143 @@ def interval_text(low: float, high: float) -> str:
     return f"{low:.{digits}f} to {high:.{digits}f}"
 
 
-def profile_text(profile: Profile, factor: float) -> str:
-    """Return the interval of a profile; where it is not bounded inside the box its end is the box."""
-    text = interval_text(profile.low * factor, profile.high * factor)
-    low, high = text.split(" to ")
-    return f"{low if profile.bounded[0] else f'box {low}'} to {high if profile.bounded[1] else f'box {high}'}"
-
-
-def bounded_text(profile: Profile) -> str:
-    """Return on which sides a profile is bounded inside the box."""
-    return {(True, True): "yes", (True, False): "below only", (False, True): "above only"}.get(profile.bounded, "NO")
+def profile_text(profile: Mapping[str, Any], factor: float) -> str:
+    """Return the interval of a stored profile; where it is not bounded inside the box its end is the box."""
+    low, high = interval_text(profile["low"] * factor, profile["high"] * factor).split(" to ")
+    return f"{low if profile['bounded_low'] else f'box {low}'} to {high if profile['bounded_high'] else f'box {high}'}"
 
 
 def deviation_text(space: Space, i: int, deviation: float, value: float) -> str:
-    """Return a standard deviation of a free parameter: in percent of a value that is no addition, else in its unit."""
-    unit = space.units[int(np.flatnonzero(space.free)[i])]
-    span = float((space.high - space.low)[space.free][i])
+    """Return a standard deviation of the i-th free parameter in words."""
+    place = int(np.flatnonzero(space.free)[i])
+    span = float(space.high[place] - space.low[place])
+    return scaled_text(space.names[place], space.units[place], span, deviation, value)
+
+
+def scaled_text(name: str, unit: str, span: float, deviation: float, value: float) -> str:
+    """Return a standard deviation: in percent of a value that is no addition, else in its unit. span: of the box."""
     if not np.isfinite(deviation):
         return "not determined"
-    if "." not in space.free_names[i] and abs(value) > 1e-3 * span:
+    if "." not in name and abs(value) > 1e-3 * span:
         return f"{100 * deviation / abs(value):.2g} %"
-    told, name = shown(deviation, unit)
-    return f"{told:.2g} {name}".removesuffix(" 1")
+    scaled, shown_unit = shown(deviation, unit)
+    return f"{scaled:.2g} {shown_unit}".removesuffix(" 1")
 
 
-def offer_table(found: Examination, most: int = MOST_OFFERS) -> Table:
-    """Return the table of the best offers: manoeuvre, deviation of each parameter after one such record."""
-    columns = told_columns(found)
-    some = "" if len(columns) == len(found.x) else f", {len(columns)} of {len(found.x)} parameters"
-    table = Table("one more record of", *(found.space.free_names[i] for i in columns), "gain",
-                  title=f"What one more manoeuvre would buy (deviations{some})")  # fmt: skip
-    table.add_row("none", *(cell(found, i, float(found.information.deviation[i])) for i in columns), "1")
-    best = found.offers[:most]
-    repeats = [o for o in found.offers[most:] if o.feasible.repeats][:1]
-    for offer in (*best, *repeats):
-        cells = [cell(found, i, float(offer.after[i])) for i in columns]
-        table.add_row(offer.feasible.name, *cells, f"{offer.gain:.3g}")
-    return table
+def offer_table(result: Mapping[str, Any], most: int = MOST_OFFERS) -> Table:
+    """Return the best offers: manoeuvre, deviation of each parameter after one such record; the best repeat is last."""
+    names, offers = list(result["parameters"]), result["offers"]
+    if len(names) > MOST_COLUMNS:
+        names = most_helped(names, offers)
+    some = (
+        "" if len(names) == len(result["parameters"]) else f", {len(names)} of {len(result['parameters'])} parameters"
+    )
+    repeats = [offer for offer in offers[most:] if " once more" in offer["words"]][:1]
+    rows = [("none", *(deviation_of(result, name, result["parameters"][name]["deviation"]) for name in names), 1.0)]
+    for offer in (*offers[:most], *repeats):
+        cells = [deviation_of(result, name, offer["deviation"][name]["after"]) for name in names]
+        rows.append((offer["words"], *cells, offer["gain"]))
+    columns = ["one more record of", *names, Column("gain", "gain", ".3g")]
+    return table(f"What one more manoeuvre would buy (deviations{some})", columns, rows)
 
 
-def told_columns(found: Examination) -> list[int]:
-    """Return the places of the parameters that the best offer helps most, in order, as many as a table can hold."""
-    n = len(found.x)
-    if n <= MOST_COLUMNS or not found.offers:
-        return list(range(min(n, MOST_COLUMNS)))
-    with np.errstate(invalid="ignore"):
-        helped = np.nan_to_num(found.offers[0].before / found.offers[0].after, nan=1.0, posinf=np.inf)
-    return sorted(int(i) for i in np.argsort(-helped, kind="stable")[:MOST_COLUMNS])
+def most_helped(names: list[str], offers: list[Mapping[str, Any]]) -> list[str]:
+    """Return the parameters that the best offer helps most, in order, as many as a table can hold."""
+    if not offers:
+        return names[:MOST_COLUMNS]
+    ends = [[offers[0]["deviation"][name][end] for name in names] for end in ("before", "after")]
+    before, after = (np.array([np.inf if d is None else d for d in end]) for end in ends)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        helped = np.nan_to_num(before / after, nan=1.0, posinf=np.inf)
+    return [names[i] for i in sorted(np.argsort(-helped, kind="stable")[:MOST_COLUMNS])]
 
 
-def cell(found: Examination, i: int, deviation: float) -> str:
-    """Return one deviation of the offers."""
-    return deviation_text(found.space, i, deviation, float(found.x[i]))
+def result_of(found: Examination) -> dict[str, Any]:
+    """Return everything of an examination that JSON can hold, SI throughout; what is not known is null."""
+    names, correlation, fisher = found.space.free_names, found.information.correlation, found.information.fisher
+    levels = {r.record.file: level for r, level in zip(found.replays, found.information.levels, strict=True)}
+    return {
+        "campaign": found.campaign.name,
+        "plant": found.model.plant.name,
+        "effects": [e.name for e in found.model.effects],
+        "unit": found.campaign.unit,
+        "at": "given" if found.given else "estimate",
+        "parameters": {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)},
+        "fixed": {n: float(v) for n, v in zip(found.space.names, found.space.fixed, strict=True) if not np.isnan(v)},
+        "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
+        "collinearity_index": collinearity_index(fisher),
+        "groups": [{"names": list(g.names), "index": g.index, "direction": by_name(g.names, g.direction)}
+                   for g in found.groups],
+        "directions": directions(fisher, names),
+        "records": {file: {"level": level.rms, "effective_fraction": level.effective_fraction,
+                           "from_residual": level.from_residual, "assumed": level.assumed}
+                    for file, level in levels.items()},
+        "ranked_by": found.ranked_by,
+        "offers": [
+            {"manoeuvre": dict(o.feasible.keys), "words": o.feasible.name, "gain": o.gain, "deviation": {
+                name: {"before": finite(o.before[i]), "after": finite(o.after[i])} for i, name in enumerate(names)
+            }} for o in found.offers
+        ],
+        "remarks": remarks(found),
+        "versions": versions_of(PACKAGES),
+    }  # fmt: skip
 
 
-def offer_text(found: Examination, offer: Offer) -> str:
-    """Return an offer in one line: "raise, empty, 24 V from 20 to -40 deg: n from 0.84 % to 0.11 %"."""
-    i = offer.best
-    before, after = cell(found, i, float(offer.before[i])), cell(found, i, float(offer.after[i]))
-    return f"{offer.feasible.name}: {found.space.free_names[i]} from {before} to {after}"
+def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
+    """Return what is known of one free parameter; `value` is where sensitivities were taken."""
+    value, half = float(found.x[i]), float(found.information.half_width[i])
+    return {
+        "value": value, "unit": profile.unit, "deviation": finite(found.information.deviation[i]),
+        "low": finite(value - half), "high": finite(value + half),
+        "bound_low": profile.box[0], "bound_high": profile.box[1], "bound_active": bool(found.at_bound[i]),
+        "profile": {
+            "minimum": profile.estimate, "low": profile.low, "high": profile.high,
+            "bounded_low": profile.bounded[0], "bounded_high": profile.bounded[1],
+            "agrees_with_curvature": profile.agrees,
+            "values": profile.values.tolist(), "rise": profile.rise.tolist(),
+        },
+    }  # fmt: skip
 
 
-# The point that was given is away from the minimum when a step there is more standard deviations than this.
-AWAY = 1.0
-# The noise of a measured start is told of when it widens an interval by more than this factor.
-WIDENS = 1.2
-MOST_NAMED = 6
+def directions(fisher: Array, names: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the eigenvectors of the information matrix scaled to a diagonal of 1, the weakest first."""
+    scaled, seen = normalised(fisher)
+    kept = [n for n, s in zip(names, seen, strict=True) if s]
+    values, vectors = np.linalg.eigh(scaled) if kept else (np.empty(0), np.empty((0, 0)))
+    pairs = zip(values, vectors.T, strict=True)
+    return [{"eigenvalue": float(value), "vector": by_name(kept, vector)} for value, vector in pairs]
+
+
+def by_name(names: Sequence[str], values: Array) -> dict[str, float]:
+    return dict(zip(names, (float(v) for v in values), strict=True))
 
 
 def remarks(found: Examination) -> list[str]:
-    """Return what a reader must know, one sentence each."""
+    """Return what a reader must know, one sentence each: groups first, the best offer last."""
+    names, fisher = found.space.free_names, found.information.fisher
     said = [group_remark(found, group) for group in found.groups]
     said += [f"{p.name} is not seen at all in these records: any value in the box leaves them as they are."
-             for p in found.profiles if not found.information.fisher.diagonal()[index(found, p)] > 0.0]  # fmt: skip
+             for p in found.profiles if not fisher[names.index(p.name), names.index(p.name)] > 0.0]  # fmt: skip
     said += [text for p in found.profiles if (text := profile_remark(found, p))]
-    return said + point_remarks(found) + start_remarks(found) + level_remarks(found) + offer_remarks(found)
-
-
-def index(found: Examination, profile: Profile) -> int:
-    """Return the place of a profile's parameter among the free ones."""
-    return found.space.free_names.index(profile.name)
-
-
-def listed(names: tuple[str, ...]) -> str:
-    """Return names as people list them."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    said += point_remarks(found) + level_remarks(found)
+    if found.offers:
+        return [*said, f"One more record, {offer_text(found, found.offers[0])}."]
+    return [*said, "No further manoeuvre was found that the machine could make."]
 
 
 def group_remark(found: Examination, group: Group) -> str:
-    """Return the sentence for parameters that move together."""
-    places = [found.space.free_names.index(n) for n in group.names]
-    leader = places[int(np.argmax(np.abs(group.direction)))]
-    followers = [
-        f"{move_text(found, i, float(d))} of {found.space.free_names[i]}"
-        for i, d in zip(places, group.direction, strict=True) if i != leader
-    ]  # fmt: skip
-    name = found.space.free_names[leader]
+    span = (found.space.high - found.space.low)[found.space.free]
+    moves: list[str] = []
+    leader = int(np.argmax(np.abs(group.direction)))
+    for name, share in zip(group.names, group.direction, strict=True):
+        i = found.space.free_names.index(name)
+        change = 0.01 * (1.0 if len(moves) == leader else float(share)) * float(span[i])
+        text = deviation_text(found.space, i, abs(change), float(found.x[i]))
+        moves.append(f"{'+' if change >= 0.0 else '-'}{text} of {name}")
+    followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
-            f"for by the others to within {100 / group.index:.2g} %; {move_text(found, leader, 1.0)} of {name} goes "
-            f"next to unseen with {listed(tuple(followers))}.")  # fmt: skip
-
-
-def move_text(found: Examination, i: int, share: float) -> str:
-    """Return a change of a free parameter that belongs to a direction, its leader moved by 1 % of its range."""
-    span = float((found.space.high - found.space.low)[found.space.free][i])
-    change = 0.01 * share * span
-    return ("+" if change >= 0.0 else "-") + deviation_text(found.space, i, abs(change), float(found.x[i]))
+            f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
+            f"{followers}.")  # fmt: skip
 
 
 def profile_remark(found: Examination, profile: Profile) -> str:
@@ -171,29 +268,20 @@ def profile_remark(found: Examination, profile: Profile) -> str:
 
 
 def point_remarks(found: Examination) -> list[str]:
-    """Return what is to be said of a point that was given."""
-    if not found.given:
-        return []
+    """Return what is to be said of a point that was given, else where the noise of measured starts widens intervals."""
+    names, deviation = found.space.free_names, found.information.deviation
     with np.errstate(invalid="ignore", divide="ignore"):
-        away = np.abs(found.x - found.minimum) / found.information.deviation
-    away = np.nan_to_num(away, nan=0.0, posinf=0.0)
-    if away.max() <= AWAY:
-        return []
-    name = found.space.free_names[int(away.argmax())]
-    return [f"The point that was given is not the least-squares minimum: {name} is {away.max():.3g} standard "
-            "deviations from it; the profiles are drawn about the minimum, all else is at the point."]  # fmt: skip
-
-
-def start_remarks(found: Examination) -> list[str]:
-    """Return a sentence where the noise of measured starts widens the intervals."""
-    told = np.array([p.deviation for p in found.profiles])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        wider = np.nan_to_num(found.information.deviation / told, nan=1.0, posinf=1.0)
-    if found.given or wider.max() < WIDENS:
-        return []
-    name = found.space.free_names[int(wider.argmax())]
-    return [f"Records start from measured states, whose noise widens the deviation of {name} {wider.max():.3g} times; "
-            "the profiles do not show it."]  # fmt: skip
+        away = np.nan_to_num(np.abs(found.x - found.minimum) / deviation, nan=0.0, posinf=0.0)
+        wider = deviation / np.array([p.deviation for p in found.profiles])
+    wider = np.nan_to_num(wider, nan=1.0, posinf=1.0)
+    if found.given and away.max() > AWAY:
+        return [f"The point that was given is not the least-squares minimum: {names[int(away.argmax())]} is "
+                f"{away.max():.3g} standard deviations from it; the profiles are drawn about the minimum, all else is "
+                "at the point."]  # fmt: skip
+    if not found.given and wider.max() >= WIDENS:
+        return [f"Records start from measured states, whose noise widens the deviation of {names[int(wider.argmax())]} "
+                f"{wider.max():.3g} times; the profiles do not show it."]  # fmt: skip
+    return []
 
 
 def level_remarks(found: Examination) -> list[str]:
@@ -201,12 +289,11 @@ def level_remarks(found: Examination) -> list[str]:
     texts: dict[str, list[str]] = {}
     for replay, level in zip(found.replays, found.information.levels, strict=True):
         texts.setdefault(level_text(level, found.campaign.unit, replay.record.noise.rms), []).append(replay.record.file)
-    said = [f"{listed(tuple(files[:MOST_NAMED]))}: {text}" for text, files in texts.items()]
+    said = [f"{listed(files[:MOST_NAMED])}: {text}" for text, files in texts.items()]
     return said[:MOST_NAMED] + ([f"So it is with {len(said) - MOST_NAMED} more."] if len(said) > MOST_NAMED else [])
 
 
 def level_text(level: Level, unit: str, noise: float) -> str:
-    """Return what one record is weighed by."""
     value, name = shown(level.rms, unit)
     if level.assumed:
         return (f"no noise is known, so white noise of {value:.3g} {name} rms is ASSUMED: intervals scale with it, "
@@ -221,95 +308,10 @@ def level_text(level: Level, unit: str, noise: float) -> str:
     return f"noise {value:.2g} {name} rms{coloured}."
 
 
-def offer_remarks(found: Examination) -> list[str]:
-    """Return the best offer in one line."""
-    if not found.offers:
-        return ["No further manoeuvre was found that the machine could make."]
-    return [f"One more record, {offer_text(found, found.offers[0])}."]
-
-
-PACKAGES = ("armid", "numpy", "scipy", "numba")
-
-
-def result_of(found: Examination) -> dict[str, Any]:
-    """Return everything of an examination that JSON can hold, SI throughout; what is not known is null."""
-    names, correlation = found.space.free_names, found.information.correlation
-    return {
-        "campaign": found.campaign.name,
-        "plant": found.model.plant.name,
-        "effects": [e.name for e in found.model.effects],
-        "unit": found.campaign.unit,
-        "at": "given" if found.given else "estimate",
-        "parameters": {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)},
-        "fixed": {n: float(v) for n, v in zip(found.space.names, found.space.fixed, strict=True) if not np.isnan(v)},
-        "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
-        "collinearity_index": collinearity_index(found.information.fisher),
-        "groups": [
-            {"names": list(g.names), "index": g.index,
-             "direction": dict(zip(g.names, (float(d) for d in g.direction), strict=True))} for g in found.groups
-        ],
-        "directions": directions(found),
-        "records": {
-            r.record.file: {"level": level.rms, "effective_fraction": level.effective_fraction,
-                            "from_residual": level.from_residual, "assumed": level.assumed}
-            for r, level in zip(found.replays, found.information.levels, strict=True)
-        },
-        "ranked_by": found.ranked_by,
-        "offers": [offer_entry(found, offer) for offer in found.offers],
-        "remarks": remarks(found),
-        "versions": {"python": platform.python_version(), **{p: version(p) for p in PACKAGES}},
-    }  # fmt: skip
-
-
-def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
-    """Return what is known of one free parameter; `value` is where sensitivities were taken."""
-    value, half = float(found.x[i]), float(found.information.half_width[i])
-    return {
-        "value": value,
-        "unit": profile.unit,
-        "deviation": finite(found.information.deviation[i]),
-        "low": finite(value - half),
-        "high": finite(value + half),
-        "bound_low": profile.box[0],
-        "bound_high": profile.box[1],
-        "bound_active": bool(found.at_bound[i]),
-        "profile": {
-            "minimum": profile.estimate,
-            "low": profile.low,
-            "high": profile.high,
-            "bounded_low": profile.bounded[0],
-            "bounded_high": profile.bounded[1],
-            "agrees_with_curvature": profile.agrees,
-            "values": profile.values.tolist(),
-            "rise": profile.rise.tolist(),
-        },
-    }
-
-
-def directions(found: Examination) -> list[dict[str, Any]]:
-    """Return the eigenvectors of the information matrix scaled to a diagonal of 1, the weakest first."""
-    scaled, seen = normalised(found.information.fisher)
-    names = [n for n, s in zip(found.space.free_names, seen, strict=True) if s]
-    values, vectors = np.linalg.eigh(scaled) if names else (np.empty(0), np.empty((0, 0)))
-    return [
-        {"eigenvalue": float(value), "vector": dict(zip(names, vector.tolist(), strict=True))}
-        for value, vector in zip(values, vectors.T, strict=True)
-    ]
-
-
-def offer_entry(found: Examination, offer: Offer) -> dict[str, Any]:
-    """Return one offer: the manoeuvre as campaign.toml would say it, and the deviations before and after."""
-    return {
-        "manoeuvre": dict(offer.feasible.keys),
-        "words": offer.feasible.name,
-        "gain": offer.gain,
-        "deviation": {
-            name: {"before": finite(offer.before[i]), "after": finite(offer.after[i])}
-            for i, name in enumerate(found.space.free_names)
-        },
-    }
-
-
-def finite(value: float) -> float | None:
-    """Return a float that JSON can hold, None for NaN and infinity."""
-    return float(value) if np.isfinite(value) else None
+def offer_text(found: Examination, offer: Offer) -> str:
+    """Return an offer in one line: "raise, empty, 24 V from 20 to -40 deg: n from 0.84 % to 0.11 %"."""
+    i = offer.best
+    before, after = (
+        deviation_text(found.space, i, float(d[i]), float(found.x[i])) for d in (offer.before, offer.after)
+    )
+    return f"{offer.feasible.name}: {found.space.free_names[i]} from {before} to {after}"

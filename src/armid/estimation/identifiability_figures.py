@@ -1,6 +1,6 @@
 """Figures of an examination: the profiles, and what the records see of each parameter."""
 
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -11,27 +11,29 @@ from armid.estimation.design import identity
 from armid.estimation.examine import Examination
 from armid.estimation.information import level_weights, sensitivities
 from armid.estimation.profile import THRESHOLD, Profile
-from armid.report.style import GREY, OKABE_ITO, style
+from armid.report.style import GREY, OKABE_ITO, look, pyplot
 from armid.units import SHOWN
 
 Array = NDArray[np.float64]
 CURVE, QUADRATIC, LIMIT = OKABE_ITO["blue"], OKABE_ITO["vermilion"], OKABE_ITO["black"]
-COLOURS = [OKABE_ITO[c] for c in ("blue", "vermilion", "green", "purple", "orange", "sky", "black")]
-DASHES = ("-", "--", "-.", ":")
 # The top of a profile's panel, and by how much its sides go beyond what was tried, as a share.
 TOP, SIDE = 6.5, 0.04
 MOST_RECORDS, MOST_PANELS = 4, 12
 LINE = 60
 
 
-def profile_figure(found: Examination, path: Path) -> None:
+def figures_of(found: Examination) -> dict[str, Callable[[], Any]]:
+    """Return name -> what draws a figure."""
+    return {"profiles": lambda: profile_figure(found), "sensitivities": lambda: sensitivity_figure(found)}
+
+
+def profile_figure(found: Examination) -> Any:
     """Draw the rise of chi2 along each parameter, the 95 % threshold, the parabola, and the bounds of the box."""
-    plt = style()
     shown = found.profiles[:MOST_PANELS]
     columns = min(len(shown), 2 if len(shown) <= 4 else 3)
     rows = -(-len(shown) // columns)
     size = (4.6 * columns, 3.3 * rows + 1.0)
-    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, sharey=True, layout="constrained")
+    figure, axes = pyplot().subplots(rows, columns, figsize=size, squeeze=False, sharey=True, layout="constrained")
     for axis, profile in zip(axes.flat, shown, strict=False):
         draw_profile(axis, profile)
     for axis in axes.flat[len(shown) :]:
@@ -41,8 +43,7 @@ def profile_figure(found: Examination, path: Path) -> None:
     handles = dict(pair for axis in axes.flat for pair in zip(*axis.get_legend_handles_labels()[::-1], strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False)
     figure.suptitle(fill(f"{title(found)}: profile likelihood", LINE * columns // 2 + 15), fontsize="large")
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    return figure
 
 
 def draw_profile(axis: Any, profile: Profile) -> None:
@@ -62,12 +63,10 @@ def draw_profile(axis: Any, profile: Profile) -> None:
             axis.axvline(bound * factor, color=GREY, lw=3.0, label="bound of the box")
     axis.plot(profile.estimate * factor, 0.0, color=LIMIT, marker="D", ms=6, ls="none", clip_on=False, zorder=5,
               label="estimate")  # fmt: skip
-    axis.set_xlim(left * factor, right * factor)
-    axis.set_ylim(0.0, TOP)
-    axis.set_xlabel(f"{profile.name} [{unit}]" if unit != "1" else profile.name)
+    name = f"{profile.name} [{unit}]" if unit != "1" else profile.name
+    axis.set(xlim=(left * factor, right * factor), ylim=(0.0, TOP), xlabel=name)
     axis.ticklabel_format(axis="x", useOffset=False, style="plain")
     axis.locator_params(axis="x", nbins=4)
-    axis.spines[["top", "right"]].set_visible(False)
 
 
 def smooth(profile: Profile, factor: float) -> tuple[Array, Array]:
@@ -91,31 +90,38 @@ def view(profile: Profile) -> tuple[float, float]:
     return left - room, right + room
 
 
-def sensitivity_figure(found: Examination, path: Path) -> None:
+def sensitivity_figure(found: Examination) -> Any:
     """Draw correlations, which record tells of which parameter, and the sensitivities of the records that tell most.
 
     With one record its sensitivities stand beside the correlations.
     """
-    plt = style()
-    jacobians = weighed(found)
+    weights = level_weights(found.information.levels)
+    # d signal / d parameter of each record in units of its level, (n_samples, n_free) each
+    jacobians = [w * sensitivities(r, found.space, found.x) for w, r in zip(weights, found.replays, strict=True)]
     order = telling(found, jacobians)
     n = len(found.space.free_names)
     height, rows = max(3.2, 0.55 * n + 1.6), 0 if len(jacobians) == 1 else -(-len(order) // 2)
-    figure = plt.figure(figsize=(11.2, height + 2.6 * rows + 0.8), layout="constrained")
+    figure = pyplot().figure(figsize=(11.2, height + 2.6 * rows + 0.8), layout="constrained")
     parts = figure.subfigures(2, 1, height_ratios=(height, 2.6 * rows)) if rows else [figure]
     left, right = parts[0].subplots(1, 2)
-    draw_correlation(left, found)
+    font = {"size": 11 if n <= 6 else 8}
+    draw_map(left, found, found.information.correlation, found.space.free_names, "correlation of estimates",
+             vmin=-1, vmax=1, cmap="vlag", annot=True, fmt=".2f", annot_kws=font, square=True)  # fmt: skip
     axes = list(parts[1].subplots(rows, 2, squeeze=False).flat) if rows else [right]
     if rows:
-        draw_shares(right, found, jacobians)
+        # how much of the information on each parameter comes from each record
+        squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
+        shares = 100 * squares / np.where(squares.sum(axis=0) > 0.0, squares.sum(axis=0), 1.0)
+        files = [r.record.file.removesuffix(".csv") for r in found.replays]
+        draw_map(right, found, shares, files, "share of the information [%]", vmin=0, vmax=100, cmap="Blues", fmt=".0f",
+                 annot=len(files) <= 14, annot_kws={"size": 11 if len(files) <= 8 else 8})  # fmt: skip
     for axis, i in zip(axes, order, strict=False):
         draw_sensitivities(axis, found, i, jacobians[i])
     for axis in axes[len(order) :]:
         axis.set_visible(False)
     parts[-1].legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=min(n, 6), frameon=False)
     figure.suptitle(fill(f"{title(found)}: what the records see", 2 * LINE), fontsize="large")
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    return figure
 
 
 def telling(found: Examination, jacobians: list[Array]) -> list[int]:
@@ -127,48 +133,14 @@ def telling(found: Examination, jacobians: list[Array]) -> list[int]:
     return list(seen.values())[:MOST_RECORDS]
 
 
-def weighed(found: Examination) -> list[Array]:
-    """Return d signal / d parameter of each record in units of its level, shape (n_samples, n_free) each."""
-    weights = level_weights(found.information.levels)
-    return [w * sensitivities(r, found.space, found.x) for w, r in zip(weights, found.replays, strict=True)]
-
-
-def draw_correlation(axis: Any, found: Examination) -> None:
-    """Draw the correlation of the estimates as a map with numbers."""
+def draw_map(axis: Any, found: Examination, values: Array, rows: Sequence[str], label: str, **looks: Any) -> None:
+    """Draw a map with numbers, (n_rows, n_free), names turned so that the longest stays off its neighbours."""
     import seaborn as sns
 
     names = found.space.free_names
-    values = found.information.correlation
-    font = {"size": 11 if len(names) <= 6 else 8}
-    sns.heatmap(
-        values, vmin=-1, vmax=1, cmap="vlag", annot=True, fmt=".2f", annot_kws=font, square=True, ax=axis,
-        xticklabels=names, yticklabels=names, cbar_kws={"label": "correlation of estimates"},
-    )  # fmt: skip
-    name_ticks(axis, names)
-
-
-def draw_shares(axis: Any, found: Examination, jacobians: list[Array]) -> None:
-    """Draw how much of the information on each parameter comes from each record, in percent."""
-    import seaborn as sns
-
-    squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
-    total = squares.sum(axis=0)
-    shares = 100 * squares / np.where(total > 0.0, total, 1.0)
-    font = {"size": 11 if len(jacobians) <= 8 else 8}
-    names = found.space.free_names
-    files = [r.record.file.removesuffix(".csv") for r in found.replays]
-    sns.heatmap(
-        shares, vmin=0, vmax=100, cmap="Blues", annot=len(files) <= 14, fmt=".0f", annot_kws=font, ax=axis,
-        xticklabels=names, yticklabels=files, cbar_kws={"label": "share of the information [%]"},
-    )  # fmt: skip
-    name_ticks(axis, names)
-
-
-def name_ticks(axis: Any, names: tuple[str, ...]) -> None:
-    """Turn the labels of a map so that the longest does not reach into its neighbours."""
-    long = max(len(n) for n in names) > 8 or len(names) > 8
+    sns.heatmap(values, xticklabels=names, yticklabels=rows, cbar_kws={"label": label}, ax=axis, **looks)
     axis.tick_params(axis="both", labelrotation=0, length=0)
-    if long:
+    if max(len(n) for n in names) > 8 or len(names) > 8:
         axis.set_xticklabels(names, rotation=30, ha="right", rotation_mode="anchor")
 
 
@@ -178,14 +150,11 @@ def draw_sensitivities(axis: Any, found: Examination, i: int, jacobian: Array) -
     for j, name in enumerate(found.space.free_names):
         largest = float(np.abs(jacobian[:, j]).max())
         curve = jacobian[:, j] / largest if largest > 0.0 else jacobian[:, j]
-        axis.plot(replay.times, curve, color=COLOURS[j % len(COLOURS)], ls=DASHES[j % len(DASHES)], lw=1.7, label=name)
+        axis.plot(replay.times, curve, lw=1.7, label=name, **look(j))
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
     axis.set_title(f"{replay.record.file}: sensitivities, each scaled to 1", fontsize="medium")
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("scaled, 1")
-    axis.set_ylim(-1.08, 1.08)
+    axis.set(xlabel="time [s]", ylabel="scaled, 1", ylim=(-1.08, 1.08))
     axis.margins(x=0.01)
-    axis.spines[["top", "right"]].set_visible(False)
 
 
 def title(found: Examination) -> str:

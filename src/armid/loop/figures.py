@@ -1,7 +1,7 @@
-"""The figures there are: file name -> what draws it."""
+"""Figures of a closed loop: residuals, where they are, candidates, parameters, the missing signal."""
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,187 +9,171 @@ from numpy.typing import NDArray
 
 from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.missing_signal import Dependence, Missing, hats
-from armid.loop.result import ClosedLoop, Estimate
-from armid.report.style import GREY, OKABE_ITO, style
-from armid.report.style import save as save_figure
+from armid.loop.result import ClosedLoop
+from armid.report.common import points, record_axes, small_axes
+from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, pyplot
 from armid.units import SHOWN, shown
 
-BEFORE, AFTER = OKABE_ITO["vermilion"], OKABE_ITO["blue"]
+Array = NDArray[np.float64]
+LOOKS = (("before", OKABE_ITO["vermilion"], -0.12), ("after", OKABE_ITO["blue"], 0.12))
+AFTER = OKABE_ITO["blue"]
+KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}
+MOST_RECORDS, MOST_CANDIDATES, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
 
 
-def tidy(axis: Any) -> None:
-    """Leave only the axes that are read."""
-    axis.spines[["top", "right"]].set_visible(False)
+def figures_of(
+    found: ClosedLoop, report: Mapping[str, Any], details: Mapping[str, Any]
+) -> dict[str, Callable[[], Any]]:
+    """Return name -> what draws a figure: that of a missing signal only where one was sought.
+
+    report, details: what is stored of the loop, see `report_of` and `details_of`.
+    """
+    made: dict[str, Callable[[], Any]] = {
+        "residuals": partial(residual_figure, found),
+        "diagnosis": partial(diagnosis_figure, found),
+        "ranking": partial(ranking_figure, report["campaign"], details["candidates"]["listed"]),
+        "parameters": partial(parameter_figure, report["campaign"], report["parameters"]),
+        "autocorrelation": partial(autocorrelation_figure, found),
+    }
+    return made if found.missing is None else made | {"missing": partial(missing_figure, found, found.missing)}
 
 
-def save(plt: Any, figure: Any, path: Path) -> None:
-    """Write a figure and forget it."""
-    save_figure(figure, path)
-
-
-MOST_RECORDS = 8
-
-
-def residual_figure(found: ClosedLoop, path: Path) -> None:
+def residual_figure(found: ClosedLoop) -> Any:
     """Draw measured minus simulated of each record, before and after, with the noise as a band."""
-    plt = style()
-    rows = [r for name in ("train", "holdout") for r in pairs(getattr(found.before, name), getattr(found.after, name))]
-    shown = rows[-MOST_RECORDS:] if len(rows) > MOST_RECORDS else rows
-    columns = 1 if len(shown) == 1 else 2
-    high = -(-len(shown) // columns)
-    figure, axes = plt.subplots(high, columns, figsize=(6.8 * columns, 2.9 * high + 0.9), squeeze=False,
-                                layout="constrained")  # fmt: skip
-    for axis, row in zip(axes.flat, shown, strict=False):
-        draw(axis, found, *row)
-    for axis in axes.flat[len(shown) :]:
-        axis.set_visible(False)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    views = ((found.before.train, found.after.train), (found.before.holdout, found.after.holdout))
+    rows = [row for old, new in views if old is not None and new is not None
+            for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS:]  # fmt: skip
+    figure, axes = record_axes(len(rows), 2.9, 0.9)
+    unit, factor = SHOWN[found.campaign.unit]
+    for (axis,), (replay, before, after) in zip(axes, rows, strict=True):
+        curves = {"before": (replay.times, before), "after": (replay.times, after)}
+        draw_residuals(axis, curves, found.noise_rms, found.campaign.unit)
+        errors = [factor * float(np.sqrt(np.mean(x**2))) for x in (before, after)]
+        record = replay.record
+        title = f"{record.file} ({record.role}), RMSE {errors[0]:.3g} to {errors[1]:.3g} {unit}"
+        axis.set_title(title, fontsize="medium")
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     names = " + ".join(found.effects) or "no effect added"
     figure.suptitle(f"{found.campaign.name}: residual before and after ({names})", fontsize="large")
-    save(plt, figure, path)
+    return figure
 
 
-def pairs(before: Residuals | None, after: Residuals | None) -> list[tuple[Any, ...]]:
-    """Return record, times and residuals before and after, of each record."""
-    if before is None or after is None:
-        return []
-    return [(r.record, r.times, b, a) for r, b, a in zip(before.replays, before.raw, after.raw, strict=True)]
+def record_figure(record: Mapping[str, Any], unit: str) -> Any:
+    """Draw a stored record for a page, before and after as layers. record: of `details.json`."""
+    figure, (axis,) = small_axes(6.0, 2.5)
+    curves = {name: points(curve) for name, curve in record["curves"].items()}
+    draw_residuals(axis, curves, record["noise_rms"], unit)
+    return figure
 
 
-def draw(axis: Any, found: ClosedLoop, record: Any, times: Any, before: Any, after: Any) -> None:
-    """Draw one record."""
-    unit, factor = SHOWN[found.campaign.unit]
-    noise = factor * found.noise_rms
-    axis.axhspan(-2.0 * noise, 2.0 * noise, color=GREY, alpha=0.35, lw=0, label="noise, 2 sigma")
-    axis.plot(times, factor * before, color=BEFORE, lw=1.0, label="before")
-    axis.plot(times, factor * after, color=AFTER, lw=0.8, label="after")
-    errors = [factor * float(np.sqrt(np.mean(x**2))) for x in (before, after)]
-    axis.set_title(f"{record.file} ({record.role}), RMSE {errors[0]:.3g} to {errors[1]:.3g} {unit}", fontsize="medium")
-    axis.set_ylabel(f"residual [{unit}]")
-    axis.set_xlabel("time [s]")
+def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si_unit: str) -> None:
+    unit, factor = SHOWN[si_unit]
+    if noise is not None:
+        band = 2.0 * noise * factor
+        axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="noise, 2 sigma")
+    for name, colour, _ in LOOKS:
+        x, y = curves[name]
+        axis.plot(x, factor * y, color=colour, lw=0.9, label=name, gid=name)
+    axis.set(ylabel=f"residual [{unit}]", xlabel="time [s]")
     axis.margins(x=0.01)
-    tidy(axis)
 
 
-KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}
+def candidate_figure(residual: Mapping[str, Any], predicted: Mapping[str, Any], edges: Sequence[int]) -> Any:
+    """Draw the stored projected residual and the part of it that a candidate predicts, records end to end."""
+    figure, (axis,) = small_axes(9.0, 2.5)
+    for curve, colour, width, name in ((residual, PALE, 0.7, "residual"), (predicted, AFTER, 1.3, "predicted")):
+        x, y = points(curve)
+        axis.plot(x, y, color=colour, lw=width, label=name)
+    for edge in edges[1:-1]:
+        axis.axvline(edge, color="0.4", lw=0.8, ls=":")
+    axis.set(xlabel="sample, train records end to end", ylabel="whitened residual\n[sigma]")
+    axis.legend(frameon=False, fontsize="small", loc="upper right", ncols=2)
+    return figure
 
 
-def diagnosis_figure(found: ClosedLoop, path: Path) -> None:
-    """Draw the mean square of the residual in units of the noise's, part by part."""
-    plt = style()
-    kinds = [k for k in KINDS if found.before.diagnosis.of_kind(k)]
+def diagnosis_figure(found: ClosedLoop) -> Any:
+    before, after = found.before.diagnosis, found.after.diagnosis
+    kinds = [k for k in KINDS if before.of_kind(k)]
     rows = -(-len(kinds) // 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(11.0, 3.9 * rows + 0.8), squeeze=False, layout="constrained")
+    size = (11.0, 3.9 * rows + 0.8)
+    figure, axes = pyplot().subplots(rows, 2, figsize=size, squeeze=False, layout="constrained")
     for axis, kind in zip(axes.flat, kinds, strict=False):
-        draw_findings(axis, kind, found.before.diagnosis, found.after.diagnosis)
+        draw_findings(axis, kind, before, after)
     for axis in axes.flat[len(kinds) :]:
         axis.set_visible(False)
-    of = "noise" if found.before.diagnosis.noise_known else "the residual"
+    of = "noise" if before.noise_known else "the residual"
     figure.supylabel(f"mean square / that of {of}", fontsize="medium")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
     figure.suptitle(f"{found.campaign.name}: where the discrepancy is (1 is noise)", fontsize="large")
-    save(plt, figure, path)
+    return figure
 
 
 def draw_findings(axis: Any, kind: str, before: Diagnosis, after: Diagnosis) -> None:
-    """Draw one kind of tests."""
-    names = [f.where for f in before.findings if f.kind == kind]
-    places = np.arange(len(names))
-    for diagnosis, colour, name, shift in ((before, BEFORE, "before", -0.12), (after, AFTER, "after", 0.12)):
-        ratios = {f.where: f.ratio for f in diagnosis.findings if f.kind == kind}
+    names = [f.where for f in before.of_kind(kind)]
+    for diagnosis, (label, colour, shift) in zip((before, after), LOOKS, strict=True):
+        ratios = {f.where: f.ratio for f in diagnosis.of_kind(kind)}
         known = [i for i, n in enumerate(names) if n in ratios]
         heights = [max(ratios[names[i]], 1e-3) for i in known]
-        axis.plot([i + shift for i in known], heights, "o", color=colour, label=name)
+        axis.plot([i + shift for i in known], heights, "o", color=colour, label=label)
     axis.axhline(1.0, color=GREY, lw=1.0)
     axis.set_yscale("log")
-    axis.set_xticks(places, names, rotation=45, ha="right", fontsize="small")
+    axis.set_xticks(range(len(names)), names, rotation=45, ha="right", fontsize="small")
     axis.set_title(KINDS[kind], fontsize="medium")
     axis.margins(x=0.1)
-    tidy(axis)
 
 
-MOST_SHOWN = 14
-
-
-def ranking_figure(found: ClosedLoop, path: Path) -> None:
+def ranking_figure(campaign: str, listed: Sequence[Mapping[str, Any]]) -> Any:
     """Draw the predicted fall of chi2 of each candidate, as a share, and that of its full fit where there was one."""
-    plt = style()
-    start = found.before.fit
-    best: dict[str, float] = {}
-    for s in found.search.scores_at(start):
-        name = s.key.public
-        best[name] = max(best.get(name, 0.0), s.drop / start.chi2)
-    names = sorted(best, key=lambda n: -best[n])[:MOST_SHOWN]
-    fitted: dict[str, float] = {}
-    for fit in found.search.of_size(1):
-        name = fit.active[0].public
-        fitted[name] = max(fitted.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
-    figure, axis = plt.subplots(figsize=(6.8, 0.34 * len(names) + 1.6), layout="constrained")
-    places = np.arange(len(names))
-    axis.barh(places, [100.0 * best[n] for n in names], color=GREY, label="predicted by the score")
-    known = [i for i, n in enumerate(names) if n in fitted]
-    axis.plot([100.0 * fitted[names[i]] for i in known], known, "D", color=AFTER, label="reached by a full fit")
-    axis.set_yticks(places, names)
+    best = sorted(listed, key=lambda c: -(c["drop"] or 0.0))[:MOST_CANDIDATES]
+    figure, axis = pyplot().subplots(figsize=(6.8, 0.34 * len(best) + 1.6), layout="constrained")
+    axis.barh(range(len(best)), [100.0 * (c["drop"] or 0.0) for c in best], color=GREY, label="predicted by the score")
+    fitted = [(100.0 * c["reached"], i) for i, c in enumerate(best) if c["reached"] is not None]
+    axis.plot([x for x, _ in fitted], [i for _, i in fitted], "D", color=AFTER, label="reached by a full fit")
+    axis.set_yticks(range(len(best)), [c["effect"] for c in best])
     axis.invert_yaxis()
     axis.set_xlabel("fall of chi2 [%]")
-    axis.set_title(f"{found.campaign.name}: candidates for the first effect", fontsize="medium")
+    axis.set_title(f"{campaign}: candidates for the first effect", fontsize="medium")
     axis.legend(frameon=False, loc="lower right")
-    tidy(axis)
-    save(plt, figure, path)
+    return figure
 
 
-def shift_figure(found: ClosedLoop, path: Path) -> None:
-    """Draw each identified parameter of the declared model before and after."""
-    plt = style()
-    later = {e.name: e for e in found.after.estimates}
-    both = [(e, later[e.name]) for e in found.before.estimates if e.low is not None or later[e.name].low is not None]
-    figure, axes = plt.subplots(1, max(len(both), 1), figsize=(2.6 * max(len(both), 1) + 1.2, 3.4), squeeze=False,
-                                layout="constrained")  # fmt: skip
-    for axis, pair in zip(axes.flat, both, strict=False):
-        for place, (estimate, colour) in enumerate(zip(pair, (BEFORE, AFTER), strict=True)):
-            value = shown(estimate.value, estimate.unit)[0]
-            axis.errorbar([place], [value], yerr=[[half(estimate)], [half(estimate)]], fmt="o", color=colour, capsize=5,
-                          mfc=colour if estimate.trusted else "white")  # fmt: skip
+def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Draw each identified parameter of the declared model before and after. parameters: of `report.json`."""
+    before, after = parameters["before"], parameters["after"]
+    both = [
+        (name, p, after[name]) for name, p in before.items() if p["low"] is not None or after[name]["low"] is not None
+    ]
+    n = max(len(both), 1)
+    figure, axes = pyplot().subplots(1, n, figsize=(2.6 * n + 1.2, 3.4), squeeze=False, layout="constrained")
+    for axis, (name, *pair) in zip(axes.flat, both, strict=False):
+        factor, unit = shown(1.0, pair[0]["unit"])
+        for place, (p, (_, colour, _)) in enumerate(zip(pair, LOOKS, strict=True)):
+            half = 0.0 if p["low"] is None or p["high"] is None else 0.5 * factor * (p["high"] - p["low"])
+            axis.errorbar([place], [factor * p["value"]], yerr=[[half], [half]], fmt="o", color=colour, capsize=5,
+                          mfc=colour if p["trusted"] else "white")  # fmt: skip
         axis.set_xticks([0, 1], ["before", "after"])
-        axis.set_xlim(-0.6, 1.6)
-        axis.set_ylabel(f"{pair[0].name} [{shown(0.0, pair[0].unit)[1]}]")
+        axis.set(xlim=(-0.6, 1.6), ylabel=f"{name} [{unit}]")
         axis.ticklabel_format(axis="y", useOffset=False)
-        tidy(axis)
     if not both:
         axes[0, 0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
         axes[0, 0].set_axis_off()
-    figure.suptitle(f"{found.campaign.name}: parameters, 95 % intervals (open: not to be trusted)", fontsize="medium")
-    save(plt, figure, path)
+    figure.suptitle(f"{campaign}: parameters, 95 % intervals (open: not to be trusted)", fontsize="medium")
+    return figure
 
 
-def half(estimate: Estimate) -> float:
-    """Return half of the interval in the unit that people read, 0 where there is none."""
-    if estimate.low is None or estimate.high is None:
-        return 0.0
-    return 0.5 * (shown(estimate.high, estimate.unit)[0] - shown(estimate.low, estimate.unit)[0])
-
-
-Array = NDArray[np.float64]
-MOST_LAGS = 150
-
-
-def autocorrelation_figure(found: ClosedLoop, path: Path) -> None:
-    """Draw the autocorrelation of the whitened residual of the train records, with the 95 % band of white noise."""
-    plt = style()
-    figure, axis = plt.subplots(figsize=(6.8, 3.6), layout="constrained")
+def autocorrelation_figure(found: ClosedLoop) -> Any:
+    figure, axis = pyplot().subplots(figsize=(6.8, 3.6), layout="constrained")
     interval = found.campaign.train[0].manoeuvre.interval
-    for judged, colour, name in ((found.before, BEFORE, "before"), (found.after, AFTER, "after")):
+    for judged, (name, colour, _) in zip((found.before, found.after), LOOKS, strict=True):
         values = correlation(judged.train)
         axis.plot(1e3 * interval * np.arange(len(values)), values, color=colour, lw=1.6, label=name)
     band = 1.96 / np.sqrt(len(found.after.train.residual))
     axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="white noise, 95 %")
-    axis.set_xlabel("lag [ms]")
-    axis.set_ylabel("autocorrelation")
+    axis.set(xlabel="lag [ms]", ylabel="autocorrelation")
     axis.set_title(f"{found.campaign.name}: whitened residual of the train records", fontsize="medium")
     axis.legend(frameon=False)
     axis.margins(x=0.01)
-    tidy(axis)
-    save(plt, figure, path)
+    return figure
 
 
 def correlation(view: Residuals) -> Array:
@@ -201,17 +185,12 @@ def correlation(view: Residuals) -> Array:
     return np.asarray(total / total[0])
 
 
-MOST_VARIABLES = 5
-
-
-def missing_figure(found: ClosedLoop, path: Path) -> None:
-    """Draw the shares at the ports, and the signal at the best of them against each variable of the motion."""
-    plt, missing = style(), found.missing
-    assert missing is not None
+def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
     best = found.term.dependence if found.term is not None else missing.dependences[0]
     variables = [best.variable, *(v for v in missing.moved[0].variables if v != best.variable)][:MOST_VARIABLES]
     columns = (len(variables) + 2) // 2
-    figure, axes = plt.subplots(2, columns, figsize=(4.0 * columns, 6.4), squeeze=False, layout="constrained")
+    size = (4.0 * columns, 6.4)
+    figure, axes = pyplot().subplots(2, columns, figsize=size, squeeze=False, layout="constrained")
     share_panel(axes.flat[0], missing)
     for axis, variable in zip(axes.flat[1:], variables, strict=False):
         signal_panel(axis, missing, best, variable)
@@ -219,11 +198,10 @@ def missing_figure(found: ClosedLoop, path: Path) -> None:
         axis.set_axis_off()
     figure.suptitle(f"{found.campaign.name}: the missing signal, recovered without a form at port {best.port}\n"
                     "(less what the free parameters can take up)", fontsize="medium")  # fmt: skip
-    save(plt, figure, path)
+    return figure
 
 
 def share_panel(axis: Any, missing: Missing) -> None:
-    """Draw what a free signal removes at each port, and what the best curve there predicts on left-out parts."""
     ports = [s.port for s in missing.signals]
     curves = [max((d.share for d in missing.dependences if d.port == p), default=0.0) for p in ports]
     rows = np.arange(len(ports))
@@ -232,54 +210,26 @@ def share_panel(axis: Any, missing: Missing) -> None:
     axis.barh(rows + 0.19, [max(100.0 * c, 0.0) for c in curves], 0.36, color=AFTER, label="best curve: predicts")
     axis.set_yticks(rows, ports)
     axis.invert_yaxis()
-    axis.set_xlim(0, 100)
-    axis.set_xlabel("share of the squared residual [%]")
+    axis.set(xlim=(0, 100), xlabel="share of the squared residual [%]")
     axis.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    tidy(axis)
 
 
 def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -> None:
     """Draw the signal of every record against one variable, with the curve where it is the one that was fitted."""
     model, signal = missing.lacking.records.replays[0].model, missing.signal_at(best.port)
-    colours = list(OKABE_ITO.values())
-    if signal is not None:
-        for motion, values in zip(missing.moved, signal.signals, strict=True):
-            place = shown_values(motion.variables[variable], unit_of(variable, model))
-            axis.plot(place, values, ".", ms=3, color=colours[motion.segment.group % len(colours)])
+    factor, name = shown(1.0, unit_of(variable, model))
+    for motion, values in zip(missing.moved if signal else (), signal.signals if signal else (), strict=True):
+        colour = COLOURS[motion.segment.group % len(COLOURS)]
+        axis.plot(factor * motion.variables[variable], values, ".", ms=3, color=colour)
     if signal is not None and variable == best.variable and best.factor == "1":
         knots = np.linspace(best.first, best.last, len(best.heights))
         seen = np.concatenate([m.variables[variable] for m in missing.moved])
         heights = np.linalg.lstsq(hats(seen, best.first, best.last), np.concatenate(signal.signals), rcond=None)[0]
-        axis.plot(shown_values(knots, unit_of(variable, model)), heights, "-", color="black", label="curve through it")
+        axis.plot(factor * knots, heights, "-", color="black", label="curve through it")
         axis.legend(fontsize="small")
-    name = shown(0.0, unit_of(variable, model))[1]
-    axis.set_xlabel(f"{variable} [{name}]")
-    axis.set_ylabel(f"missing at {best.port} [{model.plant.ports[best.port]}]")
-    tidy(axis)
+    axis.set(xlabel=f"{variable} [{name}]", ylabel=f"missing at {best.port} [{model.plant.ports[best.port]}]")
 
 
 def unit_of(variable: str, model: Any) -> str:
-    """Return the unit of a variable of the motion."""
     units = {s.name: s.unit for s in model.plant.states} | {i.name: i.unit for i in model.plant.inputs}
     return str(units.get(variable, "s" if variable == "time" else model.plant.scales.effort_unit))
-
-
-def shown_values(values: Any, unit: str) -> Any:
-    """Return values in the unit that people read."""
-    return values * shown(1.0, unit)[0]
-
-
-FIGURES: dict[str, Callable[[ClosedLoop, Path], None]] = {
-    "residuals.png": residual_figure,
-    "diagnosis.png": diagnosis_figure,
-    "ranking.png": ranking_figure,
-    "parameters.png": shift_figure,
-    "autocorrelation.png": autocorrelation_figure,
-}
-
-MISSING = {"missing.png": missing_figure}
-
-
-def figures_of(found: ClosedLoop) -> dict[str, Callable[[ClosedLoop, Path], None]]:
-    """Return the figures that a result has: that of a missing signal only where one was sought."""
-    return FIGURES | (MISSING if found.missing is not None else {})

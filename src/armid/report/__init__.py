@@ -1,1 +1,5 @@
-"""Documents and their renderers."""
+"""One document a result, and what renders it.
+
+Reading order: `document` (the classes), `common` (what several results say alike), `terminal`, `markdown`, `html` with
+`svg` and the templates, `files` (CSV, LaTeX, PNG, SVG), `style` (colours, and how figures are written).
+"""

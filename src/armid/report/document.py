@@ -6,16 +6,10 @@ word nothing themselves; each escapes what comes from files.
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from typing import TYPE_CHECKING, Any, ClassVar, Union
-
-import numpy as np
-from markupsafe import Markup
-
-from armid.report.svg import inline
-from armid.units import SHOWN, shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -96,10 +90,10 @@ class Table:
 
 
 def table(
-    title: str, columns: Sequence[str | Column], rows: Sequence[Sequence[Any]], caption: str = "", name: str = ""
+    title: str, columns: Sequence[object], rows: Sequence[Sequence[Any]], caption: str = "", name: str = ""
 ) -> Table:
-    """Return a table of plain rows, all shown; a column may be told by its header alone, and is text then."""
-    told = tuple(c if isinstance(c, Column) else Column(c, c) for c in columns)
+    """Return a table of plain rows, all shown; a column of text may be given by its header alone."""
+    told = tuple(c if isinstance(c, Column) else Column(str(c), str(c)) for c in columns)
     return Table(name, title, caption, rows, told, max(len(rows), 1))
 
 
@@ -135,28 +129,6 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Grid:
-    """Hold one table. right: which columns hold numbers; note: what it shows, or what it leaves out."""
-
-    kind: ClassVar[str] = "grid"
-    title: str
-    headers: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    right: tuple[bool, ...]
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """Hold one figure. svg: harmless (see `inline`); note: what it shows."""
-
-    kind: ClassVar[str] = "drawing"
-    title: str
-    svg: Markup
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class Gallery:
     """Figures side by side on a page.
 
@@ -165,12 +137,14 @@ class Gallery:
     figures : in order.
     slider : label of one control that fades all of them between their layers "before" and "after"; "" for none.
     name : of the PNG file that shows them together, for Markdown; "" for none.
+    wide : whether each has a row of its own.
     """
 
     kind: ClassVar[str] = "gallery"
-    figures: tuple["Figure | Drawing", ...]
+    figures: tuple[Figure, ...]
     slider: str = ""
     name: str = ""
+    wide: bool = False
 
 
 @dataclass(frozen=True)
@@ -208,7 +182,7 @@ class Listing:
     folded: bool = False
 
 
-Part = Table | Figure | Gallery | Text | Sentences | Listing | Grid | Drawing
+Part = Table | Figure | Gallery | Text | Sentences | Listing
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,122 +263,3 @@ def unlike(names: list[str]) -> list[str]:
         again = sum(re.fullmatch(rf"{re.escape(name)}(_\d+)?", f) is not None for f in found)
         found.append(f"{name}_{again + 1}" if again else name)
     return found
-
-
-# Former classes, which go when the last document is built from those above.
-
-
-@dataclass(frozen=True)
-class Page:
-    """Hold a whole page.
-
-    of: what made it, in a word or two; question; answer: up to three sentences; warning: what must be known first, ""
-    for nothing; sections: in order.
-    """
-
-    facts: ClassVar[tuple[str, ...]] = ()
-    title: str
-    of: str
-    question: str
-    answer: tuple[str, ...]
-    sections: tuple[Section, ...]
-    warning: str = field(default="", kw_only=True)
-
-
-def text_cell(text: str) -> Cell:
-    """Return a cell that is sorted by the number that it begins with, else as text."""
-    found = FIRST_NUMBER.match(text)
-    return Cell(text, float(found.group(1))) if found else Cell(text)
-
-
-def number_cell(value: float | None, digits: str, factor: float = 1.0) -> Cell:
-    """Return a number; None and NaN are left empty."""
-    if value is None or np.isnan(value):
-        return Cell("")
-    # + 0.0 takes the sign off a zero
-    return Cell(format(factor * value + 0.0, digits), float(value))
-
-
-def grid(title: str, headers: Sequence[str], rows: Sequence[Sequence[Cell]], note: str = "") -> Grid:
-    """Return a table; a column of numbers alone stands to the right."""
-    right = tuple(
-        any(row[i].number is not None for row in rows) and all(row[i].number is not None or not row[i].text
-                                                                for row in rows)
-        for i in range(len(headers))
-    )  # fmt: skip
-    return Grid(title, tuple(headers), tuple(tuple(row) for row in rows), right, note)
-
-
-def pairs(title: str, rows: Sequence[tuple[str, str]]) -> Grid:
-    """Return a table of two columns: what, and its value."""
-    return Grid(title, ("what", "value"), tuple((Cell(a), Cell(b)) for a, b in rows), (False, False))
-
-
-ERROR_NOTE = (
-    "RMSE: pooled over all samples. NRMSE: each record divided by its rms. chi2/sample: mean of (residual/noise)^2, 1 "
-    "where only noise is left. S, S1, S2: similarity degrees of the paper (whole, numbers, shape), mean by duration."
-)
-
-
-def error_headers(unit: str) -> list[str]:
-    """Return the headers of the columns of errors."""
-    return [f"RMSE [{SHOWN[unit][0]}]", "NRMSE [%]", "chi2/sample", "S", "S1", "S2"]
-
-
-def error_cells(error: Mapping[str, float | None], unit: str) -> list[Cell]:
-    """Return the cells of stored errors."""
-    rmse = number_cell(error["rmse"], ".4g", SHOWN[unit][1])
-    rest = [number_cell(error["nrmse"], ".3f", 100.0), number_cell(error["chi2_per_sample"], ".4g")]
-    return [rmse, *rest, *(number_cell(error[name], ".4f") for name in ("s", "s1", "s2"))]
-
-
-def value_text(entry: Mapping[str, Any]) -> str:
-    """Return a stored parameter with unit and 95 % interval as people read it."""
-    value, name = shown(entry["value"], entry["unit"])
-    unit = "" if name == "1" else f" {name}"
-    if entry["low"] is None or entry["high"] is None:
-        return f"{value:.5g}{unit}"
-    low, high = (shown(entry[end], entry["unit"])[0] for end in ("low", "high"))
-    return f"{value:.5g}{unit} ({low:.5g} to {high:.5g})"
-
-
-def drawing(title: str, svg: str, prefix: str, note: str = "") -> Drawing:
-    """Return a figure; prefix: of its ids on the page."""
-    return Drawing(title, inline(svg, prefix, title, title), note)
-
-
-def drawings(texts: Mapping[str, str], words: Mapping[str, tuple[str, str]]) -> dict[str, Drawing]:
-    """Return stored figures by name; words: name -> title and what it shows."""
-    return {name: drawing(words[name][0], text, f"{name}-", words[name][1]) for name, text in texts.items()}
-
-
-def made_section(made_by: Mapping[str, Any], versions: Mapping[str, str], again: str) -> Section:
-    """Return commands, settings and versions. again: the command that makes the page again."""
-    commands = [Line(made_by["command"])] if made_by else []
-    parts: list[Part] = [Listing("Commands", (*commands, Line(again)))]
-    if made_by:
-        parts.append(settings_grid(made_by["settings"]))
-    parts.append(pairs("Versions", list(versions.items())))
-    return Section("How it was made", tuple(parts))
-
-
-def settings_grid(settings: Mapping[str, Any]) -> Grid:
-    """Return the value of each option."""
-    return pairs("Settings", [(name, setting_text(value)) for name, value in sorted(settings.items())])
-
-
-def setting_text(value: Any) -> str:
-    """Return the value of an option in words."""
-    if value in (None, "", []):
-        return "not given"
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-def records_note(shown_records: int, there_are: int) -> str:
-    """Return how many records are not shown, "" for none."""
-    return "" if shown_records >= there_are else f"The first {shown_records} of {there_are} records are shown."
-
-
-def plain_grid(title: str, headers: Iterable[str], rows: Iterable[Iterable[str]], note: str = "") -> Grid:
-    """Return a table of texts that are sorted as texts."""
-    return grid(title, list(headers), [[Cell(text) for text in row] for row in rows], note)

@@ -3,7 +3,6 @@
 from base64 import b64encode
 from collections.abc import Mapping
 from hashlib import sha256
-from typing import Any
 
 from markupsafe import Markup
 
@@ -12,7 +11,7 @@ from armid.report.style import svg_text
 from armid.report.svg import inline
 
 
-def html(document: Document | Any, stored: Mapping[str, str] | None = None) -> str:
+def html(document: Document, stored: Mapping[str, str] | None = None) -> str:
     """Return the document as HTML: style, script and figures are in it.
 
     Everything from files is escaped, and a browser runs no script but the page's own, whose hash the page names.

@@ -16,24 +16,22 @@ def markdown(document: Document, made_by: str = "") -> str:
 
 
 def section_texts(section: Section) -> Iterator[str]:
-    """Yield heading, text and parts of a section."""
     yield f"## {escaped(section.title)}"
     yield escaped(section.text)
     for part in section.parts:
-        yield from part_texts(part)
+        yield from part_texts(part, section.title)
 
 
-def part_texts(part: Part) -> Iterator[str]:
-    """Yield a part under its title."""
+def part_texts(part: Part, section: str) -> Iterator[str]:
     if isinstance(part, Text):
         yield escaped(part.text)
         return
     if isinstance(part, Gallery):
         yield f"![{escaped(part.slider or part.name)}]({part.name}.png)" if part.name else ""
         return
-    if isinstance(part, Table) and not part.most:
+    if (isinstance(part, Table) and not part.most) or (isinstance(part, Listing) and part.folded):
         return
-    yield f"### {escaped(part.title)}" if part.title else ""
+    yield f"### {escaped(part.title)}" if part.title not in ("", section) else ""
     if isinstance(part, Table):
         yield table_text(part)
         yield escaped(part.note)

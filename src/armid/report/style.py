@@ -112,7 +112,3 @@ def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
         # the first sample of each interval that is its extreme
         chosen += list(equal[np.unique(np.searchsorted(edges, equal, side="right"), return_index=True)[1]])
     return np.unique(np.array(chosen, dtype=np.intp))
-
-
-# Interim names, until every figure uses `pyplot`.
-style = pyplot

@@ -8,18 +8,19 @@ from armid.report.document import Document, Sentences, Table, Text
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-# Columns where the output is no terminal.
-WIDTH = 150
+# Columns of text and of tables where the output is no terminal.
+TEXT_WIDTH, TABLE_WIDTH = 120, 150
 
 
 def show(document: Document) -> None:
     """Print warning, answer and main parts of a document; nothing from files is taken for markup or control codes."""
     from rich.console import Console
 
-    console = Console(width=None if sys.stdout.isatty() else WIDTH)
+    text_width, table_width = (None, None) if sys.stdout.isatty() else (TEXT_WIDTH, TABLE_WIDTH)
+    console = Console(width=table_width)
 
     def say(text: str) -> None:
-        console.print(printable(text), highlight=False, markup=False, emoji=False, soft_wrap=not sys.stdout.isatty())
+        console.print(printable(text), highlight=False, markup=False, emoji=False, width=text_width)
 
     for sentence in (document.warning, *document.answer):
         if sentence:
@@ -67,5 +68,4 @@ def drawn(table: Table) -> "RichTable":
 
 
 def printable(text: str) -> str:
-    """Return a text without the control codes that a terminal would obey."""
     return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)

@@ -12,5 +12,6 @@ Where a run goes, in reading order:
 
 Beside them: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind of
 study that closes the loop), dask_pool (a cluster in place of own processes), results (the store as tables), export
-(the store in formats of others). The rest makes the report.
+(the store in formats of others). The report: traces (what each run had reached by when), analyses (statistics, a file
+a topic), document (answer, facts and the sections of the analyses).
 """

@@ -1,11 +1,11 @@
 """The document of a study from its stored results: the answer, how it was made, and the sections of its analyses."""
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pandas import DataFrame
 
 from armid.errors import ArmidError
 from armid.report.document import Document, Line, Listing, Part, Section, listing
@@ -14,6 +14,7 @@ from armid.study.analyses.catalogue import ANALYSES, OwnAnalyses, check_names, o
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
 from armid.study.results import StudyResults
+from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
 
 MOST_SETTINGS = 2
 ALONE = "A seed decides the search alone; the noise is the records' own."
@@ -22,7 +23,10 @@ SYNTHETIC = (
     "Synthetic: records are simulated from a known truth by the model that is identified, and white noise of the "
     "stated level (standard deviation) is added; no measured data enters."
 )
-SCORING = "Each loop saw its campaign alone. Against the truth, answers are scored by `python studies/blind/score.py`."
+SCORING = (
+    "Each loop saw its campaign alone; `python studies/blind/score.py RESULTS --key KEY --out DIR` scores its answers "
+    "against the truth."
+)
 
 
 def report_of(
@@ -49,17 +53,18 @@ def report_of(
     """
     study, own = results.study, own or {}
     kind = known_kind(study)
-    if key is not None and kind == "identify":
+    if key is not None and kind == IDENTIFIES:
         raise ArmidError(f"study '{study['name']}' knows its truths, a key is not expected")
     if results.runs.empty:
         raise ArmidError(f"study '{study['name']}' has no finished run: nothing can be reported")
     check_names(own)
-    if kind == "identify":
+    if kind == IDENTIFIES:
         evidence = Evidence(results)
         found = [Section(a.title, tuple(a.parts(evidence))) for a in ANALYSES]
         sections, facts, runs = tuple(s for s in found if s.parts), facts_of(evidence), wide_runs(evidence)
-        answer = nearest(evidence) if evidence.knows_truth else (lowest_fitness(evidence),)
-        main = sections[0].parts[:1]
+        table = main_table(evidence)
+        main = (table,)
+        answer = nearest(table.frame, evidence.settings) if evidence.knows_truth else (lowest_fitness(evidence),)
     else:
         runs = loop_runs(results.loops)
         main = (verdicts(runs),)
@@ -76,7 +81,7 @@ def report_of(
 
 def summary_of(results: StudyResults) -> Document:
     """Return state and main table alone; no trace is read."""
-    if known_kind(results.study) == "identify":
+    if known_kind(results.study) == IDENTIFIES:
         main = main_table(Evidence(results))
     else:
         main = verdicts(loop_runs(results.loops))
@@ -88,30 +93,30 @@ def known_kind(study: dict[str, Any]) -> str:
 
     Raises ArmidError for one that this version does not know.
     """
-    kind = str(study.get("kind", "identify"))
-    if kind not in ("identify", "close_loop"):
-        raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of identify, close_loop is expected")
+    kind = str(study.get("kind", IDENTIFIES))
+    if kind not in KIND_NAMES:
+        raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of {', '.join(KIND_NAMES)} is expected")
     return kind
 
 
-def nearest(evidence: Evidence) -> tuple[str, str]:
+def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
     """Return who came nearest to the truth, and how the others (or the paper's result) stand to that."""
+    is_paper = overview["variant"] == PAPER
+    ours, paper = overview[~is_paper], overview[is_paper]
     said = []
-    for setting in evidence.settings[:MOST_SETTINGS]:
-        errors = by_variant(evidence.of(setting))
-        best = min(errors, key=lambda v: quantile(errors[v], 0.5))
-        said.append(f"{setting}: {best}, median largest error of a run {percent(quantile(errors[best], 0.5))}, "
-                    f"95 % of its {len(errors[best])} runs within {percent(quantile(errors[best], 0.95))}")  # fmt: skip
-    more = len(evidence.settings) - MOST_SETTINGS
+    for setting in settings[:MOST_SETTINGS]:
+        own = ours[ours["setting"] == setting]
+        best = own.loc[own["largest_median"].idxmin()]
+        said.append(f"{setting}: {best['variant']}, median largest error of a run {percent(best['largest_median'])}, "
+                    f"95 % of its {best['n']} runs within {percent(best['largest_p95'])}")  # fmt: skip
+    more = len(settings) - MOST_SETTINGS
     first = f"Nearest to the truth: {'; '.join(said)}{f'; {more} more settings below' if more > 0 else ''}."
-    medians = {v: quantile(errors, 0.5) for v, errors in by_variant(evidence.of(evidence.settings[0])).items()}
-    if not evidence.published.empty and evidence.study.get("report") == "table1":
-        paper = float(np.median(evidence.published.groupby("case")["relative_error"].max()))
-        better = sum(value < paper for value in medians.values())
-        return first, (f"{PAPER[0].upper()}{PAPER[1:]}, from its printed values on its own data, has {percent(paper)}; "
-                       f"{better} of {len(medians)} identifiers are below that.")  # fmt: skip
-    worst = max(medians, key=lambda v: medians[v])
-    return first, f"Of {len(medians)} identifiers the furthest is {worst} with {percent(medians[worst])}."
+    medians = ours[ours["setting"] == settings[0]].set_index("variant")["largest_median"]
+    if len(paper):
+        error = float(paper["largest_median"].iloc[0])
+        return first, (f"{PAPER[0].upper()}{PAPER[1:]}, from its printed values on its own data, has {percent(error)}; "
+                       f"{(medians < error).sum()} of {len(medians)} identifiers are below that.")  # fmt: skip
+    return first, f"Of {len(medians)} identifiers the furthest is {medians.idxmax()} with {percent(medians.max())}."
 
 
 def lowest_fitness(evidence: Evidence) -> str:
@@ -124,16 +129,6 @@ def lowest_fitness(evidence: Evidence) -> str:
     return f"No truth is known. Lowest median fitness: {'; '.join(said)}."
 
 
-def by_variant(runs: DataFrame) -> dict[str, np.ndarray]:
-    """Return variant -> largest relative error of each run; infinite for a failed one."""
-    return {str(v): g["largest_error"].to_numpy(float) for v, g in runs.groupby("variant", sort=False)}
-
-
-def quantile(values: np.ndarray, share: float) -> float:
-    """Return a quantile as the tables have it: a value that occurs."""
-    return float(np.quantile(values, share, method="inverted_cdf"))
-
-
 def percent(value: float) -> str:
     return "not finite" if not np.isfinite(value) else f"{100.0 * value:.3g} %"
 
@@ -141,7 +136,7 @@ def percent(value: float) -> str:
 def state_of(study: dict[str, Any]) -> str:
     """Return how much of the study was run."""
     planned, done, failed = (int(study[key]) for key in ("n_planned", "n_done", "n_failed"))
-    what = "campaigns" if study.get("kind") == "close_loop" else "runs"
+    what = "campaigns" if study.get("kind") == CLOSES_LOOP else "runs"
     lost = f", {failed} of them failed" if failed else ""
     if done + failed < planned:
         return f"NOT COMPLETE: {done + failed} of {planned} {what} have ended{lost}; every number below is of these."
@@ -168,8 +163,10 @@ def loop_facts(study: dict[str, Any], scored: bool) -> tuple[str, ...]:
     """Return how a study of loops was made; scored: whether a truth was kept from it."""
     candidates = "differ from campaign to campaign" if study["rivals"] else f"{len(study['candidates'])} effects"
     made = f", made by `{study['made_by']}`" if study["made_by"] else ""
-    campaigns = f"Campaigns: those in {study['campaigns']}{made}. Candidates: {candidates}."
-    return (campaigns, *((SCORING,) if scored else ()), versions(study))
+    facts = [f"Campaigns: those in {study['campaigns']}{made}. Candidates: {candidates}."]
+    if study["report"]:
+        facts.insert(0, "Synthetic: records of a simulated arm; no machine was measured.")
+    return (*facts, *((SCORING,) if scored else ()), versions(study))
 
 
 def origin(study: dict[str, Any]) -> str:

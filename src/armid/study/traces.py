@@ -51,7 +51,11 @@ def histories(results: StudyResults, runs: DataFrame, truths: Mapping[str, Mappi
     for trace in results.iter_traces():
         if trace.run in place and trace.values.size:
             firsts[place[trace.run]] = trace.values[0]
-    starts, bests = reference_values(runs, firsts)
+    # the way of a run starts at the median of the first values of all runs on the same case, setting and fitness, and
+    # ends at the best fitness that any of them found with the same seed, that is on the same noise
+    problem = ["case", "setting", "fitness"]
+    starts = runs.assign(first=firsts).groupby(problem)["first"].transform("median").to_numpy()
+    bests = runs.groupby([*problem, "seed"])["value"].transform("min").to_numpy()
     cases = runs["case"].to_numpy()
     kept = Histories(grid, *(np.full((len(place), n), np.inf, np.float32)
                              for n in (TARGETS.size, TARGETS.size, grid.size, grid.size)))  # fmt: skip
@@ -112,16 +116,3 @@ def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
         return np.full(trace.evaluations.size, np.nan)
     errors: Array = np.max(np.abs(trace.X[:, known] - true[known]) / np.abs(true[known]), axis=1)
     return errors
-
-
-def reference_values(runs: DataFrame, firsts: Array) -> tuple[Array, Array]:
-    """Return where each run's way starts and where the best known ends, (n_runs,) each.
-
-    The start is the median of the first values of all runs on the same case, setting and fitness; the end is the best
-    fitness that any of them found with the same seed, that is on the same noise.
-    """
-    frame = runs[["case", "setting", "fitness", "seed", "value"]].assign(first=firsts)
-    problem = ["case", "setting", "fitness"]
-    start = frame.groupby(problem)["first"].transform("median").to_numpy()
-    best = frame.groupby([*problem, "seed"])["value"].transform("min").to_numpy()
-    return start, best

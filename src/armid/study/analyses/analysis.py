@@ -24,16 +24,10 @@ PARAMETER, N_RUNS = Column("parameter", "parameter"), Column("n", "runs", ".0f")
 
 @dataclass(frozen=True)
 class Analysis:
-    """One section of the report of a study.
+    """One section of the report of a study, and a line of `armid list analyses`.
 
-    Parameters
-    ----------
-    name, title
-        In the list of analyses, and over the section.
-    parts
-        Function of the evidence: tables, figures and texts, in order; none where the analysis does not apply.
-    note
-        What the analysis tells, one sentence.
+    parts: function of the evidence; it returns tables, figures and texts in order, none where it does not apply. note:
+    what it tells.
     """
 
     name: str
@@ -54,7 +48,9 @@ class Evidence:
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
         self.runs = ordered(outcomes(results.runs, self.parameters), self.study)
-        self.estimates = by_parameter(self.runs, self.parameters)
+        keys = ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]
+        done = self.runs.loc[self.runs["status"] == "done", keys]
+        self.estimates = done.merge(self.parameters, on="run", how="inner", sort=False)
 
     @cached_property
     def variants(self) -> list[str]:
@@ -86,7 +82,8 @@ class Evidence:
     @cached_property
     def histories(self) -> Histories:
         """What the traces say."""
-        return histories(self.results, self.runs, truths_of(self.runs, self.parameters))
+        truths = {str(case["name"]): case.get("truth") or {} for case in self.study["cases"]}
+        return histories(self.results, self.runs, truths)
 
     @cached_property
     def used(self) -> NDArray[np.float64]:
@@ -178,22 +175,6 @@ def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
     keys = runs.assign(_label=runs["identifier"].map(label), _case=runs["case"].map(case))
     by = ["_label", "identifier", "fitness", "_case", "case", "noise_deg_s", "window", "seed", "run"]
     return keys.sort_values(by, kind="stable", ignore_index=True).drop(columns=["_label", "_case"])
-
-
-def by_parameter(runs: DataFrame, parameters: DataFrame) -> DataFrame:
-    """Return one row a finished run and free parameter, with case, variant, setting and seed beside."""
-    keys = runs.loc[runs["status"] == "done", ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]]
-    return keys.merge(parameters, on="run", how="inner", sort=False)
-
-
-def truths_of(runs: DataFrame, parameters: DataFrame) -> dict[str, dict[str, float]]:
-    """Return case -> parameter -> truth [SI], of the truths that are known."""
-    known = parameters[parameters["truth"].notna()].merge(runs[["run", "case"]], on="run")
-    rows = known.drop_duplicates(["case", "parameter"])
-    truths: dict[str, dict[str, float]] = {}
-    for case, parameter, truth in zip(rows["case"], rows["parameter"], rows["truth"], strict=True):
-        truths.setdefault(str(case), {})[str(parameter)] = float(truth)
-    return truths
 
 
 def published_values(study: dict[str, Any]) -> DataFrame:

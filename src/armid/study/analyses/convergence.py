@@ -1,6 +1,7 @@
 """Convergence: error and fitness of the best candidate against simulations, median and quartiles over runs."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from armid.study.analyses.drawing import legend_below
 Array = NDArray[np.floating[Any]]
 QUARTILES = (0.25, 0.5, 0.75)
 COLUMNS = 4
+ERROR_LABEL = "largest relative\nerror [%]"
 # Smaller values are drawn there.
 LEAST_PERCENT, LEAST_FITNESS = 1e-6, 1e-16
 ERROR_CAPTION = (
@@ -32,28 +34,21 @@ FITNESS_CAPTION = (
 def parts(evidence: Evidence) -> Sequence[Part]:
     if evidence.parameters.empty:
         return ()
-    figures = []
+    kept, figures = evidence.histories, []
     if evidence.knows_truth:
         every = np.ones(len(evidence.runs), bool)
-        figures.append(Figure(
-            "convergence_error", "Convergence of the parameters", ERROR_CAPTION, lambda: convergence_figure(
-                evidence, every, 100.0 * evidence.histories.errors, "largest relative\nerror [%]", LEAST_PERCENT),
-        ))  # fmt: skip
+        draw = partial(convergence_figure, evidence, every, 100.0 * kept.errors, ERROR_LABEL, LEAST_PERCENT)
+        figures.append(Figure("convergence_error", "Convergence of the parameters", ERROR_CAPTION, draw))
     names = list(dict.fromkeys(map(str, evidence.runs["fitness"])))
-    return *figures, *(fitness_figure(evidence, name, len(names) > 1) for name in names)
+    for name in names:
+        own = (evidence.runs["fitness"] == name).to_numpy()
+        draw = partial(convergence_figure, evidence, own, kept.values, f"best fitness\n({name})", LEAST_FITNESS)
+        file = slug("convergence", name) if len(names) > 1 else "convergence_fitness"
+        figures.append(Figure(file, f"Convergence of {name}", FITNESS_CAPTION.format(fitness=name), draw))
+    return figures
 
 
 CONVERGENCE = Analysis("convergence", "Convergence", parts, "error and fitness against simulations")
-
-
-def fitness_figure(evidence: Evidence, fitness: str, several: bool) -> Figure:
-    """Return the figure of one fitness. several: whether there are others, so that its file is named by the fitness."""
-    own = (evidence.runs["fitness"] == fitness).to_numpy()
-    return Figure(
-        slug("convergence", fitness) if several else "convergence_fitness", f"Convergence of {fitness}",
-        FITNESS_CAPTION.format(fitness=fitness), lambda: convergence_figure(
-            evidence, own, evidence.histories.values, f"best fitness\n({fitness})", LEAST_FITNESS),
-    )  # fmt: skip
 
 
 def band(held_values: Array) -> Array:

@@ -64,11 +64,9 @@ CRAMER_RAO = Analysis("cramer_rao", TITLE, parts, "standard deviation and bias o
 
 
 class Efficiency(NamedTuple):
-    """Scatter and bias over the bound.
+    """Scatter and bias in units of the Cramer-Rao bound (a standard deviation, SI); intervals are of 95 %.
 
-    n: noise realisations; bound: Cramer-Rao standard deviation, SI; ratio: sample standard deviation over bound, with
-    the 95 % interval low to high; robust: from the quartiles; bias: (mean - truth) over bound, with the half width of
-    its 95 % interval.
+    ratio: sample standard deviation, from low to high; robust: the same from the quartiles; bias: mean - truth.
     """
 
     n: int
@@ -161,7 +159,6 @@ def cramer_rao_figure(rows: DataFrame) -> Any:
 
 
 def log_with_plain_ticks(axis: Any) -> None:
-    """Make the axis logarithmic and write ratios as plain numbers."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     axis.set_xscale("log")

@@ -6,11 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armid.report.document import Figure
-from armid.report.style import COLOURS, INK, look, panels, pyplot, save
-
-# Interim names, until study/blind has moved.
-__all__ = ["COLOURS", "Figure", "listed_lines", "named_lines", "panels", "pyplot", "save"]
+from armid.report.style import INK, look
 
 # Where names stand beside the axes, as shares of their width; the distance between two [inch], and what an upright
 # panel needs beside its axes [inch].
@@ -19,7 +15,6 @@ APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
 
 
 def panel_height(n_lines: int) -> float:
-    """Return how high a panel has to be for the names of its lines [inch]."""
     return max(LEAST_HEIGHT, FRAME_INCH + APART_INCH * n_lines)
 
 

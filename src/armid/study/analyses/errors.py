@@ -1,6 +1,7 @@
 """Where the errors are: by identifier and case, and along the valley of parameters that stand in for each other."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,18 +36,14 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     figures = [Figure("error_map", "Errors by identifier and case", MAP_CAPTION, lambda: error_map_figure(maps))]
     ends = end_points(evidence.estimates)
     if ends.shape[1] > 3 and len(ends) > 1:
-        figures += [valley(ends, s, evidence) for s in evidence.settings]
+        for s in evidence.settings:
+            draw = partial(valley_figure, ends[ends["setting"] == s], evidence.interesting[:MOST_COLOURED])
+            name = slug("valley", s if len(evidence.settings) > 1 else "")
+            figures.append(Figure(name, f"Where runs end, {s}", VALLEY_CAPTION, draw))
     return figures
 
 
 ERRORS = Analysis("errors", "Where the errors are", parts, "largest error by identifier and case; where runs end")
-
-
-def valley(ends: DataFrame, setting: str, evidence: Evidence) -> Figure:
-    """Return the figure of where the runs of one setting end."""
-    own, coloured = ends[ends["setting"] == setting], evidence.interesting[:MOST_COLOURED]
-    name = slug("valley", setting if len(evidence.settings) > 1 else "")
-    return Figure(name, f"Where runs end, {setting}", VALLEY_CAPTION, lambda: valley_figure(own, coloured))
 
 
 def error_map(runs: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
@@ -88,7 +85,6 @@ def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
 
 
 def brief(percent: float) -> str:
-    """Return a number that fits into a cell."""
     if not np.isfinite(percent):
         return "failed"
     return f"{percent:.2g}" if percent >= 1e-3 or percent == 0.0 else f"{percent:.0e}"
@@ -135,13 +131,11 @@ def valley_figure(ends: DataFrame, chosen: list[str]) -> Any:
 
 
 def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:
-    """Draw marks, hollow so that those below stay visible."""
     pyplot().gca().plot(
         x, y, ls="", marker=look["marker"], ms=5, mfc="none", mec=look["color"], mew=0.9, label=look.get("label")
     )
 
 
 def thinned(ends: DataFrame) -> DataFrame:
-    """Return every n-th run of a variant that has very many."""
     parts = [g.iloc[:: -(-len(g) // MOST_POINTS)].index for _, g in ends.groupby("variant", sort=False)]
     return ends.loc[[i for part in parts for i in part]]

@@ -56,5 +56,7 @@ def campaigns(runs: DataFrame) -> Table:
 
 def counted(runs: DataFrame) -> str:
     """Return how often each verdict was given, in a sentence."""
+    if runs.empty:
+        return "No campaign was closed."
     counts = [f"{n} {str(verdict).replace('_', ' ')}" for verdict, n in runs["verdict"].value_counts().items()]
     return f"Of {len(runs)} campaigns: {', '.join(counts)}."

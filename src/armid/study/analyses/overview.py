@@ -133,7 +133,6 @@ def runs_table(runs: DataFrame, parameters: DataFrame) -> Table:
 
 
 def reasons(runs: DataFrame) -> Table:
-    """Return why runs stopped, or failed, with counts."""
     failed = runs["status"] != "done"
     reason = runs["stopped"].where(~failed, "failed: " + runs["error"].map(first_line))
     frame = runs.assign(reason=reason).groupby(["variant", "reason"], sort=False).size().reset_index(name="n")
@@ -142,6 +141,5 @@ def reasons(runs: DataFrame) -> Table:
 
 
 def first_line(text: str) -> str:
-    """Return the beginning of an error."""
     line = str(text).strip().partition("\n")[0]
     return line if len(line) <= 120 else f"{line[:117]}..."

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -48,7 +49,9 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         end = "" if len(evidence.settings) == 1 else setting
         tables += [mean_ranks(tests, setting, slug("ranks", end)), pairs(tests, setting, slug("pairs", end))]
         if tests.n_cases >= LEAST_CASES and len(tests.ranks) > 2:
-            figures.append(critical_difference(tests, setting, slug("critical_difference", end)))
+            draw = partial(critical_difference_figure, tests, setting)
+            name = slug("critical_difference", end)
+            figures.append(Figure(name, f"Critical differences, {setting}", FIGURE_CAPTION, draw))
     note = "" if figures else f" A critical-difference diagram wants {LEAST_CASES} cases or more."
     return Text(INTRODUCTION + note), *tables, *figures
 
@@ -56,26 +59,13 @@ def parts(evidence: Evidence) -> Sequence[Part]:
 RANKS = Analysis("ranks", "Ranks", parts, "which identifiers differ: Friedman, Wilcoxon with Holm, effect sizes")
 
 
-def critical_difference(tests: "RankTests", setting: str, name: str) -> Figure:
-    """Return the diagram of one setting."""
-    return Figure(name, f"Critical differences, {setting}", FIGURE_CAPTION,
-                  lambda: critical_difference_figure(tests, setting))  # fmt: skip
-
-
 @dataclass(frozen=True, eq=False)
 class RankTests:
     """The comparison of all variants on the same cases.
 
-    Attributes
-    ----------
-    blocks
-        Median over the seeds, one row a case and one column a variant.
-    ranks
-        Mean rank of each variant, 1 is best, rising.
-    friedman, p
-        Statistic, and probability that all variants are equal; NaN for fewer than 3 variants.
-    pairs
-        Columns first, second, n, p, p_holm, a12; one row a pair.
+    blocks: median over the seeds, one row a case and one column a variant. ranks: mean rank of each variant, 1 is best,
+    rising. friedman, p: statistic, and probability that all are equal, NaN for fewer than 3. pairs: first, second, n,
+    p, p_holm, a12, one row a pair.
     """
 
     blocks: DataFrame

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table, Text, slug, unlike
@@ -13,8 +13,8 @@ from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, A
 from armid.study.analyses.drawing import legend_below, row_names
 from armid.units import SHOWN
 
-Array = NDArray[np.float64]
 MEAN_ROW = "mean of the rows"
+AVERAGED = ["published_error", "error_of_median", "median_error", "mean_error"]
 COLUMNS = (
     Column("case", "row"), PARAMETER, Column("unit", "unit"), Column("truth", "truth", ".4f"),
     Column("published", "paper", ".4f"), Column("median", "ours (median)", ".4f"),
@@ -57,8 +57,11 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     return (
         Text(f"Shown for {', '.join(evidence.interesting)}: the swarm in every form that was run, then the best of the "
              "others by the rank of their median largest error. All identifiers are in table1.csv."),
-        *(table1(rows, s, v, name) for (s, v), name in zip(wanted, names, strict=True)),
-        table1_all(rows),
+        *(Table(name, f"Table I beside ours: {v}, {s}", TABLE_CAPTION,
+                rows[(rows["setting"] == s) & (rows["variant"] == v)], COLUMNS)
+          for (s, v), name in zip(wanted, names, strict=True)),
+        Table("table1", "Table I beside ours: all identifiers", TABLE_CAPTION, rows, (SETTING, VARIANT, *COLUMNS),
+              most=0),
         Figure("table1", "Errors on Table I beside the paper's", FIGURE_CAPTION,
                lambda: table1_figure(evidence.estimates, evidence.published, order)),
     )  # fmt: skip
@@ -68,61 +71,37 @@ TABLE1 = Analysis("table1", "Table I of the paper beside ours", parts, "row by r
 
 
 def table1_rows(estimates: DataFrame, published: DataFrame) -> DataFrame:
-    """Return one row per setting, variant, case and parameter, SI, and the mean over the cases.
+    """Return one row per setting, variant, case and parameter, and after each variant's the means over the cases.
 
-    estimates: one row a run and parameter; published: the paper's values.
+    Values are in the units that the paper prints, pressures in MPa. estimates: one row a run and parameter; published:
+    the paper's values, SI.
     """
     beside = published[["case", "parameter", "published", "relative_error"]]
     both = estimates.merge(beside.rename(columns={"relative_error": "published_error"}), on=["case", "parameter"])
-    keys = ["setting", "variant", "case", "parameter"]
-    frame = DataFrame([dict(zip(keys, k, strict=True)) | one_row(g) for k, g in both.groupby(keys, sort=False)])
-    return frame if frame.empty else with_means(frame)
+    rows: list[dict[Any, Any]] = []
+    for (setting, variant), own in both.groupby(["setting", "variant"], sort=False):
+        names = {"setting": setting, "variant": variant}
+        found = [names | {"case": case, "parameter": parameter} | one_row(group)
+                 for (case, parameter), group in own.groupby(["case", "parameter"], sort=False)]  # fmt: skip
+        rows += found
+        groups = DataFrame(found).groupby("parameter", sort=False)
+        means = groups[AVERAGED].mean().assign(n=groups["n"].sum(), case=MEAN_ROW, unit="").reset_index()
+        rows += [names | mean for mean in means.to_dict("records")]
+    return DataFrame(rows)
 
 
 def one_row(group: DataFrame) -> dict[str, object]:
-    """Return the numbers of one case and parameter."""
     errors = group["relative_error"].to_numpy(float)
     truth, published, published_error = group[["truth", "published", "published_error"]].to_numpy(float)[0]
     middle = float(group["value"].median())
     low, high = median_interval(errors)
+    unit, factor = SHOWN.get(group["unit"].iloc[0], (group["unit"].iloc[0], 1.0))
     return {
-        "unit": group["unit"].iloc[0], "n": len(group), "truth": truth, "published": published, "median": middle,
-        "published_error": published_error, "error_of_median": abs(middle - truth) / abs(truth),
-        "median_error": float(np.median(errors)), "low": low, "high": high, "mean_error": float(np.mean(errors)),
-        "percentile": percentile_among(errors, published_error),
+        "unit": unit, "n": len(group), "truth": factor * truth, "published": factor * published,
+        "median": factor * middle, "published_error": published_error,
+        "error_of_median": abs(middle - truth) / abs(truth), "median_error": float(np.median(errors)), "low": low,
+        "high": high, "mean_error": float(np.mean(errors)), "percentile": percentile_among(errors, published_error),
     }  # fmt: skip
-
-
-def with_means(rows: DataFrame) -> DataFrame:
-    """Return the rows with the mean over the cases after each variant's."""
-    averaged = ["published_error", "error_of_median", "median_error", "mean_error"]
-    keys = ["setting", "variant", "parameter"]
-    means = rows.groupby(keys, sort=False)[averaged].mean().reset_index().assign(case=MEAN_ROW, unit="")
-    means["n"] = rows.groupby(keys, sort=False)["n"].sum().to_numpy()
-    both = [rows, means.reindex(columns=rows.columns).astype({"truth": float})]
-    order = {key: i for i, key in enumerate(dict.fromkeys(zip(rows["setting"], rows["variant"], strict=True)))}
-    frame = DataFrame([r for part in both for r in part.to_dict("records")], columns=rows.columns)
-    place = [order[s, v] for s, v in zip(frame["setting"], frame["variant"], strict=True)]
-    return frame.assign(_place=place).sort_values("_place", kind="stable", ignore_index=True).drop(columns="_place")
-
-
-def table1(rows: DataFrame, setting: str, variant: str, name: str) -> Table:
-    """Return the table of one variant under one setting, in the units that people read."""
-    chosen = rows[(rows["setting"] == setting) & (rows["variant"] == variant)]
-    return Table(name, f"Table I beside ours: {variant}, {setting}", TABLE_CAPTION, in_shown_units(chosen), COLUMNS)
-
-
-def in_shown_units(rows: DataFrame) -> DataFrame:
-    """Return the rows with pressures in MPa, as the paper prints them."""
-    factor = rows["unit"].map(lambda u: SHOWN.get(u, (u, 1.0))[1])
-    shown = {key: rows[key] * factor for key in ("truth", "published", "median")}
-    return rows.assign(**shown, unit=rows["unit"].map(lambda u: SHOWN.get(u, (u, 1.0))[0]))
-
-
-def table1_all(rows: DataFrame) -> Table:
-    """Return every variant and setting in one table, for the CSV file."""
-    title = "Table I beside ours: all identifiers"
-    return Table("table1", title, TABLE_CAPTION, in_shown_units(rows), (SETTING, VARIANT, *COLUMNS), most=0)
 
 
 def percentile_among(errors: ArrayLike, published: float) -> float:
@@ -154,13 +133,11 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) 
         (resampled,), np.median, n_resamples=RESAMPLES, batch=max(1, BATCH_NUMBERS // sample.size),
         confidence_level=confidence, method="percentile", rng=np.random.default_rng(seed),
     ).confidence_interval  # fmt: skip
-    low, high = float(found.low), float(found.high)
-    return (low, high) if finite else (at_rank(sample, low), at_rank(sample, high))
-
-
-def at_rank(ordered: Array, rank: float) -> float:
-    """Return the value at a rank of an ordered sample, between two values their mean."""
-    return float((ordered[int(np.floor(rank))] + ordered[int(np.ceil(rank))]) / 2.0)
+    if finite:
+        return float(found.low), float(found.high)
+    # between two ranks the mean of their values
+    low, high = (float(sample[[int(np.floor(r)), int(np.ceil(r))]].mean()) for r in (found.low, found.high))
+    return low, high
 
 
 def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence[str]) -> Any:

@@ -82,7 +82,6 @@ def paper_row(name: str, values: np.ndarray, box: DataFrame) -> dict[str, object
 
 
 def one_row(group: DataFrame) -> dict[str, object]:
-    """Return the numbers of one setting, variant and parameter."""
     found = spread(group["value"])
     records = [spread(v) for _, v in group.groupby("case", sort=False)["value"]]
     truths = group["truth"].dropna().unique()

@@ -5,8 +5,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.study.analyses.table2 import table2, table2_figure
+from armid.study.analyses.table2 import spread, table2, table2_figure
 
+# Table II of the paper: five identifications, and the mean and "mean square error" that it prints below them.
+PAPER = {
+    "p0": ([3.0215, 3.0641, 3.0578, 3.0438, 3.0422], 3.0459, 0.0147),
+    "k": ([0.9973, 0.9991, 1.0000, 0.9964, 0.9916], 0.9969, 0.0029),
+    "eta3": ([0.5338, 0.5662, 0.5607, 0.5526, 0.5523], 0.5531, 0.0110),
+    "n": ([1.4986, 1.4837, 1.4888, 1.4993, 1.5000], 1.4941, 0.0066),
+}
 VALUES = {"record 1": [1.0, 3.0], "record 2": [5.0, 9.0]}
 
 
@@ -21,6 +28,14 @@ def estimates():
 def published(*values):
     rows = [(f"record {i}", "p0", 1e6 * v) for i, v in enumerate(values, 1)]
     return pd.DataFrame(rows, columns=["case", "parameter", "published"])
+
+
+def test_means_and_deviations_are_those_that_the_paper_prints():
+    for values, mean, deviation in PAPER.values():
+        found = spread(values)
+        assert (found.n, round(found.mean, 4), round(found.deviation, 4)) == (5, mean, deviation)
+    assert spread([]).n == 0
+    assert np.isnan(spread([]).mean)
 
 
 def test_by_hand_in_mpa():

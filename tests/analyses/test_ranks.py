@@ -1,12 +1,23 @@
-"""Rank tests, against the example of Demsar 2006 and closed forms."""
+"""Rank tests against the example of Demsar 2006 and closed forms, and effect sizes."""
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import chi2
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi2, mannwhitneyu
 
-from armid.study.analyses.ranks import critical_difference_figure, mean_ranks, p_matrix, pairs, rank_tests, signed_rank
+from armid.study.analyses.ranks import (
+    a12,
+    critical_difference_figure,
+    mean_ranks,
+    p_matrix,
+    pairs,
+    rank_tests,
+    signed_rank,
+    size_in_words,
+)
 
 # Table 6 of Demsar, J. Mach. Learn. Res. 7 (2006) 1: AUC of four classifiers on 14 data sets. On the last but one the
 # two to the right are printed alike, 0.975, but ranked 2 and 3: 0.97501 stands for the digits that are not printed.
@@ -53,12 +64,9 @@ def test_seeds_of_a_case_are_no_further_evidence():
     assert one.pairs["p"].tolist() == many.pairs["p"].tolist()
 
 
-@pytest.mark.parametrize("n", [5, 8])
-def test_signed_rank_of_pairs_that_all_agree_is_two_of_all_signs(n):
-    assert signed_rank(np.arange(1.0, n + 1), 3.0 * np.arange(1.0, n + 1) ** 2) == pytest.approx(2.0 ** (1 - n))
-
-
-def test_signed_rank_without_a_difference():
+def test_signed_rank_of_pairs_that_all_agree_is_two_of_all_signs_and_1_without_a_difference():
+    for n in (5, 8):
+        assert signed_rank(np.arange(1.0, n + 1), 3.0 * np.arange(1.0, n + 1) ** 2) == pytest.approx(2.0 ** (1 - n))
     assert signed_rank(np.ones(6), np.ones(6)) == 1.0
     assert signed_rank(np.full(6, np.inf), np.full(6, np.inf)) == 1.0
 
@@ -83,21 +91,34 @@ def test_errors_below_a_millionth_of_a_percent_are_equal():
     assert tests.pairs.loc[0, "a12"] == 0.5
 
 
-def test_cases_that_not_all_ran_are_left_out():
+def test_cases_that_not_all_ran_are_left_out_and_two_variants_have_no_friedman_test():
     frame = outcomes_of(1.0 - AUC, NAMES)
     assert rank_tests(frame[~((frame["case"] == "case 3") & (frame["variant"] == "C4.5"))]).n_cases == 13
-
-
-def test_two_variants_have_no_friedman_test():
     assert np.isnan(rank_tests(outcomes_of(AUC[:, :2], NAMES[:2])).p)
 
 
 def test_tables_and_diagram():
     tests = rank_tests(outcomes_of(1.0 - AUC, NAMES))
-    assert "p = " in mean_ranks(tests, "noise-free", "ranks").words
+    assert "p = " in mean_ranks(tests, "noise-free", "ranks").caption
     table = pairs(tests, "noise-free", "pairs")
     assert len(table.frame) == 6
     assert (table.frame.iloc[:3][["first", "second"]] == "C4.5+m+cf").any(axis=1).all()
     figure = critical_difference_figure(tests, "noise-free")
     assert {t.get_text().split(" (")[0] for t in figure.axes[0].texts if " (" in t.get_text()} >= {"C4.5+m"}
     plt.close(figure)
+
+
+SAMPLES = st.lists(st.integers(0, 9).map(float), min_size=1, max_size=15)
+
+
+@given(SAMPLES, SAMPLES)
+def test_the_effect_size_is_the_mann_whitney_statistic_over_the_pairs(x, y):
+    assert a12(x, y) == pytest.approx(mannwhitneyu(y, x).statistic / (len(x) * len(y)))
+    assert a12(x, y) + a12(y, x) == pytest.approx(1.0)
+
+
+def test_effect_sizes_by_hand_with_a_tie_and_a_failure():
+    assert a12([1.0, 2.0], [2.0, np.inf]) == (2 + 1.5) / 4
+    assert np.isnan(a12([], [1.0]))
+    words = [size_in_words(value) for value in (0.5, 0.44, 0.57, 0.65, 0.28, 1.0)]
+    assert words == ["negligible", "small", "small", "medium", "large", "large"]

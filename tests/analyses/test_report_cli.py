@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armid.cli.main import main
-from armid.study import markdown as write
+from armid.report import files as write
 from armid.study.results import load_study
 from armid.study.runner import run_study
 
@@ -105,7 +105,7 @@ def test_its_numbers_are_those_of_the_store(reported):
 
 
 def test_the_main_table_and_the_state_are_printed(store, capsys, monkeypatch):
-    monkeypatch.setattr(write, "save", lambda figure, png, svg: [p.write_text("<svg/>") for p in (png, svg)])
+    monkeypatch.setattr(write, "save", lambda figure, *paths: [p.write_text("<svg/>") for p in paths])
     with pytest.raises(SystemExit):
         main(["report", str(store)])
     printed = capsys.readouterr().out
@@ -116,8 +116,8 @@ def test_the_main_table_and_the_state_are_printed(store, capsys, monkeypatch):
 def test_a_report_that_fails_leaves_nothing(store, tmp_path, monkeypatch):
     (tmp_path / "study.sqlite").write_bytes((store / "study.sqlite").read_bytes())
 
-    def fails(figure, png, svg):
-        png.write_text("half")
+    def fails(figure, *paths):
+        paths[0].write_text("half")
         raise RuntimeError("no room")
 
     monkeypatch.setattr(write, "save", fails)

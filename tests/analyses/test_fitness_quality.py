@@ -4,8 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from armid.study.analyses.fitness_quality import fitness_quality_figure
-from armid.study.analyses.fitness_quality import fitness_quality_table as fitness_quality
+from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
 
 
 def frame():

@@ -12,17 +12,19 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from armid.study.markdown import page, write_report
 
 from armid.errors import ArmidError
+from armid.report.files import write_files
+from armid.report.markdown import markdown
 from armid.study.document import report_of
-from armid.study.report import Evidence
 
 
 def written(results, folder):
     folder.mkdir(exist_ok=True)
-    names = []
-    write_report(report_of(results), "armid report x", lambda name: names.append(name) or folder / name)
+    names = ["report.md"]
+    document = report_of(results, again="armid report x")
+    write_files(document, lambda name: names.append(name) or folder / name)
+    (folder / "report.md").write_text(markdown(document, "Made by `armid report x`."), encoding="utf-8")
     return names
 
 
@@ -104,30 +106,27 @@ def test_same_results_give_the_same_bytes_in_another_process_and_order(table1_re
 def test_a_study_that_is_not_complete_says_so_first(made):
     results = made(seeds=1)
     some = replace(results, study=results.study | {"n_planned": 500})
-    report = report_of(some)
-    assert report.state == "NOT COMPLETE: 30 of 500 runs have ended; every number below is of these."
-    assert page(report, "x").index("NOT COMPLETE") < page(report, "x").index("## Overview")
+    document = report_of(some)
+    assert document.warning == "NOT COMPLETE: 30 of 500 runs have ended; every number below is of these."
+    assert markdown(document).index("NOT COMPLETE") < markdown(document).index("## Overview")
 
 
-def test_nothing_to_report(made):
+def test_what_cannot_be_reported_is_refused(made, tmp_path):
     results = made(seeds=1)
     empty = replace(results, runs=results.runs[:0], parameters=results.parameters[:0], kept=[])
     with pytest.raises(ArmidError, match="has no finished run"):
         report_of(empty)
-
-
-def test_a_study_of_another_kind(made):
-    results = made(seeds=1)
+    with pytest.raises(ArmidError, match="knows its truths, a key is not expected"):
+        report_of(results, tmp_path / "key.json")
     other = replace(results, study=results.study | {"kind": "loop"})
     with pytest.raises(ArmidError, match="is of kind 'loop', one of identify, close_loop is expected"):
         report_of(other)
 
 
 @pytest.mark.parametrize("change", [
-    {"seeds": 1, "noises": (0.0,), "identifiers": {"pso": 1e-3}},
-    {"seeds": 1, "noises": (0.3,), "identifiers": {"pso": 1e-3, "de": 1e-2}, "failed": 3},
-    {"seeds": 2, "noises": (0.0,), "fitness": ("rmse", "similarity"), "report": "fitness"},
-    {"seeds": 2, "noises": (0.3,), "windows": ("0-0.7 s", "whole"), "report": "table2"},
+    {"seeds": 1, "noises": (0.3,), "identifiers": {"pso": 1e-3}, "failed": 3},
+    {"seeds": 2, "noises": (0.0,), "identifiers": {"pso": 1e-3, "de": 1e-2}, "fitness": ("rmse", "similarity")},
+    {"seeds": 1, "noises": (0.3,), "windows": ("0-0.7 s", "whole"), "report": "table2"},
 ])  # fmt: skip
 def test_studies_of_other_shapes(made, change):
     names = drawn(made(**change))
@@ -137,8 +136,9 @@ def test_studies_of_other_shapes(made, change):
 
 def test_all_runs_failed(made, tmp_path):
     results = made(seeds=1, noises=(0.0,), failed=15)
+    assert report_of(results).answer[0] == "No run has a result."
     names = written(results, tmp_path / "out")
-    assert names == ["values.csv", "values.tex", "runs.csv", "runs.tex", "reasons.csv", "reasons.tex", "report.md"]
+    assert names == ["report.md", *(f"{n}.{end}" for n in ("values", "runs", "reasons") for end in ("csv", "tex"))]
     assert "15 of them failed" in (tmp_path / "out" / "report.md").read_text()
 
 
@@ -150,7 +150,12 @@ def test_without_a_truth_there_are_values_and_costs_and_no_errors(made):
     names = drawn(unknown)
     assert {"values", "fixed_target", "data_profile", "convergence_fitness"} <= set(names)
     assert not {"success", "ecdf", "valley", "overview", "error_map", "ranks"} & set(names)
-    assert "Records of campaigns/mine." in report_of(unknown).facts
+    document = report_of(unknown)
+    assert "Records of campaigns/mine." in document.facts
+    medians = results.runs.groupby("identifier")["value"].median()
+    assert document.answer[0] == (
+        f"No truth is known. Lowest median fitness: {medians.idxmin()}, {medians.min():.6g} of similarity."
+    )
 
 
 def test_twenty_cases_have_critical_differences_and_realisations_their_bound(made, many_cases):
@@ -170,7 +175,7 @@ def test_seeds_on_one_record_are_no_noise_realisations(made):
 def test_names_of_a_file_cannot_break_the_page(made):
     results = made(seeds=1, identifiers={"a|b<script>": 1e-3, "A B": 1e-2, "a/b": 1e-2}, report="table1")
     report = report_of(results)
-    text = page(report, "x")
+    text = markdown(report)
     assert "<script>" not in text
     assert "a\\|b&lt;script&gt;" in text
     names = [t.name for t in report.tables]
@@ -178,8 +183,21 @@ def test_names_of_a_file_cannot_break_the_page(made):
     assert all(re.fullmatch(r"[a-z0-9_]+", n) for n in names)
 
 
-def test_the_papers_swarm_and_the_best_of_the_others_are_of_interest(made):
-    identifiers = {"pso, x": 1e-2, "pso+bobyqa": 1e-5, "a": 1e-1, "b": 1e-4, "c": 1e-3}
-    evidence = Evidence(made(seeds=3, noises=(0.0,), identifiers=identifiers))
-    assert evidence.interesting == ["pso, x", "pso+bobyqa", "b", "c"]
-    assert evidence.best_first == ["pso+bobyqa", "b", "c", "pso, x", "a"]
+def test_the_answer_is_that_of_the_main_table(made):
+    document = report_of(made(report="table1", seeds=3, noises=(0.0, 0.3)))
+    table = document.main[0].frame
+    for setting in ("noise-free", "0.3 deg/s"):
+        own = table[table["setting"] == setting]
+        best = own.loc[own["largest_median"].idxmin()]
+        said = f"{setting}: {best['variant']}, median largest error of a run {100 * best['largest_median']:.3g} %"
+        assert said in document.answer[0]
+        assert f"within {100 * best['largest_p95']:.3g} %" in document.answer[0]
+    paper = table[table["variant"] == "the paper's pso"].iloc[0]
+    assert re.search(rf"has {100 * paper['largest_median']:.3g} %; \d of 3 identifiers", document.answer[1])
+    assert document.answer[2] == "Complete: 90 of 90 runs."
+
+
+def test_without_the_paper_the_furthest_is_named(made):
+    answer = report_of(made(seeds=2, noises=(0.0,), identifiers={"near": 1e-6, "far": 1e-1})).answer
+    assert answer[0].startswith("Nearest to the truth: noise-free: near, ")
+    assert "Of 2 identifiers the furthest is far with" in answer[1]

@@ -32,6 +32,10 @@ class MadeResults:
         """Return the traces."""
         yield from self.kept
 
+    def text_of(self, digest: str) -> str:
+        """Return the text of a hash."""
+        return f"equations of {digest}"
+
 
 def paper_cases() -> list[dict[str, Any]]:
     """Return the five rows of Table I."""
@@ -95,6 +99,7 @@ def made() -> Callable[..., MadeResults]:
                         "value": trace.values[-1], "stopped": "budget used", "status": "done", "error": "",
                         "seconds": rng.uniform(), "train_rmse": 0.01, "train_s": 1.0 - trace.values[-1],
                         "train_s1": 0.99, "train_s2": 1.0, "holdout_rmse": np.nan, "started_at": "never",
+                        "model": "m", "versions": "v",
                     })  # fmt: skip
                     for i, p in enumerate(UNITS):
                         parameters.append({
@@ -116,6 +121,7 @@ def made() -> Callable[..., MadeResults]:
             "name": "made_up", "question": "Does the report hold?", "kind": "identify", "report": report, "text": "",
             "plant": "shell_transfer_arm", "effects": [], "cases": cases, "identifiers": list(identifiers),
             "versions": {"armid": "0"}, "n_planned": len(frame), "n_done": len(frame) - failed,
+            "n_failed": failed,
         }  # fmt: skip
         return MadeResults(frame, rows, study, traces)
 

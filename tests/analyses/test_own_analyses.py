@@ -1,0 +1,66 @@
+"""An analysis of a user: a plug-in, its contract, and its section in the report."""
+
+import matplotlib.pyplot as plt
+import pandas as pd
+import pytest
+
+from armid.cli.new import python_file
+from armid.contract.analysis import check_analysis, parts_of
+from armid.contract.check import check_thing
+from armid.errors import ArmidError
+from armid.registry import load_registry
+from armid.study.analyses.catalogue import ANALYSES, own_sections
+from armid.study.document import report_of
+
+
+def passed(function):
+    return {f.name: f.passed for f in check_analysis("mine", function)}
+
+
+def test_the_starting_file_is_a_plug_in_that_keeps_the_contract_and_becomes_a_section(made, tmp_path):
+    (tmp_path / "my_costs.py").write_text(python_file("analysis", "my_costs"), encoding="utf-8")
+    own = load_registry([f"{tmp_path / 'my_costs.py'}:my_costs"]).analyses
+    assert all(f.passed for f in check_thing("analyses", "my_costs", own["my_costs"]))
+    document = report_of(made(seeds=1, failed=1), own=own)
+    section = next(s for s in document.sections if s.title == "My costs")
+    assert [p.name for p in section.parts] == ["own_my_costs_medians_over_the_runs", "own_my_costs_every_run"]
+    table, figure = section.parts
+    assert table.frame["used"].notna().all()
+    assert figure.draw().axes
+    plt.close("all")
+
+
+def test_what_breaks_the_contract_is_found():
+    assert passed(lambda runs: runs.groupby("variant")["used"].median().to_frame()) == dict.fromkeys(
+        ("tables and figures", "leaves its argument alone", "deterministic"), True
+    )
+    assert not passed(lambda runs: runs.pop("used").to_frame())["leaves its argument alone"]
+    calls = iter(range(9))
+    assert not passed(lambda runs: pd.DataFrame({"n": [next(calls)]}))["deterministic"]
+    for broken in (lambda runs: runs["nothing"], lambda runs: 3.0, lambda: None):
+        assert passed(broken) == {"tables and figures": False}
+    with pytest.raises(ArmidError, match="is of type int: a function of runs is expected"):
+        check_analysis("mine", 3)
+
+
+def test_tables_and_figures_in_any_form():
+    frame = pd.DataFrame({"n": [1]})
+    figure, axes = plt.subplots()
+    assert parts_of("mine", None) == {}
+    assert list(parts_of("mine", frame)) == ["mine"]
+    assert parts_of("mine", (frame, axes)) == {"mine 1": frame, "mine 2": figure}
+    assert parts_of("mine", {"Cost": figure}) == {"Cost": figure}
+    plt.close(figure)
+
+
+def test_names_of_files_differ_and_an_index_of_names_is_a_column():
+    frame = pd.DataFrame({("n", "mean"): [1.5]}, index=pd.Index(["pso"], name="variant"))
+    (section,) = own_sections({"mine": lambda runs: {"A b": frame, "a_B": frame}}, pd.DataFrame())
+    assert [p.name for p in section.parts] == ["own_mine_a_b", "own_mine_a_b_2"]
+    assert [(c.header, c.digits) for c in section.parts[0].columns] == [("variant", ""), ("n mean", ".6g")]
+
+
+def test_names_of_ours_are_taken(made):
+    assert len({a.name for a in ANALYSES}) == len(ANALYSES)
+    with pytest.raises(ArmidError, match="analyses: 'ranks' is there already"):
+        report_of(made(seeds=1), own={"ranks": lambda runs: None})
