@@ -24,10 +24,19 @@ def test_a_whole_run(run, lowering_only, tmp_path):
     for words in ("What the records say", "What one more manoeuvre would buy", "p0, eta3 and n move together",
                   "One more record, "):  # fmt: skip
         assert words in ran.out
-    assert sorted(p.name for p in out.iterdir()) == ["identifiability.json", "profiles.png", "sensitivities.png"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "identifiability.html", "identifiability.json", "profiles.png", "profiles.svg", "sensitivities.png",
+        "sensitivities.svg",
+    ]  # fmt: skip
     told = json.loads((out / "identifiability.json").read_text())
     assert told["ranked_by"] == "worst"
     assert told["groups"][0]["names"] == ["p0", "eta3", "n"]
+    page = (out / "identifiability.html").read_text()
+    assert page.count("<svg") == 2
+    assert "p0, eta3 and n move together" in page
+    again = run("report", out)
+    assert (again.code, (out / "identifiability.html").read_text()) == (0, page)
+    assert "wrote identifiability.html" in again.out
 
 
 def test_at_a_point_and_from_a_result(run, lowering_only, tmp_path):

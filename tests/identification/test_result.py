@@ -1,16 +1,17 @@
 """The result as numbers for other programs, and as words for people."""
 
-import io
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from armid.estimation.identify import record_errors
-from armid.estimation.identify_document import error_table, parameter_table, remarks, result_of
+from armid.estimation.identify_document import details_of, identify_document, remarks, result_of
 from armid.problem.space import space_of
+from armid.report.html import html
+from armid.report.markdown import markdown
+from armid.report.terminal import show
 
 PARAMETER = {"value", "unit", "low", "high", "bound_low", "bound_high", "bound_active"}
 ERROR = {"rmse", "nrmse", "chi2_per_sample", "s", "s1", "s2"}
@@ -23,11 +24,15 @@ def partly_fixed(found, lowering, arm):
     return found(lowering, arm, space_of(arm, fixed={"k": 1.0}))
 
 
-def words(table):
-    """Return a table as text."""
-    text = io.StringIO()
-    Console(width=120, file=text).print(table)
-    return text.getvalue()
+@pytest.fixture
+def shown(capsys):
+    """Return a function that gives what a terminal shows of an identification."""
+
+    def text(found):
+        show(identify_document(result_of(found), details_of(found), {}, ""))
+        return capsys.readouterr().out
+
+    return text
 
 
 def test_has_the_declared_keys(lowering_found):
@@ -71,15 +76,15 @@ def test_each_record_s_errors(lowering_found):
     assert {k: v for k, v in told["lower_low_voltage.csv"].items() if k != "role"} == vars(holdout)
 
 
-def test_a_fixed_parameter_has_neither_interval_nor_bounds(partly_fixed):
+def test_a_fixed_parameter_has_neither_interval_nor_bounds(partly_fixed, shown):
     result = result_of(partly_fixed)
     nothing = dict.fromkeys(("low", "high", "bound_low", "bound_high"))
     assert result["parameters"]["k"] == {"value": 1.0, "unit": "1", "bound_active": False, **nothing}
     assert set(result["correlation"]) == {"p0", "eta3", "n"}
-    assert "fixed" in words(parameter_table(partly_fixed))
+    assert "fixed" in shown(partly_fixed)
 
 
-def test_what_is_not_known_is_null(lowering_found):
+def test_what_is_not_known_is_null(lowering_found, shown):
     lost = lowering_found.information.deviation.copy()
     lost[1] = np.inf
     unknown = np.where([[False], [True], [False], [False]], np.nan, lowering_found.information.correlation)
@@ -90,18 +95,32 @@ def test_what_is_not_known_is_null(lowering_found):
     assert set(result["correlation"]["k"].values()) == {None}
     assert result["error"]["holdout"] is None
     assert result["fitness_value"] is None
-    assert "not determined" in words(parameter_table(worse))
-    assert "holdout: none" in words(error_table(worse))
+    text = shown(worse)
+    assert "Not determined by these records: k." in text
+    assert "│ not determined" in text
+    assert "holdout: none" in text
     assert "k is not determined by these records." in remarks(worse)
+    lost = replace(worse, train=replace(worse.train, rmse=np.nan))
+    assert "Error (RMSE): not finite deg/s on the records fitted" in shown(lost)
 
 
-def test_tables_are_in_units_that_people_read(lowering_found):
-    text = words(parameter_table(lowering_found)) + words(error_table(lowering_found))
+def test_tables_are_in_units_that_people_read(lowering_found, shown):
+    text = shown(lowering_found)
     p0 = lowering_found.candidate[0]
     assert f"{p0 / 1e6:.6g}" in text
     assert "MPa" in text
     assert f"{np.degrees(lowering_found.train.rmse):.4g}" in text
     assert "RMSE, deg/s" in text
+
+
+def test_every_renderer_gives_the_answer_first(lowering_found, shown):
+    document = identify_document(result_of(lowering_found), details_of(lowering_found), {}, "armid report x")
+    first = document.answer[0]
+    assert first.startswith("p0 = ")
+    assert " ".join(shown(lowering_found).split()).startswith(" ".join(first.split()))
+    assert f"**{first}**" in markdown(document)
+    assert html(document).index(first) < html(document).index("<section")
+    assert html(document).count("<svg") == len(details_of(lowering_found)["records"])
 
 
 def test_remarks_name_bounds_pairs_divergence_and_noise(lowering_found):

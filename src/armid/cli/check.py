@@ -36,7 +36,6 @@ def check_command(thing: str, plugins: tuple[str, ...]) -> None:
 
 
 def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[Finding]"]:
-    """Return kind and name of a thing, and what its contract finds."""
     # simulations and pymoo, which other commands do not need
     from armid.contract.check import check_campaign, check_thing
     from armid.record import read_campaign

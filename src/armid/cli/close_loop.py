@@ -1,12 +1,13 @@
 """`armid close-loop`: what the declared model lacks, from the records of a campaign."""
 
 import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import click
 
-from armid.cli.options import examples, opened, problem_options
+from armid.cli.options import examples, opened, out_option, problem_options, seed_option
 from armid.cli.results import LOOP, refuse_unwritable, show_and_write
 from armid.errors import ArmidError, nearest
 from armid.model import Effect
@@ -18,22 +19,10 @@ from armid.model import Effect
     "armid close-loop CAMPAIGN --out DIR --plugin mine.py:my_drag",
 ))  # fmt: skip
 @problem_options
-@click.option(
-    "--out",
-    required=True,
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for report.html, report.md, report.json and the figures.",
-)
+@out_option("Folder for report.html, report.md, report.json and the figures.", required=True)
 @click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]")
 @click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
-@click.option(
-    "--seed",
-    default=1,
-    show_default=True,
-    type=click.IntRange(0),
-    help="Seed of everything random; searches here start from evenly spread points, so that nothing is.",
-)
+@seed_option
 @click.option("--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations.")
 def close_loop_command(
     campaign: Path, out: Path, effects: str, candidates: str, without: str, bounds: tuple[str, ...],
@@ -43,8 +32,8 @@ def close_loop_command(
 
     Identifies the declared model on the train records, tells whether what remains is more than noise, names the effect
     that is missing (or says that it cannot), adds it and identifies again, until nothing earns its parameters. Records
-    held out are simulated after the last decision. --bounds and --fix may name parameters of candidates too. Every
-    verdict exits with 0.
+    held out are simulated after the last decision. --bounds and --fix may name parameters of candidates too; searches
+    start from evenly spread points, so that nothing is random. Every verdict exits with 0.
     """
     from numpy.random import default_rng
 
@@ -53,26 +42,19 @@ def close_loop_command(
     from armid.loop.figures import figures_of
 
     given = opened(campaign, effects, plugins, window, bounds, fix)
-    wanted = looked_for(given.registry.effects, candidates, without)
+    effects_known = given.registry.effects
+    named = names_of(candidates, "--candidates", effects_known) or list(effects_known)
+    left_out = names_of(without, "--without", effects_known)
+    wanted = {name: effects_known[name] for name in named if name not in left_out}
     refuse_unwritable(out)
-    with Status() as status:
+    with status_line() as tell:
         found = close_loop(given.model, given.campaign, wanted, default_rng(seed), given.bounds, given.fixed,
-                           threads=threads, told=status.tell)  # fmt: skip
+                           threads=threads, told=tell)  # fmt: skip
     report, details = report_of(found), details_of(found)
     show_and_write(LOOP, report, details, out, figures_of(found, report, details))
 
 
-def looked_for(effects: dict[str, Effect], candidates: str, without: str) -> dict[str, Effect]:
-    """Return the effects that are candidates.
-
-    Raises ArmidError with the nearest valid name for one that is not known.
-    """
-    chosen = names_of(candidates, "--candidates", effects) or list(effects)
-    left_out = names_of(without, "--without", effects)
-    return {n: effects[n] for n in chosen if n not in left_out}
-
-
-def names_of(text: str, option: str, effects: dict[str, Effect]) -> list[str]:
+def names_of(text: str, option: str, effects: Mapping[str, Effect]) -> list[str]:
     """Return the names in a list of names, each of a known effect."""
     names = [n.strip() for n in text.split(",") if n.strip()]
     for name in names:
@@ -81,28 +63,16 @@ def names_of(text: str, option: str, effects: dict[str, Effect]) -> list[str]:
     return names
 
 
-class Status:
-    """Show on a terminal what is being done and for how long, nothing elsewhere."""
+@contextmanager
+def status_line() -> Iterator[Callable[[str], None]]:
+    """Yield what shows a sentence and the time on a terminal; nothing is shown elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda sentence: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    def __init__(self) -> None:
-        self.bar: Any = None
-
-    def __enter__(self) -> "Status":
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-            columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
-            self.bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            self.task = self.bar.add_task("identifying the declared model (compiling at first)", total=None)
-            self.bar.start()
-        return self
-
-    def tell(self, sentence: str) -> None:
-        """Show what is being done."""
-        if self.bar is not None:
-            self.bar.update(self.task, description=sentence)
-
-    def __exit__(self, *_: object) -> None:
-        if self.bar is not None:
-            self.bar.stop()
+    columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("identifying the declared model (compiling at first)", total=None)
+        yield lambda sentence: bar.update(task, description=sentence)

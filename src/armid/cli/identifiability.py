@@ -8,7 +8,16 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.options import accuracy_of, accuracy_option, assignments, examples, number, opened, problem_options
+from armid.cli.options import (
+    accuracy_of,
+    accuracy_option,
+    assignments,
+    examples,
+    number,
+    opened,
+    out_option,
+    problem_options,
+)
 from armid.cli.results import IDENTIFIABILITY, refuse_unwritable, show_and_write
 from armid.errors import ArmidError, nearest
 
@@ -29,31 +38,18 @@ LEAST_NOISE = 1e-15
     "--at", default="", metavar="NAME=VALUE,...", help="Examine this point, SI, instead of the least-squares estimate."
 )
 @click.option(
-    "--from",
-    "source",
-    type=click.Path(path_type=Path),
-    metavar="RESULT.json",
+    "--from", "source", type=click.Path(path_type=Path), metavar="RESULT.json",
     help="Examine the point that `armid identify` found.",
-)
+)  # fmt: skip
 @click.option(
-    "--noise",
-    type=float,
-    metavar="RMS",
+    "--noise", type=float, metavar="RMS",
     help="White noise to assume for every record, rad/s or m/s, in place of what was measured.",
-)
+)  # fmt: skip
 @click.option(
-    "--rank",
-    default="volume",
-    show_default=True,
-    metavar="volume|worst|shrinkage",
+    "--rank", default="volume", show_default=True, metavar="volume|worst|shrinkage",
     help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.",
-)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for identifiability.html, identifiability.json and the figures.",
-)
+)  # fmt: skip
+@out_option("Folder for identifiability.html, identifiability.json and the figures.")
 @accuracy_option
 def identifiability_command(
     campaign: Path, effects: str, bounds: tuple[str, ...], fix: tuple[str, ...], at: str, source: Path | None,

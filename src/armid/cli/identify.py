@@ -1,6 +1,8 @@
 """`armid identify`: parameters from the records of a campaign."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,9 @@ from armid.cli.options import (
     chosen,
     examples,
     opened,
+    out_option,
     problem_options,
+    seed_option,
     value_of,
 )
 from armid.cli.results import IDENTIFICATION, refuse_unwritable, show_and_write
@@ -26,41 +30,25 @@ from armid.cli.results import IDENTIFICATION, refuse_unwritable, show_and_write
 ))  # fmt: skip
 @problem_options
 @click.option(
-    "--identifier",
-    default="pso",
-    show_default=True,
+    "--identifier", default="pso", show_default=True,
     help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.",
-)
+)  # fmt: skip
 @click.option(
-    "--option",
-    "options",
-    multiple=True,
-    metavar="NAME=VALUE",
+    "--option", "options", multiple=True, metavar="NAME=VALUE",
     help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
     "0.5:0.3 for three phases), pso.velocity_limit=0.2. Repeatable.",
-)
+)  # fmt: skip
 @click.option("--fitness", default="similarity", show_default=True, help="What is minimised: see `armid list fitness`.")
 @click.option(
-    "--budget",
-    default=12_000,
-    show_default=True,
+    "--budget", default=12_000, show_default=True,
     help="Simulations: one candidate through all train records counts as one.",
-)
+)  # fmt: skip
 @click.option(
-    "--target",
-    type=float,
+    "--target", type=float,
     help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.",
-)
-@click.option(
-    "--seed",
-    default=1,
-    show_default=True,
-    type=click.IntRange(0),
-    help="Seed of everything random; the same gives the same result.",
-)
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder for report.html, result.json and the figures."
-)
+)  # fmt: skip
+@seed_option
+@out_option("Folder for report.html, result.json and the figures.")
 @accuracy_option
 def identify_command(
     campaign: Path, identifier: str, options: tuple[str, ...], fitness: str, effects: str, bounds: tuple[str, ...],
@@ -81,47 +69,32 @@ def identify_command(
 
     given = opened(campaign, effects, plugins, window, bounds, fix)
     space = given.space()
-    distance: Any = chosen(fitness, given.registry.fitness, "fitness")
+    distance = chosen(fitness, given.registry.fitness, "fitness")
     searcher = given.registry.identifier_of(identifier)
     searcher = searcher.with_options({n: value_of(v) for n, v in assignments(options, "--option").items()})
     goal = 1.0 - target if target is not None and fitness in SIMILARITIES else target
     refuse_unwritable(out)
-    with Progress(budget) as progress:
+    with progress_bar(budget) as update:
         found = run(given.campaign, given.model, space, distance, searcher, budget, seed, goal, accuracy_of(accuracy),
-                    progress.update)  # fmt: skip
+                    update)  # fmt: skip
     show_and_write(IDENTIFICATION, result_of(found), details_of(found), out, figures_of(found))
     if found.stopped == INTERRUPTED:
         sys.exit(130)
 
 
-class Progress:
-    """Show a bar with rate and time left on a terminal, nothing elsewhere."""
+@contextmanager
+def progress_bar(budget: int) -> Iterator[Callable[[Any], None]]:
+    """Yield what shows the state of a search, with rate and time left, on a terminal; nothing is shown elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda meter: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    def __init__(self, budget: int) -> None:
-        self.budget = budget
-        self.bar: Any = None
-
-    def __enter__(self) -> "Progress":
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-            self.bar = Progress(
-                TextColumn("{task.completed:.0f}/{task.total:.0f} simulations"), BarColumn(),
-                TextColumn("{task.fields[rate]:.0f}/s"), TimeRemainingColumn(),
-                TextColumn("best {task.fields[best]:.6g}"), console=Console(stderr=True),
-            )  # fmt: skip
-            self.task = self.bar.add_task("", total=self.budget, best=float("inf"), rate=0.0)
-            self.bar.start()
-        return self
-
-    def update(self, meter: Any) -> None:
-        """Move the bar."""
-        if self.bar is not None:
-            # rich does not know a speed until it has seen two steps
-            rate = self.bar.tasks[0].speed or 0.0
-            self.bar.update(self.task, completed=meter.used, best=meter.best_f, rate=rate)
-
-    def __exit__(self, *_: object) -> None:
-        if self.bar is not None:
-            self.bar.stop()
+    columns = (TextColumn("{task.completed:.0f}/{task.total:.0f} simulations"), BarColumn(),
+               TextColumn("{task.fields[rate]:.0f}/s"), TimeRemainingColumn(),
+               TextColumn("best {task.fields[best]:.6g}"))  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=budget, best=float("inf"), rate=0.0)
+        # rich does not know a speed until it has seen two steps
+        yield lambda m: bar.update(task, completed=m.used, best=m.best_f, rate=bar.tasks[0].speed or 0.0)

@@ -37,13 +37,11 @@ def list_command(what: str, plugins: tuple[str, ...]) -> None:
 
 
 def effect_texts(registry: Registry) -> list[str]:
-    """Return one paragraph for each effect."""
     plants = [p for plant in registry.plants.values() for p in (plant, *plant.variants)]
     return [effect_text(e, plants) for e in registry.effects.values()]
 
 
 def effect_text(effect: Effect, plants: Sequence[Plant] = ()) -> str:
-    """Return name, note, forms with equations, states and parameters, source, and the plants that take an effect."""
     several = len(effect.every_form) > 1
     lines = [f"{effect.name}: {effect.note or 'no note'}"]
     for form in effect.every_form:
@@ -54,7 +52,6 @@ def effect_text(effect: Effect, plants: Sequence[Plant] = ()) -> str:
 
 
 def form_lines(effect: Effect, with_source: bool) -> list[str]:
-    """Return ports with equations, states, switches and parameters of one form of an effect."""
     lines = [f"  port {port} += {returned_text(f)}" for port, f in effect.adds.items()]
     lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {returned_text(s.rate)}" for s in effect.states]
     lines += [f"  switch {g.name} where {returned_text(g.function)} comes to 0" for g in effect.guards]
@@ -90,12 +87,10 @@ def parameter_text(parameter: Parameter) -> str:
 
 
 def plant_texts(registry: Registry) -> list[str]:
-    """Return one paragraph for each plant and its siblings."""
     return [plant_text(p) for plant in registry.plants.values() for p in (plant, *plant.variants)]
 
 
 def plant_text(plant: Plant) -> str:
-    """Return everything that an effect or a campaign can name."""
     lines = [f"{plant.name} (recorded in {plant.output_unit}): {plant.note}"]
     lines += [f"  parameter {parameter_text(p)}" for p in plant.parameters]
     lines += [f"  state {s.name} [{s.unit}]" for s in plant.states]
@@ -111,12 +106,10 @@ def plant_text(plant: Plant) -> str:
 
 
 def fitness_texts(registry: Registry) -> list[str]:
-    """Return one line for each fitness."""
     return [f"{name}: {f.note or 'no note'} (records join by {f.join})" for name, f in registry.fitness.items()]
 
 
 def identifier_texts(registry: Registry) -> list[str]:
-    """Return one line for each identifier."""
     lines = []
     for name, i in registry.identifiers.items():
         kinds = {"gradient": i.uses_gradient, "stochastic": i.is_stochastic, "rmse or likelihood": i.needs_residuals}
@@ -126,7 +119,6 @@ def identifier_texts(registry: Registry) -> list[str]:
 
 
 def analysis_texts(registry: Registry) -> list[str]:
-    """Return one line for each analysis."""
     from armid.study.analyses.catalogue import ANALYSES
 
     own = [f"{name}: {(f.__doc__ or 'no note').strip().splitlines()[0]}" for name, f in registry.analyses.items()]

@@ -24,6 +24,17 @@ from armid.registry import load_registry
 
 CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifiers", "plant": "plants",
               "analysis": "analyses"}  # fmt: skip
+CAMPAIGN = "campaign"
+KINDS = (*CATALOGUES, CAMPAIGN)
+FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+Array = NDArray[np.float64]
+# The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
+INERTIA, FRICTION, NOISE = 0.05, 0.03, 0.01
+INTERVAL, N_SAMPLES = 0.005, 401
+# File -> size [N m] and frequency [Hz] of the drive, seed of the noise.
+RECORDS = {"synthetic_train.csv": (1.0, 0.8, 1), "synthetic_holdout.csv": (0.7, 1.3, 2)}
+FIRST_STEP = 0.1
+DIGITS = 6
 
 
 @click.command("new", short_help="Write a starting file of your own.", epilog=examples(
@@ -32,13 +43,9 @@ CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifi
 @click.argument("kind", metavar="effect|fitness|identifier|plant|analysis|campaign")
 @click.argument("name", metavar="NAME")
 @click.option(
-    "--out",
-    default=".",
-    show_default="this folder",
-    type=click.Path(path_type=Path),
-    metavar="FOLDER",
+    "--out", default=".", show_default="this folder", type=click.Path(path_type=Path), metavar="FOLDER",
     help="Folder to write to.",
-)
+)  # fmt: skip
 def new_command(kind: str, name: str, out: Path) -> None:
     """Write a commented starting file of your own that passes `armid check`.
 
@@ -46,6 +53,8 @@ def new_command(kind: str, name: str, out: Path) -> None:
     NAME. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
     say so. Nothing that exists is overwritten.
     """
+    from armid.record import write_campaign
+
     chosen(kind, dict.fromkeys(KINDS), "kind")
     taken = set(getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else ())
     if kind == "analysis":
@@ -56,29 +65,17 @@ def new_command(kind: str, name: str, out: Path) -> None:
     target = out / (f"{name}.py" if kind in CATALOGUES else name)
     if os.path.lexists(target):
         raise ArmidError(f"{target} exists already: another name, or another folder by --out, is expected")
-    write(kind, name, target)
+    if kind == CAMPAIGN:
+        write_campaign(target, campaign_text(name), synthetic_records())
+    else:
+        with NewFiles(out) as new_files:
+            new_files.path(target.name).write_text(python_file(kind, name), encoding="utf-8")
     print(f"wrote {target}; try: armid check {target}{f':{name}' if kind in CATALOGUES else ''}")
 
 
-def write(kind: str, name: str, target: Path) -> None:
-    """Write the file or the folder, whole or not at all."""
-    from armid.record import write_campaign
-
-    if kind not in CATALOGUES:
-        write_campaign(target, campaign_text(name), synthetic_records())
-        return
-    with NewFiles(target.parent) as files:
-        files.path(target.name).write_text(python_file(kind, name), encoding="utf-8")
-
-
-CAMPAIGN = "campaign"
-KINDS = ("effect", "fitness", "identifier", "plant", "analysis", CAMPAIGN)
-FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
-
-
-def template(file: str) -> Template:
-    """Return the text of a file of templates; `$name` in it stands for the user's name."""
-    return Template((files("armid.cli") / "templates" / file).read_text(encoding="utf-8"))
+def filled(file: str, **values: object) -> str:
+    """Return a file of templates with values in place of their `$name`."""
+    return Template((files("armid.cli") / "templates" / file).read_text(encoding="utf-8")).substitute(values)
 
 
 def python_file(kind: str, name: str) -> str:
@@ -86,7 +83,7 @@ def python_file(kind: str, name: str) -> str:
 
     kind: "effect", "fitness", "identifier" or "plant". name: of the thing, and of the file without its ending.
     """
-    return template(f"{kind}.py.txt").substitute(name=name)
+    return filled(f"{kind}.py.txt", name=name)
 
 
 def check_new_name(kind: str, name: str, taken: Collection[str] = ()) -> None:
@@ -106,12 +103,13 @@ def check_new_name(kind: str, name: str, taken: Collection[str] = ()) -> None:
         raise ArmidError(f"{kind} '{name}' is there already: another name is expected")
     if name in names_in(python_file(kind, "_")):
         raise ArmidError(f"{kind} '{name}' cannot have this name, which the file itself uses: another is expected")
-    if is_module(name):
+    module = find_spec(name)
+    installed = module is not None and str(module.origin).startswith(tuple(sysconfig.get_paths().values()))
+    if installed or name == "armid" or name in sys.stdlib_module_names:
         raise ArmidError(f"{kind} '{name}' cannot have this name: {name}.py would hide the module '{name}'")
 
 
 def names_in(text: str) -> set[str]:
-    """Return every name that a Python file uses or binds."""
     found = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Name):
@@ -123,27 +121,9 @@ def names_in(text: str) -> set[str]:
     return found
 
 
-def is_module(name: str) -> bool:
-    """Tell whether Python or a package that is installed has a module of the name."""
-    found = find_spec(name)
-    if name == __package__.partition(".")[0] or name in sys.stdlib_module_names:
-        return True
-    return found is not None and str(found.origin).startswith(tuple(sysconfig.get_paths().values()))
-
-
-Array = NDArray[np.float64]
-# The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
-INERTIA, FRICTION, NOISE = 0.05, 0.03, 0.01
-INTERVAL, N_SAMPLES = 0.005, 401
-# File -> size [N m] and frequency [Hz] of the drive, seed of the noise.
-RECORDS = {"synthetic_train.csv": (1.0, 0.8, 1), "synthetic_holdout.csv": (0.7, 1.3, 2)}
-FIRST_STEP = 0.1
-DIGITS = 6
-
-
 def campaign_text(name: str) -> str:
     """Return the text of campaign.toml."""
-    return template("campaign.toml.txt").substitute(name=name, inertia=INERTIA, friction=FRICTION, noise=NOISE)
+    return filled("campaign.toml.txt", name=name, inertia=INERTIA, friction=FRICTION, noise=NOISE)
 
 
 def synthetic_records() -> dict[str, dict[str, Array]]:

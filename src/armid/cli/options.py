@@ -1,7 +1,7 @@
 """Options that several commands share, and how their texts become values."""
 
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from armid.errors import ArmidError, nearest
-from armid.model import Model
+from armid.model import Effect, Model
 from armid.registry import Registry, load_registry
 
 if TYPE_CHECKING:
@@ -39,7 +39,16 @@ bounds_option = click.option(
     "--bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Free a parameter between bounds, SI. Repeatable."
 )
 fix_option = click.option("--fix", multiple=True, metavar="NAME=VALUE", help="Fix a parameter, SI. Repeatable.")
+seed_option = click.option(
+    "--seed", default=1, show_default=True, type=click.IntRange(0),
+    help="Seed of everything random; the same gives the same result.",
+)  # fmt: skip
 window_option = click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
+
+
+def out_option(text: str, required: bool = False) -> Callable[[Any], Any]:
+    """Return --out DIR with its help."""
+    return click.option("--out", required=required, type=click.Path(path_type=Path), metavar="DIR", help=text)
 
 
 def problem_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -83,7 +92,11 @@ def opened(
     read = read_campaign(campaign, registry.plants, registry.effects)
     if window:
         read = read.with_window(*interval(window, "--window"))
-    model = model_of(read, effects, registry)
+    model = Model(read.plant)
+    for text in [*read.effects, *(name.strip() for name in effects.split(",") if name.strip())]:
+        name, _, form = text.partition(":")
+        effect: Effect = chosen(name, registry.effects, "effect")
+        model = model + (effect.in_form(form) if form else effect)
     return Opened(registry, read, model, intervals(bounds, "--bounds"), fixed_values(fix, model))
 
 
@@ -161,7 +174,7 @@ def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float
     return {name: interval(value, f"{option} {name}") for name, value in found.items()}
 
 
-def chosen(name: str, known: dict[str, object], what: str) -> object:
+def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
     """Return what is registered under a name.
 
     Raises ArmidError with the nearest valid name.
@@ -176,16 +189,3 @@ def accuracy_of(text: str) -> str | None:
     if text not in ("standard", "fine", "auto"):
         raise ArmidError(f"--accuracy '{text}': {nearest(text, ('standard', 'fine', 'auto'))}")
     return None if text == "auto" else text
-
-
-def model_of(campaign: "Campaign", effects: str, registry: Registry) -> Model:
-    """Return the campaign's model with further effects added."""
-    model = Model(campaign.plant)
-    wanted = [*campaign.effects, *(name.strip() for name in effects.split(",") if name.strip())]
-    for text in wanted:
-        name, _, form = text.partition(":")
-        effect = registry.effects.get(name)
-        if effect is None:
-            raise ArmidError(f"effect '{name}' is not known: {nearest(name, registry.effects)}")
-        model = model + (effect.in_form(form) if form else effect)
-    return model

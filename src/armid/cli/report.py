@@ -46,7 +46,6 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
 
 
 def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
-    """Write the page, tables and figures of a study, and print its main table."""
     from armid.report.files import write_files
     from armid.report.html import html
     from armid.report.markdown import markdown

@@ -15,6 +15,7 @@ from armid.cli.options import (
     examples,
     numbers,
     opened,
+    out_option,
     plugin_option,
 )
 from armid.cli.results import NewFiles
@@ -32,7 +33,7 @@ SIGNAL = {"rad/s": "angular_velocity_rad_s", "m/s": "velocity_m_s"}
     "armid simulate CAMPAIGN --effects coulomb --set coulomb.level=40 --out DIR",
 ))  # fmt: skip
 @campaign_argument
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write to.")
+@out_option("Folder to write to.", required=True)
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, SI. Repeatable.")
 @effects_option
 @accuracy_option
@@ -81,7 +82,6 @@ def candidate_of(model: Model, campaign: Campaign, given: dict[str, float]) -> A
 
 
 def simulated_table(record: Record, model: Model, candidate: Array, accuracy: str | None) -> dict[str, Array]:
-    """Return header -> values of one record, over its whole length from t = 0 on."""
     parts = [simulated_piece(p, record, model, candidate, accuracy) for p in record.whole_pieces]
     table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     shown = table["time_s"] > -1e-3 * record.manoeuvre.interval
@@ -91,7 +91,6 @@ def simulated_table(record: Record, model: Model, candidate: Array, accuracy: st
 def simulated_piece(
     piece: Piece, record: Record, model: Model, candidate: Array, accuracy: str | None
 ) -> dict[str, Array]:
-    """Return header -> values of one piece."""
     wanted = accuracy or accuracy_against(record.noise.rms, model)
     calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted, spans=False)
     run = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)

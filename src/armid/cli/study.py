@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armid.cli.options import examples, plugin_option
+from armid.cli.options import examples, out_option, plugin_option
 
 if TYPE_CHECKING:
     from armid.study.runner import Ending
@@ -23,22 +23,15 @@ MOST_NAMED = 300
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("--jobs", type=click.IntRange(1), help="Worker processes. [default: as many as processors]")
 @click.option("--dask", metavar="tcp://HOST:PORT", help="Scheduler of a Dask cluster, in place of own processes.")
+@out_option("Folder of the results. [default: results/NAME]")
 @click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder of the results. [default: results/NAME]"
-)
-@click.option(
-    "--time-limit",
-    default=600.0,
-    show_default=True,
-    metavar="S",
+    "--time-limit", default=600.0, show_default=True, metavar="S",
     help="A run that takes longer is stopped and counts as failed, s.",
-)
+)  # fmt: skip
 @click.option(
-    "--only",
-    default="*",
-    metavar="CASE/IDENTIFIER",
+    "--only", default="*", metavar="CASE/IDENTIFIER",
     help="Run these only; * and ? stand for any letters, CASE alone for all identifiers.",
-)
+)  # fmt: skip
 @click.option("--retry", is_flag=True, help="Perform failed runs anew.")
 @plugin_option
 def study_command(
@@ -70,7 +63,6 @@ def study_command(
 
 
 def show_table(folder: Path) -> None:
-    """Print the main table of the report, the rest of which takes longer."""
     from armid.report.terminal import show
     from armid.study.document import summary_of
     from armid.study.results import load_study

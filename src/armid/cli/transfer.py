@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from armid.cli.options import examples, plugin_option
+from armid.cli.options import examples, out_option, plugin_option
 from armid.cli.results import NewFiles, refuse_unwritable
 from armid.errors import ArmidError
 from armid.registry import load_registry
@@ -20,7 +20,7 @@ def import_group() -> None:
 
 @import_group.command("emps", epilog=examples("armid import emps FOLDER --out studies/campaigns/emps"))
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="New folder to write.")
+@out_option("New folder to write.", required=True)
 @plugin_option
 def emps(folder: Path | None, out: Path, plugins: tuple[str, ...]) -> None:
     """Import EMPS (Janot, Gautier, Brunot 2019): a linear axis with its drive, train and holdout record.
@@ -38,7 +38,7 @@ def emps(folder: Path | None, out: Path, plugins: tuple[str, ...]) -> None:
 @import_group.command("dfki", short_help="Import DFKI's torque-limited simple pendulum: a rotary axis that swings up.",
                       epilog=examples("armid import dfki FOLDER --out studies/campaigns/dfki"))  # fmt: skip
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="New folder to write.")
+@out_option("New folder to write.", required=True)
 @click.option("--holdout", metavar="NAME", help="Record to hold out, ddp or direct_collocation; else both train.")
 @plugin_option
 def dfki(folder: Path, out: Path, holdout: str | None, plugins: tuple[str, ...]) -> None:

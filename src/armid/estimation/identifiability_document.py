@@ -1,9 +1,10 @@
 """The document of an examination, and what is stored of it: identifiability.json."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.estimation.collinearity import Group, collinearity_index, normalised
 from armid.estimation.design import Offer
@@ -17,6 +18,7 @@ from armid.report.common import finite, listed, made_section
 from armid.report.document import Column, Document, Figure, Section, Sentences, Table, table
 from armid.units import SHOWN, shown
 
+Array = NDArray[np.float64]
 PACKAGES = ("armid", "numpy", "scipy", "numba")
 MOST_OFFERS, MOST_COLUMNS, MOST_NAMED = 8, 5, 6
 # The point that was given is away from the minimum when a step there is more standard deviations than this.
@@ -38,14 +40,7 @@ def identifiability_document(
 ) -> Document:
     """Build the document of an examination from identifiability.json.
 
-    Parameters
-    ----------
-    result, details : dict
-        identifiability.json; and `made_by`, where it is known.
-    svgs : dict
-        Name -> SVG of those of `FIGURES` that are stored.
-    again : str
-        The command that makes the page again.
+    details: `made_by`, where it is known; for the others see `identify_document`.
     """
     figures = {name: (Figure(name, *FIGURES[name], svg=svg),) for name, svg in svgs.items()}
     answer, remarks = answer_and_remarks(result)
@@ -165,7 +160,8 @@ def most_helped(names: list[str], offers: list[Mapping[str, Any]]) -> list[str]:
 
 def result_of(found: Examination) -> dict[str, Any]:
     """Return everything of an examination that JSON can hold, SI throughout; what is not known is null."""
-    names, correlation = found.space.free_names, found.information.correlation
+    names, correlation, fisher = found.space.free_names, found.information.correlation, found.information.fisher
+    levels = {r.record.file: level for r, level in zip(found.replays, found.information.levels, strict=True)}
     return {
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
@@ -175,19 +171,19 @@ def result_of(found: Examination) -> dict[str, Any]:
         "parameters": {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)},
         "fixed": {n: float(v) for n, v in zip(found.space.names, found.space.fixed, strict=True) if not np.isnan(v)},
         "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
-        "collinearity_index": collinearity_index(found.information.fisher),
-        "groups": [
-            {"names": list(g.names), "index": g.index,
-             "direction": dict(zip(g.names, (float(d) for d in g.direction), strict=True))} for g in found.groups
-        ],
-        "directions": directions(found),
-        "records": {
-            r.record.file: {"level": level.rms, "effective_fraction": level.effective_fraction,
-                            "from_residual": level.from_residual, "assumed": level.assumed}
-            for r, level in zip(found.replays, found.information.levels, strict=True)
-        },
+        "collinearity_index": collinearity_index(fisher),
+        "groups": [{"names": list(g.names), "index": g.index, "direction": by_name(g.names, g.direction)}
+                   for g in found.groups],
+        "directions": directions(fisher, names),
+        "records": {file: {"level": level.rms, "effective_fraction": level.effective_fraction,
+                           "from_residual": level.from_residual, "assumed": level.assumed}
+                    for file, level in levels.items()},
         "ranked_by": found.ranked_by,
-        "offers": [offer_entry(found, offer) for offer in found.offers],
+        "offers": [
+            {"manoeuvre": dict(o.feasible.keys), "words": o.feasible.name, "gain": o.gain, "deviation": {
+                name: {"before": finite(o.before[i]), "after": finite(o.after[i])} for i, name in enumerate(names)
+            }} for o in found.offers
+        ],
         "remarks": remarks(found),
         "versions": versions_of(PACKAGES),
     }  # fmt: skip
@@ -197,84 +193,57 @@ def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
     """Return what is known of one free parameter; `value` is where sensitivities were taken."""
     value, half = float(found.x[i]), float(found.information.half_width[i])
     return {
-        "value": value,
-        "unit": profile.unit,
-        "deviation": finite(found.information.deviation[i]),
-        "low": finite(value - half),
-        "high": finite(value + half),
-        "bound_low": profile.box[0],
-        "bound_high": profile.box[1],
-        "bound_active": bool(found.at_bound[i]),
+        "value": value, "unit": profile.unit, "deviation": finite(found.information.deviation[i]),
+        "low": finite(value - half), "high": finite(value + half),
+        "bound_low": profile.box[0], "bound_high": profile.box[1], "bound_active": bool(found.at_bound[i]),
         "profile": {
-            "minimum": profile.estimate,
-            "low": profile.low,
-            "high": profile.high,
-            "bounded_low": profile.bounded[0],
-            "bounded_high": profile.bounded[1],
+            "minimum": profile.estimate, "low": profile.low, "high": profile.high,
+            "bounded_low": profile.bounded[0], "bounded_high": profile.bounded[1],
             "agrees_with_curvature": profile.agrees,
-            "values": profile.values.tolist(),
-            "rise": profile.rise.tolist(),
+            "values": profile.values.tolist(), "rise": profile.rise.tolist(),
         },
-    }
+    }  # fmt: skip
 
 
-def directions(found: Examination) -> list[dict[str, Any]]:
+def directions(fisher: Array, names: Sequence[str]) -> list[dict[str, Any]]:
     """Return the eigenvectors of the information matrix scaled to a diagonal of 1, the weakest first."""
-    scaled, seen = normalised(found.information.fisher)
-    names = [n for n, s in zip(found.space.free_names, seen, strict=True) if s]
-    values, vectors = np.linalg.eigh(scaled) if names else (np.empty(0), np.empty((0, 0)))
-    return [
-        {"eigenvalue": float(value), "vector": dict(zip(names, vector.tolist(), strict=True))}
-        for value, vector in zip(values, vectors.T, strict=True)
-    ]
+    scaled, seen = normalised(fisher)
+    kept = [n for n, s in zip(names, seen, strict=True) if s]
+    values, vectors = np.linalg.eigh(scaled) if kept else (np.empty(0), np.empty((0, 0)))
+    pairs = zip(values, vectors.T, strict=True)
+    return [{"eigenvalue": float(value), "vector": by_name(kept, vector)} for value, vector in pairs]
 
 
-def offer_entry(found: Examination, offer: Offer) -> dict[str, Any]:
-    """Return one offer: the manoeuvre as campaign.toml would say it, and the deviations before and after."""
-    return {
-        "manoeuvre": dict(offer.feasible.keys),
-        "words": offer.feasible.name,
-        "gain": offer.gain,
-        "deviation": {
-            name: {"before": finite(offer.before[i]), "after": finite(offer.after[i])}
-            for i, name in enumerate(found.space.free_names)
-        },
-    }
+def by_name(names: Sequence[str], values: Array) -> dict[str, float]:
+    return dict(zip(names, (float(v) for v in values), strict=True))
 
 
 def remarks(found: Examination) -> list[str]:
-    """Return what a reader must know, one sentence each."""
+    """Return what a reader must know, one sentence each: groups first, the best offer last."""
+    names, fisher = found.space.free_names, found.information.fisher
     said = [group_remark(found, group) for group in found.groups]
     said += [f"{p.name} is not seen at all in these records: any value in the box leaves them as they are."
-             for p in found.profiles if not found.information.fisher.diagonal()[index(found, p)] > 0.0]  # fmt: skip
+             for p in found.profiles if not fisher[names.index(p.name), names.index(p.name)] > 0.0]  # fmt: skip
     said += [text for p in found.profiles if (text := profile_remark(found, p))]
-    return said + point_remarks(found) + start_remarks(found) + level_remarks(found) + offer_remarks(found)
-
-
-def index(found: Examination, profile: Profile) -> int:
-    """Return the place of a profile's parameter among the free ones."""
-    return found.space.free_names.index(profile.name)
+    said += point_remarks(found) + level_remarks(found)
+    if found.offers:
+        return [*said, f"One more record, {offer_text(found, found.offers[0])}."]
+    return [*said, "No further manoeuvre was found that the machine could make."]
 
 
 def group_remark(found: Examination, group: Group) -> str:
-    """Return the sentence for parameters that move together."""
-    places = [found.space.free_names.index(n) for n in group.names]
-    leader = places[int(np.argmax(np.abs(group.direction)))]
-    followers = [
-        f"{move_text(found, i, float(d))} of {found.space.free_names[i]}"
-        for i, d in zip(places, group.direction, strict=True) if i != leader
-    ]  # fmt: skip
-    name = found.space.free_names[leader]
+    span = (found.space.high - found.space.low)[found.space.free]
+    moves: list[str] = []
+    leader = int(np.argmax(np.abs(group.direction)))
+    for name, share in zip(group.names, group.direction, strict=True):
+        i = found.space.free_names.index(name)
+        change = 0.01 * (1.0 if len(moves) == leader else float(share)) * float(span[i])
+        text = deviation_text(found.space, i, abs(change), float(found.x[i]))
+        moves.append(f"{'+' if change >= 0.0 else '-'}{text} of {name}")
+    followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
-            f"for by the others to within {100 / group.index:.2g} %; {move_text(found, leader, 1.0)} of {name} goes "
-            f"next to unseen with {listed(followers)}.")  # fmt: skip
-
-
-def move_text(found: Examination, i: int, share: float) -> str:
-    """Return a change of a free parameter that belongs to a direction, its leader moved by 1 % of its range."""
-    span = float((found.space.high - found.space.low)[found.space.free][i])
-    change = 0.01 * share * span
-    return ("+" if change >= 0.0 else "-") + deviation_text(found.space, i, abs(change), float(found.x[i]))
+            f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
+            f"{followers}.")  # fmt: skip
 
 
 def profile_remark(found: Examination, profile: Profile) -> str:
@@ -299,29 +268,20 @@ def profile_remark(found: Examination, profile: Profile) -> str:
 
 
 def point_remarks(found: Examination) -> list[str]:
-    """Return what is to be said of a point that was given."""
-    if not found.given:
-        return []
+    """Return what is to be said of a point that was given, else where the noise of measured starts widens intervals."""
+    names, deviation = found.space.free_names, found.information.deviation
     with np.errstate(invalid="ignore", divide="ignore"):
-        away = np.abs(found.x - found.minimum) / found.information.deviation
-    away = np.nan_to_num(away, nan=0.0, posinf=0.0)
-    if away.max() <= AWAY:
-        return []
-    name = found.space.free_names[int(away.argmax())]
-    return [f"The point that was given is not the least-squares minimum: {name} is {away.max():.3g} standard "
-            "deviations from it; the profiles are drawn about the minimum, all else is at the point."]  # fmt: skip
-
-
-def start_remarks(found: Examination) -> list[str]:
-    """Return a sentence where the noise of measured starts widens the intervals."""
-    told = np.array([p.deviation for p in found.profiles])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        wider = np.nan_to_num(found.information.deviation / told, nan=1.0, posinf=1.0)
-    if found.given or wider.max() < WIDENS:
-        return []
-    name = found.space.free_names[int(wider.argmax())]
-    return [f"Records start from measured states, whose noise widens the deviation of {name} {wider.max():.3g} times; "
-            "the profiles do not show it."]  # fmt: skip
+        away = np.nan_to_num(np.abs(found.x - found.minimum) / deviation, nan=0.0, posinf=0.0)
+        wider = deviation / np.array([p.deviation for p in found.profiles])
+    wider = np.nan_to_num(wider, nan=1.0, posinf=1.0)
+    if found.given and away.max() > AWAY:
+        return [f"The point that was given is not the least-squares minimum: {names[int(away.argmax())]} is "
+                f"{away.max():.3g} standard deviations from it; the profiles are drawn about the minimum, all else is "
+                "at the point."]  # fmt: skip
+    if not found.given and wider.max() >= WIDENS:
+        return [f"Records start from measured states, whose noise widens the deviation of {names[int(wider.argmax())]} "
+                f"{wider.max():.3g} times; the profiles do not show it."]  # fmt: skip
+    return []
 
 
 def level_remarks(found: Examination) -> list[str]:
@@ -334,7 +294,6 @@ def level_remarks(found: Examination) -> list[str]:
 
 
 def level_text(level: Level, unit: str, noise: float) -> str:
-    """Return what one record is weighed by."""
     value, name = shown(level.rms, unit)
     if level.assumed:
         return (f"no noise is known, so white noise of {value:.3g} {name} rms is ASSUMED: intervals scale with it, "
@@ -347,13 +306,6 @@ def level_text(level: Level, unit: str, noise: float) -> str:
     share = level.effective_fraction
     coloured = "" if share > 0.9 else f", coloured: one sample in {1 / share:.2g} is new"
     return f"noise {value:.2g} {name} rms{coloured}."
-
-
-def offer_remarks(found: Examination) -> list[str]:
-    """Return the best offer in one line."""
-    if not found.offers:
-        return ["No further manoeuvre was found that the machine could make."]
-    return [f"One more record, {offer_text(found, found.offers[0])}."]
 
 
 def offer_text(found: Examination, offer: Offer) -> str:

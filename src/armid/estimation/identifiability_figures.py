@@ -1,6 +1,6 @@
 """Figures of an examination: the profiles, and what the records see of each parameter."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -63,9 +63,8 @@ def draw_profile(axis: Any, profile: Profile) -> None:
             axis.axvline(bound * factor, color=GREY, lw=3.0, label="bound of the box")
     axis.plot(profile.estimate * factor, 0.0, color=LIMIT, marker="D", ms=6, ls="none", clip_on=False, zorder=5,
               label="estimate")  # fmt: skip
-    axis.set_xlim(left * factor, right * factor)
-    axis.set_ylim(0.0, TOP)
-    axis.set_xlabel(f"{profile.name} [{unit}]" if unit != "1" else profile.name)
+    name = f"{profile.name} [{unit}]" if unit != "1" else profile.name
+    axis.set(xlim=(left * factor, right * factor), ylim=(0.0, TOP), xlabel=name)
     axis.ticklabel_format(axis="x", useOffset=False, style="plain")
     axis.locator_params(axis="x", nbins=4)
 
@@ -105,10 +104,17 @@ def sensitivity_figure(found: Examination) -> Any:
     figure = pyplot().figure(figsize=(11.2, height + 2.6 * rows + 0.8), layout="constrained")
     parts = figure.subfigures(2, 1, height_ratios=(height, 2.6 * rows)) if rows else [figure]
     left, right = parts[0].subplots(1, 2)
-    draw_correlation(left, found)
+    font = {"size": 11 if n <= 6 else 8}
+    draw_map(left, found, found.information.correlation, found.space.free_names, "correlation of estimates",
+             vmin=-1, vmax=1, cmap="vlag", annot=True, fmt=".2f", annot_kws=font, square=True)  # fmt: skip
     axes = list(parts[1].subplots(rows, 2, squeeze=False).flat) if rows else [right]
     if rows:
-        draw_shares(right, found, jacobians)
+        # how much of the information on each parameter comes from each record
+        squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
+        shares = 100 * squares / np.where(squares.sum(axis=0) > 0.0, squares.sum(axis=0), 1.0)
+        files = [r.record.file.removesuffix(".csv") for r in found.replays]
+        draw_map(right, found, shares, files, "share of the information [%]", vmin=0, vmax=100, cmap="Blues", fmt=".0f",
+                 annot=len(files) <= 14, annot_kws={"size": 11 if len(files) <= 8 else 8})  # fmt: skip
     for axis, i in zip(axes, order, strict=False):
         draw_sensitivities(axis, found, i, jacobians[i])
     for axis in axes[len(order) :]:
@@ -127,42 +133,14 @@ def telling(found: Examination, jacobians: list[Array]) -> list[int]:
     return list(seen.values())[:MOST_RECORDS]
 
 
-def draw_correlation(axis: Any, found: Examination) -> None:
-    """Draw the correlation of the estimates as a map with numbers."""
+def draw_map(axis: Any, found: Examination, values: Array, rows: Sequence[str], label: str, **looks: Any) -> None:
+    """Draw a map with numbers, (n_rows, n_free), names turned so that the longest stays off its neighbours."""
     import seaborn as sns
 
     names = found.space.free_names
-    values = found.information.correlation
-    font = {"size": 11 if len(names) <= 6 else 8}
-    sns.heatmap(
-        values, vmin=-1, vmax=1, cmap="vlag", annot=True, fmt=".2f", annot_kws=font, square=True, ax=axis,
-        xticklabels=names, yticklabels=names, cbar_kws={"label": "correlation of estimates"},
-    )  # fmt: skip
-    name_ticks(axis, names)
-
-
-def draw_shares(axis: Any, found: Examination, jacobians: list[Array]) -> None:
-    """Draw how much of the information on each parameter comes from each record, in percent."""
-    import seaborn as sns
-
-    squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
-    total = squares.sum(axis=0)
-    shares = 100 * squares / np.where(total > 0.0, total, 1.0)
-    font = {"size": 11 if len(jacobians) <= 8 else 8}
-    names = found.space.free_names
-    files = [r.record.file.removesuffix(".csv") for r in found.replays]
-    sns.heatmap(
-        shares, vmin=0, vmax=100, cmap="Blues", annot=len(files) <= 14, fmt=".0f", annot_kws=font, ax=axis,
-        xticklabels=names, yticklabels=files, cbar_kws={"label": "share of the information [%]"},
-    )  # fmt: skip
-    name_ticks(axis, names)
-
-
-def name_ticks(axis: Any, names: tuple[str, ...]) -> None:
-    """Turn the labels of a map so that the longest does not reach into its neighbours."""
-    long = max(len(n) for n in names) > 8 or len(names) > 8
+    sns.heatmap(values, xticklabels=names, yticklabels=rows, cbar_kws={"label": label}, ax=axis, **looks)
     axis.tick_params(axis="both", labelrotation=0, length=0)
-    if long:
+    if max(len(n) for n in names) > 8 or len(names) > 8:
         axis.set_xticklabels(names, rotation=30, ha="right", rotation_mode="anchor")
 
 
@@ -175,9 +153,7 @@ def draw_sensitivities(axis: Any, found: Examination, i: int, jacobian: Array) -
         axis.plot(replay.times, curve, lw=1.7, label=name, **look(j))
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
     axis.set_title(f"{replay.record.file}: sensitivities, each scaled to 1", fontsize="medium")
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("scaled, 1")
-    axis.set_ylim(-1.08, 1.08)
+    axis.set(xlabel="time [s]", ylabel="scaled, 1", ylim=(-1.08, 1.08))
     axis.margins(x=0.01)
 
 

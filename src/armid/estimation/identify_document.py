@@ -146,7 +146,6 @@ def correlation_table(correlation: Mapping[str, Mapping[str, float | None]]) -> 
 
 
 def train_and_holdout(result: Mapping[str, Any]) -> Table:
-    """Return the errors on train and holdout, with the number of records."""
     roles = [e["role"] for e in result["error_by_record"].values()]
     rows = [(f"{role}: none" if e is None else f"{role} ({roles.count(role)})", e)
             for role, e in result["error"].items()]  # fmt: skip
@@ -154,7 +153,6 @@ def train_and_holdout(result: Mapping[str, Any]) -> Table:
 
 
 def fit_section(details: Mapping[str, Any], unit: str) -> Section:
-    """Return measured and simulated signal of each record."""
     figures = tuple(
         Figure(f"r{i}", f"{r['file']} ({r['role']})", "", partial(record_figure, r["curves"], unit))
         for i, r in enumerate(details["records"])
@@ -169,18 +167,17 @@ def fit_section(details: Mapping[str, Any], unit: str) -> Section:
 
 def result_of(found: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
-    names = found.information.names
-    correlation = found.information.correlation
+    names, correlation = found.information.names, found.information.correlation
     replays = (*found.train_replays, *found.holdout_replays)
+    by_record = {r.record.file: {"role": r.record.role, **errors(record_errors(r, found.candidate))} for r in replays}
+    noises = {r.record.file: r.record.noise for r in replays}
     return {
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
         "effects": [e.name for e in found.model.effects],
         "parameters": {name: entry(found, i) for i, name in enumerate(found.space.names)},
-        "error": {"train": errors(found.train), "holdout": errors(found.holdout)},
-        "error_by_record": {
-            r.record.file: {"role": r.record.role, **(errors(record_errors(r, found.candidate)) or {})} for r in replays
-        },
+        "error": {"train": errors(found.train), "holdout": None if found.holdout is None else errors(found.holdout)},
+        "error_by_record": by_record,
         "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
         "unit": found.campaign.unit,
         "fitness": found.fitness.name,
@@ -191,10 +188,7 @@ def result_of(found: Identification) -> dict[str, Any]:
         "failed": found.n_failed,
         "stopped": found.stopped,
         "seed": found.seed,
-        "noise": {
-            r.record.file: {"rms": r.record.noise.rms, "mean": r.record.noise.mean, "source": r.record.noise.source}
-            for r in replays
-        },
+        "noise": {file: {"rms": n.rms, "mean": n.mean, "source": n.source} for file, n in noises.items()},
         "engine_error": max(r.engine_error for r in found.train_replays),
         "model": str(found.model),
         "versions": versions(),
@@ -208,23 +202,21 @@ def versions() -> dict[str, str]:
 
 def entry(found: Identification, i: int) -> dict[str, Any]:
     """Return value, interval, bounds and flag of one parameter; a fixed one has neither interval nor bounds."""
-    space, free = found.space, bool(found.space.free[i])
-    half = found.information.half_width[found.information.names.index(space.names[i])] if free else 0.0
-    value = float(found.candidate[i])
-    return {
-        "value": value,
-        "unit": space.units[i],
-        "low": finite(value - half) if free else None,
-        "high": finite(value + half) if free else None,
-        "bound_low": float(space.low[i]) if free else None,
-        "bound_high": float(space.high[i]) if free else None,
-        "bound_active": bool(found.at_bound[i]),
-    }
+    space, value, ends = (
+        found.space,
+        float(found.candidate[i]),
+        dict.fromkeys(("low", "high", "bound_low", "bound_high")),
+    )
+    if space.free[i]:
+        half = found.information.half_width[found.information.names.index(space.names[i])]
+        ends = {"low": finite(value - half), "high": finite(value + half),
+                "bound_low": float(space.low[i]), "bound_high": float(space.high[i])}  # fmt: skip
+    return {"value": value, "unit": space.units[i], **ends, "bound_active": bool(found.at_bound[i])}
 
 
-def errors(found: Errors | None) -> dict[str, float | None] | None:
+def errors(found: Errors) -> dict[str, float | None]:
     """Return errors with null for what is not finite."""
-    return None if found is None else {k: finite(v) for k, v in asdict(found).items()}
+    return {k: finite(v) for k, v in asdict(found).items()}
 
 
 def details_of(found: Identification) -> dict[str, Any]:
@@ -232,67 +224,58 @@ def details_of(found: Identification) -> dict[str, Any]:
 
     Of long records each curve keeps the samples that `thinned` chooses.
     """
-    replays = (*found.train_replays, *found.holdout_replays)
+    replays, records = (*found.train_replays, *found.holdout_replays), []
+    for replay in replays[:MOST_RECORDS]:
+        measured, simulated = replay.measured, replay.signal(found.candidate[np.newaxis])[0]
+        curves = {"measured": measured, "simulated": simulated, "residual": measured - simulated}
+        records.append({
+            "file": replay.record.file, "role": replay.record.role, "noise_rms": replay.record.noise.rms,
+            "n_samples": len(measured), "curves": {name: curve_entry(replay.times, y) for name, y in curves.items()},
+        })  # fmt: skip
     return {
         "remarks": remarks(found),
         "warnings": convergence_remarks(found),
-        "records": [record_entry(r, found.candidate) for r in replays[:MOST_RECORDS]],
+        "records": records,
         "n_records": len(replays),
         "search": curve_entry(found.trace[0].astype(float), found.trace[1]),
     }
 
 
-def record_entry(replay: Replay, candidate: Array) -> dict[str, Any]:
-    measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])[0]
-    curves = {"measured": measured, "simulated": simulated, "residual": measured - simulated}
-    return {
-        "file": replay.record.file, "role": replay.record.role, "noise_rms": replay.record.noise.rms,
-        "n_samples": len(measured), "curves": {name: curve_entry(replay.times, y) for name, y in curves.items()},
-    }  # fmt: skip
-
-
 def remarks(found: Identification) -> list[str]:
     """Return what a reader must know, one sentence each."""
+    information, (unit, factor) = found.information, SHOWN[found.campaign.unit]
     said = [bound_remark(found, int(i)) for i in np.flatnonzero(found.at_bound)] + convergence_remarks(found)
-    for a, b, r in collinear(found.information):
-        said.append(f"{a} and {b} can hardly be told apart on these records (correlation {r:+.3f}): "
-                    "a change of one is made up for by the other.")  # fmt: skip
-    lost = [n for n, d in zip(found.information.names, found.information.deviation, strict=True) if not np.isfinite(d)]
-    said += [f"{name} is not determined by these records." for name in lost]
+    for a, b, r in collinear(information):
+        said.append(f"{a} and {b} can hardly be told apart on these records (correlation {r:+.3f}): a change of one is "
+                    "made up for by the other.")  # fmt: skip
+    deviations = zip(information.names, information.deviation, strict=True)
+    said += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
     if found.n_failed:
         said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
-    return said + shape_remarks(found) + engine_remarks(found) + noise_remarks(found)
+    replays = (*found.train_replays, *found.holdout_replays)
+    said += [text for replay in replays if (text := shape_remark(replay, found.candidate))]
+    said += [
+        f"{r.record.file}: the engine is off by up to {factor * r.engine_error:.2g} {unit} even at its "
+        "finest steps: the equations are stiff there, or switch somewhere without a guard."
+        for r in replays if not all(c.reached for c in r.calibrations)
+    ]  # fmt: skip
+    return said + noise_remarks(found)
 
 
-def shape_remarks(found: Identification) -> list[str]:
-    """Return a sentence for each record on which S2 falls though the residual is no more than noise.
+def shape_remark(replay: Replay, candidate: Array) -> str:
+    """Return a sentence where S2 falls though the residual is no more than noise, else "".
 
     S2 pairs few intervals between landmarks; one landmark that is only noise, near an end, can unpair them all.
     """
-    said = []
-    for replay in (*found.train_replays, *found.holdout_replays):
-        e = record_errors(replay, found.candidate)
-        only_noise = e.chi2_per_sample is not None and e.chi2_per_sample < MISFIT
-        if e.s2 < SHAPE_FALLS and e.s1 > NUMBERS_AGREE and only_noise:
-            said.append(
-                f"{replay.record.file}: S2 is {e.s2:.3f} though S1 is {e.s1:.3f}: the shape similarity pairs "
-                "a few intervals by order, and a landmark of noise unpairs them; look at S1 and RMSE."
-            )
-    return said
-
-
-def engine_remarks(found: Identification) -> list[str]:
-    """Return a sentence for each record on which the engine is less accurate than it promises."""
-    name, factor = SHOWN[found.campaign.unit]
-    return [
-        f"{r.record.file}: the engine is off by up to {factor * r.engine_error:.2g} {name} even at its "
-        "finest steps: the equations are stiff there, or switch somewhere without a guard."
-        for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)
-    ]  # fmt: skip
+    e = record_errors(replay, candidate)
+    only_noise = e.chi2_per_sample is not None and e.chi2_per_sample < MISFIT
+    if not (e.s2 < SHAPE_FALLS and e.s1 > NUMBERS_AGREE and only_noise):
+        return ""
+    return (f"{replay.record.file}: S2 is {e.s2:.3f} though S1 is {e.s1:.3f}: the shape similarity pairs a few "
+            "intervals by order, and a landmark of noise unpairs them; look at S1 and RMSE.")  # fmt: skip
 
 
 def bound_remark(found: Identification, i: int) -> str:
-    """Return the sentence for a parameter at its bound."""
     name, value = found.space.names[i], found.candidate[i]
     null = found.model.parameters[name].null
     margin = 1e-3 * (found.space.high[i] - found.space.low[i])
@@ -319,24 +302,28 @@ def convergence_remarks(found: Identification) -> list[str]:
 
 
 def noise_remarks(found: Identification) -> list[str]:
-    """Return what is to be said of the noise, its mean at rest, and a residual far above it."""
     replays, unit = found.train_replays, found.campaign.unit
-    named = [r for r in replays if len(replays) <= MOST_NAMED]
-    said = [noise_remark(r, unit) for r in named]
-    if not named:
+    said = [noise_remark(r, unit) for r in replays if len(replays) <= MOST_NAMED]
+    if not said:
         values = [shown(r.record.noise.rms, unit)[0] for r in replays]
         said.append(f"{len(replays)} records: noise {min(values):.3g} to {max(values):.3g} {SHOWN[unit][0]} rms.")
-    pairs = zip(replays, found.information.levels, strict=True)
-    above = [(r.record, level.rms) for r, level in pairs if level.from_residual]
-    searched = bool(found.space.free.any())
-    said += [misfit_remark(record.file, rms, record.noise.rms, searched) for record, rms in above[:MOST_NAMED]]
+    above = [(r.record, level.rms) for r, level in zip(replays, found.information.levels, strict=True)
+             if level.from_residual]  # fmt: skip
+    why = "the model, in which nothing is free, lacks something."
+    if found.space.free.any():
+        why = (
+            "the model lacks something, or the search has not come to the minimum; the intervals are widened to the "
+            "residual and its correlation in time, and hold only as far as what is lacking averages out."
+        )
+    for record, rms in above[:MOST_NAMED]:
+        times = rms / record.noise.rms if record.noise.rms else np.inf
+        said.append(f"{record.file}: the residual is {times:.3g} times the noise: {why}")
     if len(above) > MOST_NAMED:
         said.append(f"So it is with {len(above) - MOST_NAMED} more records.")
     return said
 
 
 def noise_remark(replay: Replay, unit: str) -> str:
-    """Return the noise of one record in words."""
     noise = replay.record.noise
     value, name = shown(noise.rms, unit)
     text = f"{replay.record.file}: noise {value:.3g} {name} rms"
@@ -344,14 +331,3 @@ def noise_remark(replay: Replay, unit: str) -> str:
         mean = shown(noise.mean or 0.0, unit)[0]
         return f"{text} and mean {mean:+.3g} {name} (shown, not subtracted) from {noise.n_samples} samples at rest."
     return f"{text} from high-frequency differences of the motion, as fewer than 50 samples were recorded at rest."
-
-
-def misfit_remark(file: str, rms: float, noise: float, searched: bool) -> str:
-    """Return the sentence for a record whose residual is far above its noise; searched: some parameter was free."""
-    times = rms / noise if noise else np.inf
-    if not searched:
-        return (f"{file}: the residual is {times:.3g} times the noise: the model, in which nothing is free, lacks "
-                "something.")  # fmt: skip
-    return (f"{file}: the residual is {times:.3g} times the noise: the model lacks something, or the search has not "
-            "come to the minimum; the intervals are widened to the residual and its correlation in time, and hold only "
-            "as far as what is lacking averages out.")  # fmt: skip

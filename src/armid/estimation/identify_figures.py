@@ -61,7 +61,6 @@ def record_figure(curves: Mapping[str, Mapping[str, Any]], unit: str) -> Any:
 
 
 def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) -> None:
-    """Draw the curves (x, y) of one record into a pair of axes."""
     (upper, lower), (unit, factor) = axes, SHOWN[si_unit]
     looks = {"measured": {"color": OKABE_ITO["black"], "lw": 1.6},
              "simulated": {"color": OKABE_ITO["vermilion"], "lw": 1.3, "ls": "--"}}  # fmt: skip
@@ -73,8 +72,7 @@ def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) ->
     lower.plot(x, factor * y, color=OKABE_ITO["blue"], lw=0.8)
     upper.set_ylabel(f"speed [{unit}]")
     upper.tick_params(labelbottom=False)
-    lower.set_ylabel(f"residual\n[{unit}]")
-    lower.set_xlabel("time [s]")
+    lower.set(ylabel=f"residual\n[{unit}]", xlabel="time [s]")
     for axis in axes:
         axis.margins(x=0.01)
 
@@ -97,8 +95,7 @@ def convergence_figure(found: Identification) -> Any:
         axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))
     named = f"{found.fitness.name} [{unit}]" if unit else found.fitness.name
-    axis.set_ylabel("similarity degree of the best" if similarity else f"best {named}")
-    axis.set_xlabel("simulations")
+    axis.set(ylabel="similarity degree of the best" if similarity else f"best {named}", xlabel="simulations")
     text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {shown[-1]:.6g} {unit}"
     axis.set_title(text.rstrip(), fontsize="medium")
     return figure

@@ -94,14 +94,7 @@ def loop_document(
 ) -> Document:
     """Build the document of a closed loop from what is stored of it.
 
-    Parameters
-    ----------
-    report, details : dict
-        report.json and details.json (empty where an earlier version of armid wrote none).
-    svgs : dict
-        Name -> SVG of those of `FIGURES` that are stored.
-    again : str
-        The command that makes the page again.
+    report, details: report.json and details.json; for the others see `identify_document`.
     """
     figures = {name: (Figure(name, *FIGURES[name], svg=svg),) for name, svg in svgs.items()}
     unit = report["unit"]
@@ -109,6 +102,10 @@ def loop_document(
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
     parameters = parameter_table(report)
+    each = [(r["file"], r["role"], model, r["error"][model]) for r in details.get("records", ())
+            for model in ("before", "after")]  # fmt: skip
+    note = records_note(len(each) // 2, details.get("n_records", 0))
+    by_record = (error_table("Errors of each record", ["record", "role", "model"], each, unit, note),) if each else ()
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
     shifts = tuple(details.get("shifts", ()))
     missing = tuple(details.get("missing", ()))
@@ -116,7 +113,7 @@ def loop_document(
                                       for a in report["advice"]]  # fmt: skip
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
     sections = [
-        Section("Error before and after", (errors, *([record_error_table(details, unit)] if details else []))),
+        Section("Error before and after", (errors, *by_record)),
         *([residual_section(details, unit)] if details else []),
         Section("Steps", steps or (Text("No effect was added."),)),
         Section("Parameters", (parameters, *([Sentences(shifts)] if shifts else []), *figures.get("parameters", ()))),
@@ -124,7 +121,11 @@ def loop_document(
     if details:
         sections.append(candidates_section(details["candidates"], figures.get("ranking", ())))
         drawn = tuple(f for name in ("diagnosis", "autocorrelation", "missing") for f in figures.get(name, ()))
-        sections.append(Section("Is what remains noise?", (*diagnosis_parts(details, missing), *drawn)))
+        told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
+                for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
+        tests = [Sentences(tuple(sentences), title) for title, sentences in told if sentences]
+        unnamed = [Sentences(missing, "What is missing, without a name")] if missing else []
+        sections.append(Section("Is what remains noise?", (*tests, *unnamed, *drawn)))
     elif figures:
         sections.append(Section("Figures", tuple(f for several in figures.values() for f in several)))
     if report["advice"]:
@@ -157,7 +158,6 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
 
 
 def error_sentence(report: Mapping[str, Any]) -> str:
-    """Return the error before and after, on the records held out where there are any."""
     before, after = report["error"]["before"], report["error"]["after"]
     which, on = ("holdout", "the records held out") if after["holdout"] else ("train", "the train records")
     was, now = rmse_text(before[which], report["unit"]), rmse_text(after[which], report["unit"])
@@ -169,7 +169,6 @@ def error_sentence(report: Mapping[str, Any]) -> str:
 
 
 def step_table(report: Mapping[str, Any]) -> Table:
-    """Return the effects that were added, with the error before and after each."""
     unit, rows, last = report["unit"], [], report["error"]["before"]
     for step in report["steps"]:
         own = [f"{name.partition('.')[2]} {value_text(p)}" for name, p in step["parameters"].items()
@@ -186,7 +185,6 @@ def step_table(report: Mapping[str, Any]) -> Table:
 
 
 def parameter_table(report: Mapping[str, Any]) -> Table:
-    """Return each parameter before and after."""
     before, after = report["parameters"]["before"], report["parameters"]["after"]
     rows = [(name, value_text(before[name]) if name in before else "", value_text(p),
              "yes" if p["trusted"] else "fixed or not determined" if p["low"] is None else "no")
@@ -194,16 +192,7 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
     return table("Parameters", ["parameter", "before", "after", "trusted"], rows, "Values with 95 % intervals.")
 
 
-def record_error_table(details: Mapping[str, Any], unit: str) -> Table:
-    """Return the errors of each record, before and after."""
-    rows = [(r["file"], r["role"], model, r["error"][model]) for r in details["records"]
-            for model in ("before", "after")]  # fmt: skip
-    note = records_note(len(details["records"]), details["n_records"])
-    return error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
-
-
 def residual_section(details: Mapping[str, Any], unit: str) -> Section:
-    """Return the residual of each record before and after, one over the other."""
     figures = []
     for i, record in enumerate(details["records"]):
         was, now = (rmse_text(record["error"][model], unit) for model in ("before", "after"))
@@ -218,7 +207,6 @@ def residual_section(details: Mapping[str, Any], unit: str) -> Section:
 
 
 def candidates_section(candidates: Mapping[str, Any], ranking: tuple[Figure, ...]) -> Section:
-    """Return the ranking, and what the leading candidates would do to the residual."""
     columns = (
         Column("effect", "effect"), Column("drop", "fall of chi2 predicted [%]", ".3g", 100.0),
         Column("p", "chance from noise", ".2g"), Column("share", "left after projection [%]", ".3g", 100.0),
@@ -239,19 +227,7 @@ def candidates_section(candidates: Mapping[str, Any], ranking: tuple[Figure, ...
     return Section("Candidates", parts, text)
 
 
-def diagnosis_parts(details: Mapping[str, Any], missing: tuple[str, ...]) -> list[Part]:
-    """Return what the tests of the residuals say."""
-    parts: list[Part] = []
-    for model in ("before", "after"):
-        for which in ("train", "holdout"):
-            said = (details["diagnosis"][model] or {}).get(which)
-            if said:
-                parts.append(Sentences(tuple(said), f"{model.capitalize()}, {which} records"))
-    return [*parts, Sentences(missing, "What is missing, without a name")] if missing else parts
-
-
 def advice_table(advice: list[Mapping[str, Any]], words: list[str]) -> Table:
-    """Return the manoeuvres that would tell rivals apart. words: of each manoeuvre."""
     rows = [(text, " and ".join(a["separates"]), a["power"]) for text, a in zip(words, advice, strict=True)]
     note = "Power: chance that one such record lets the right effect win, the lowest of all pairs."
     columns = ["manoeuvre", "separates", Column("power", "power [%]", ".0f", 100.0)]
@@ -259,7 +235,6 @@ def advice_table(advice: list[Mapping[str, Any]], words: list[str]) -> Table:
 
 
 def advice_sentence(best: Mapping[str, Any], words: str) -> str:
-    """Return what the most telling manoeuvre would do."""
     names = " and ".join(best["separates"])
     if best["power"] < HOPELESS:
         return (f"No manoeuvre that this machine can make is likely to separate {names}: the best, {words}, has a "
@@ -268,7 +243,6 @@ def advice_sentence(best: Mapping[str, Any], words: str) -> str:
 
 
 def equations_section(equations: Mapping[str, str]) -> Section:
-    """Return the model after the last step, marked where it differs from the declared one."""
     before, after = equations["before"], equations["after"]
     if before == after:
         return Section("Equations", (listing("The declared model; nothing was added", before),))
@@ -282,19 +256,20 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
 
     Of long records each curve keeps the samples that `thinned` chooses.
     """
-    records = [r for name in ("train", "holdout") for r in records_of(getattr(found.before, name),
-                                                                      getattr(found.after, name))]  # fmt: skip
+    before, after = found.before, found.after
+    records = [*record_entries(before.train, after.train), *record_entries(before.holdout, after.holdout)]
+    diagnoses = {
+        name: {"train": diagnosis_sentences(judged.diagnosis), "holdout": None if judged.holdout_diagnosis is None else
+               diagnosis_sentences(judged.holdout_diagnosis)} for name, judged in (("before", before), ("after", after))
+    }  # fmt: skip
     return {
         "versions": versions(),
         "conclusion": conclusion(found),
-        "shifts": shift_sentences(found.before, found.after) if found.steps else [],
-        "doubts": doubt_sentences(found.after),
-        "diagnosis": {
-            "before": finding_entry(found.before),
-            "after": finding_entry(found.after) if found.steps else None,
-        },
+        "shifts": shift_sentences(before, after) if found.steps else [],
+        "doubts": doubt_sentences(after),
+        "diagnosis": diagnoses if found.steps else diagnoses | {"after": None},
         "missing": missing_sentences(found.missing) if found.missing is not None else [],
-        "equations": {"before": str(found.before.model), "after": str(found.after.model)},
+        "equations": {"before": str(before.model), "after": str(after.model)},
         "records": records[:MOST_RECORDS],
         "n_records": len(records),
         "candidates": candidates_of(found),
@@ -302,18 +277,9 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
     }
 
 
-def finding_entry(judged: Judgement) -> dict[str, list[str] | None]:
-    """Return what was found in the residuals of a model, on train and holdout."""
-    unseen = judged.holdout_diagnosis
-    return {"train": diagnosis_sentences(judged.diagnosis),
-            "holdout": None if unseen is None else diagnosis_sentences(unseen)}  # fmt: skip
-
-
-def records_of(before: View | None, after: View | None) -> list[dict[str, Any]]:
-    """Return each record with its errors and residuals before and after."""
+def record_entries(before: View | None, after: View | None) -> list[dict[str, Any]]:
     if before is None or after is None:
         return []
-    pairs = zip(before.replays, before.raw, after.replays, after.raw, strict=True)
     return [
         {
             "file": old.record.file, "role": old.record.role, "n_samples": len(was),
@@ -322,7 +288,7 @@ def records_of(before: View | None, after: View | None) -> list[dict[str, Any]]:
                       "after": error_entry(record_errors(new, after.candidate))},
             "curves": {"before": curve_entry(old.times, was), "after": curve_entry(new.times, now)},
         }
-        for old, was, new, now in pairs
+        for old, was, new, now in zip(before.replays, before.raw, after.replays, after.raw, strict=True)
     ]  # fmt: skip
 
 
@@ -375,7 +341,6 @@ def conclusion(found: ClosedLoop) -> str:
 
 
 def doubtful(found: ClosedLoop) -> str:
-    """Return which effects would do as well."""
     if found.refused is not None:
         rivals = [r.name for r in (*found.refused.alike, *found.refused.unlike)]
         return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
@@ -390,7 +355,6 @@ def doubtful(found: ClosedLoop) -> str:
 
 
 def partly_empirical(found: ClosedLoop) -> str:
-    """Return what the empirical term stands for."""
     assert found.term is not None
     named = " + ".join(found.effects[:-1])
     lacking = f"The declared model lacks {named}, and beside it" if named else "The declared model lacks"
@@ -401,7 +365,6 @@ def partly_empirical(found: ClosedLoop) -> str:
 
 
 def missing_sentences(missing: Missing) -> list[str]:
-    """Return at which port the missing signal is, and on what it depends."""
     ports = ", ".join(f"{s.port} {max(s.share, 0.0):.0%}" for s in missing.signals[:MOST_PORTS])
     said = [f"A signal without a form would remove this share of the residual at port: {ports}."]
     best = {d.variable: d for d in reversed(missing.dependences)}
@@ -411,43 +374,39 @@ def missing_sentences(missing: Missing) -> list[str]:
 
 
 def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return whether there is a discrepancy and where, one sentence each."""
     if not diagnosis.significant:
         return [f"What remains cannot be told from noise (least chance of {len(diagnosis.findings)} tests together "
                 f"{diagnosis.p:.2g}, {SIGNIFICANCE:g} would be significant)."]  # fmt: skip
-    bound = "below " if diagnosis.p < LEAST else ""
-    said = [f"What remains is more than noise (chance {bound}{max(diagnosis.p, LEAST):.2g})."]
+
+    def significant(kind: str) -> list[Finding]:
+        """Return the significant findings of one kind, the largest first."""
+        found = [f for f in diagnosis.of_kind(kind) if f.p * len(diagnosis.findings) < SIGNIFICANCE]
+        return sorted(found, key=lambda f: -f.ratio)[:MOST_TOLD]
+
+    said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST else ''}"
+            f"{max(diagnosis.p, LEAST):.2g})."]  # fmt: skip
     if not diagnosis.noise_known:
         said.append("No rest was recorded, so that the noise is not known: the residual is tested against itself.")
-    said += [
-        residual_sentence(f) for kind in ("size", "repeats", "autocorrelation") for f in striking(diagnosis, kind, 1)
-    ]
-    for kind in ("record", "stage", "variable", "frequency"):
-        found = striking(diagnosis, "dependence" if kind == "variable" else kind, MOST_TOLD)
-        places = ", ".join(f"{f.where} ({f.ratio:.3g} times the noise)" for f in found)
-        said += [f"Where it is, by {kind}: {places}."] if found else []
+    wholes = {
+        "size": "Its mean square is {ratio:.4g} times that of the noise.",
+        "repeats": "Repeats of {where} agree with each other {ratio:.3g} times better than with the model (mean "
+                   "squares, pure-error lack of fit).",
+        "autocorrelation": "It is correlated in time: the Ljung-Box statistic over {where} is {ratio:.3g} times what "
+                           "noise gives.",
+    }  # fmt: skip
+    said += [text.format(**vars(f)) for kind, text in wholes.items() for f in significant(kind)[:1]]
+    for kind, name in (
+        ("record", "record"),
+        ("stage", "stage"),
+        ("dependence", "variable"),
+        ("frequency", "frequency"),
+    ):
+        places = ", ".join(f"{f.where} ({f.ratio:.3g} times the noise)" for f in significant(kind))
+        said += [f"Where it is, by {name}: {places}."] if places else []
     return said
 
 
-def striking(diagnosis: Diagnosis, kind: str, most: int) -> list[Finding]:
-    """Return the significant findings of one kind, the largest first."""
-    found = [f for f in diagnosis.of_kind(kind) if f.p * len(diagnosis.findings) < SIGNIFICANCE]
-    return sorted(found, key=lambda f: -f.ratio)[:most]
-
-
-def residual_sentence(finding: Finding) -> str:
-    """Return the sentence of a finding about the residual as a whole."""
-    return {
-        "size": f"Its mean square is {finding.ratio:.4g} times that of the noise.",
-        "repeats": f"Repeats of {finding.where} agree with each other {finding.ratio:.3g} times better than with the "
-        "model (mean squares, pure-error lack of fit).",
-        "autocorrelation": f"It is correlated in time: the Ljung-Box statistic over {finding.where} is "
-        f"{finding.ratio:.3g} times what noise gives.",
-    }[finding.kind]
-
-
 def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
-    """Return what the missing effects had bent: the declared parameters that moved."""
     later = {e.name: e for e in after.estimates}
     said = []
     for old in before.estimates:
@@ -461,7 +420,6 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
 
 
 def doubt_sentences(judged: Judgement) -> list[str]:
-    """Return why parameters are not to be trusted."""
     reasons: dict[tuple[str, ...], list[str]] = {}
     for e in judged.estimates:
         # The heights of an empirical curve mean nothing one by one.

@@ -11,7 +11,7 @@ from armid.loop.diagnose import Diagnosis, View
 from armid.loop.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
 from armid.report.common import points, record_axes, small_axes
-from armid.report.style import GREY, OKABE_ITO, PALE, pyplot
+from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, pyplot
 from armid.units import SHOWN, shown
 
 Array = NDArray[np.float64]
@@ -67,7 +67,6 @@ def record_figure(record: Mapping[str, Any], unit: str) -> Any:
 
 
 def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si_unit: str) -> None:
-    """Draw residuals (x, y) before and after on a band of 2 sigma of noise."""
     unit, factor = SHOWN[si_unit]
     if noise is not None:
         band = 2.0 * noise * factor
@@ -75,8 +74,7 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
     for name, colour, _ in LOOKS:
         x, y = curves[name]
         axis.plot(x, factor * y, color=colour, lw=0.9, label=name, gid=name)
-    axis.set_ylabel(f"residual [{unit}]")
-    axis.set_xlabel("time [s]")
+    axis.set(ylabel=f"residual [{unit}]", xlabel="time [s]")
     axis.margins(x=0.01)
 
 
@@ -88,14 +86,12 @@ def candidate_figure(residual: Mapping[str, Any], predicted: Mapping[str, Any], 
         axis.plot(x, y, color=colour, lw=width, label=name)
     for edge in edges[1:-1]:
         axis.axvline(edge, color="0.4", lw=0.8, ls=":")
-    axis.set_xlabel("sample, train records end to end")
-    axis.set_ylabel("whitened residual\n[sigma]")
+    axis.set(xlabel="sample, train records end to end", ylabel="whitened residual\n[sigma]")
     axis.legend(frameon=False, fontsize="small", loc="upper right", ncols=2)
     return figure
 
 
 def diagnosis_figure(found: ClosedLoop) -> Any:
-    """Draw the mean square of the residual in units of the noise's, part by part."""
     before, after = found.before.diagnosis, found.after.diagnosis
     kinds = [k for k in KINDS if before.of_kind(k)]
     rows = -(-len(kinds) // 2)
@@ -156,8 +152,7 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]])
             axis.errorbar([place], [factor * p["value"]], yerr=[[half], [half]], fmt="o", color=colour, capsize=5,
                           mfc=colour if p["trusted"] else "white")  # fmt: skip
         axis.set_xticks([0, 1], ["before", "after"])
-        axis.set_xlim(-0.6, 1.6)
-        axis.set_ylabel(f"{name} [{unit}]")
+        axis.set(xlim=(-0.6, 1.6), ylabel=f"{name} [{unit}]")
         axis.ticklabel_format(axis="y", useOffset=False)
     if not both:
         axes[0, 0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
@@ -167,7 +162,6 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]])
 
 
 def autocorrelation_figure(found: ClosedLoop) -> Any:
-    """Draw the autocorrelation of the whitened residual of the train records, with the 95 % band of white noise."""
     figure, axis = pyplot().subplots(figsize=(6.8, 3.6), layout="constrained")
     interval = found.campaign.train[0].manoeuvre.interval
     for judged, (name, colour, _) in zip((found.before, found.after), LOOKS, strict=True):
@@ -175,8 +169,7 @@ def autocorrelation_figure(found: ClosedLoop) -> Any:
         axis.plot(1e3 * interval * np.arange(len(values)), values, color=colour, lw=1.6, label=name)
     band = 1.96 / np.sqrt(len(found.after.train.residual))
     axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="white noise, 95 %")
-    axis.set_xlabel("lag [ms]")
-    axis.set_ylabel("autocorrelation")
+    axis.set(xlabel="lag [ms]", ylabel="autocorrelation")
     axis.set_title(f"{found.campaign.name}: whitened residual of the train records", fontsize="medium")
     axis.legend(frameon=False)
     axis.margins(x=0.01)
@@ -193,7 +186,6 @@ def correlation(view: View) -> Array:
 
 
 def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
-    """Draw the shares at the ports, and the signal at the best of them against each variable of the motion."""
     best = found.term.dependence if found.term is not None else missing.dependences[0]
     variables = [best.variable, *(v for v in missing.moved[0].variables if v != best.variable)][:MOST_VARIABLES]
     columns = (len(variables) + 2) // 2
@@ -210,7 +202,6 @@ def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
 
 
 def share_panel(axis: Any, missing: Missing) -> None:
-    """Draw what a free signal removes at each port, and what the best curve there predicts on left-out parts."""
     ports = [s.port for s in missing.signals]
     curves = [max((d.share for d in missing.dependences if d.port == p), default=0.0) for p in ports]
     rows = np.arange(len(ports))
@@ -219,36 +210,26 @@ def share_panel(axis: Any, missing: Missing) -> None:
     axis.barh(rows + 0.19, [max(100.0 * c, 0.0) for c in curves], 0.36, color=AFTER, label="best curve: predicts")
     axis.set_yticks(rows, ports)
     axis.invert_yaxis()
-    axis.set_xlim(0, 100)
-    axis.set_xlabel("share of the squared residual [%]")
+    axis.set(xlim=(0, 100), xlabel="share of the squared residual [%]")
     axis.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -> None:
     """Draw the signal of every record against one variable, with the curve where it is the one that was fitted."""
     model, signal = missing.lacking.records.replays[0].model, missing.signal_at(best.port)
-    colours = list(OKABE_ITO.values())
     factor, name = shown(1.0, unit_of(variable, model))
-    if signal is not None:
-        for motion, values in zip(missing.moved, signal.signals, strict=True):
-            axis.plot(
-                factor * motion.variables[variable],
-                values,
-                ".",
-                ms=3,
-                color=colours[motion.stretch.group % len(colours)],
-            )
+    for motion, values in zip(missing.moved if signal else (), signal.signals if signal else (), strict=True):
+        colour = COLOURS[motion.stretch.group % len(COLOURS)]
+        axis.plot(factor * motion.variables[variable], values, ".", ms=3, color=colour)
     if signal is not None and variable == best.variable and best.factor == "1":
         knots = np.linspace(best.first, best.last, len(best.heights))
         seen = np.concatenate([m.variables[variable] for m in missing.moved])
         heights = np.linalg.lstsq(hats(seen, best.first, best.last), np.concatenate(signal.signals), rcond=None)[0]
         axis.plot(factor * knots, heights, "-", color="black", label="curve through it")
         axis.legend(fontsize="small")
-    axis.set_xlabel(f"{variable} [{name}]")
-    axis.set_ylabel(f"missing at {best.port} [{model.plant.ports[best.port]}]")
+    axis.set(xlabel=f"{variable} [{name}]", ylabel=f"missing at {best.port} [{model.plant.ports[best.port]}]")
 
 
 def unit_of(variable: str, model: Any) -> str:
-    """Return the unit of a variable of the motion."""
     units = {s.name: s.unit for s in model.plant.states} | {i.name: i.unit for i in model.plant.inputs}
     return str(units.get(variable, "s" if variable == "time" else model.plant.scales.effort_unit))

@@ -73,7 +73,6 @@ def made_section(made_by: Mapping[str, Any], versions: Mapping[str, str], again:
 
 
 def setting_text(value: Any) -> str:
-    """Return the value of an option in words."""
     if value in (None, "", []):
         return "not given"
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -43,7 +43,6 @@ def latex(table: Table) -> str:
 
 
 def latex_text(text: str) -> str:
-    """Return text in which LaTeX reads no command."""
     special = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": "\\textasciitilde{}", "^": "\\textasciicircum{}"}
     special["\\"] = "\\textbackslash{}"
     return "".join(special.get(letter, letter) for letter in text)

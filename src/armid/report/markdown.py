@@ -16,7 +16,6 @@ def markdown(document: Document, made_by: str = "") -> str:
 
 
 def section_texts(section: Section) -> Iterator[str]:
-    """Yield heading, text and parts of a section."""
     yield f"## {escaped(section.title)}"
     yield escaped(section.text)
     for part in section.parts:
@@ -24,7 +23,6 @@ def section_texts(section: Section) -> Iterator[str]:
 
 
 def part_texts(part: Part, section: str) -> Iterator[str]:
-    """Yield a part under its title, unless that is the section's."""
     if isinstance(part, Text):
         yield escaped(part.text)
         return

@@ -58,7 +58,6 @@ def local(name: str) -> str:
 
 
 def referenced(root: ElementTree.Element) -> set[str]:
-    """Return the ids that something in the drawing refers to."""
     found: set[str] = set()
     for element in root.iter():
         for name, value in element.attrib.items():
@@ -69,7 +68,6 @@ def referenced(root: ElementTree.Element) -> set[str]:
 
 
 def cleaned(element: ElementTree.Element, prefix: str, used: set[str]) -> ElementTree.Element:
-    """Return an element with what is allowed in it."""
     name = local(element.tag)
     made = ElementTree.Element(name)
     for key, value in element.attrib.items():

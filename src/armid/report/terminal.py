@@ -68,5 +68,4 @@ def drawn(table: Table) -> "RichTable":
 
 
 def printable(text: str) -> str:
-    """Return a text without the control codes that a terminal would obey."""
     return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
