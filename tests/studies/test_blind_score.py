@@ -70,7 +70,7 @@ def test_rates_and_the_test_of_pairs():
 
 
 def test_no_lead_is_no_lead():
-    (first, _), aims = judged_pairs([1, 0], [0, 1])
+    _, aims = judged_pairs([1, 0], [0, 1])
     lead = aims["all pairs: lead over a random record"]
     assert (lead.found, lead.met) == (0.0, False)
     assert judged_pairs([1], [1])[0][0]["p"] == 1.0

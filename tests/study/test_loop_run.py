@@ -1,4 +1,4 @@
-"""The loop closed on a small blind suite by the runner: the key stays shut, a kill loses nothing, the score is right."""
+"""The loop closed on a small blind suite: the key stays shut, a kill loses nothing, the score is right."""
 
 import os
 import shutil

@@ -46,6 +46,7 @@ def ended_with_one_sentence(process):
     return err
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, small_disk, undisturbed):
     file, out = write_study(SEEDS), small_disk / "out"
     err = ended_with_one_sentence(start(file, "--out", out, "--jobs", 1))
@@ -57,6 +58,7 @@ def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, sma
     assert same_results(load_study(out), undisturbed)
 
 
+@pytest.mark.slow
 def test_a_file_that_may_not_grow_is_told_and_harms_nothing(start, write_study, tmp_path, undisturbed):
     file, out = write_study(SEEDS), tmp_path / "out"
 
@@ -110,33 +112,40 @@ def test_a_log_left_in_a_read_only_folder_is_read(start, write_study, small_disk
         subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
 
 
-@pytest.mark.parametrize(("name", "words"), [
-    ("raises", "ZeroDivisionError: nothing to divide by"),
-    ("leaves", "SystemExit: 3"),
-    ("segfaults", "the worker process ended by SIGSEGV, 2 times"),
-    pytest.param("hangs", "stopped at the time limit of 30 s", marks=pytest.mark.slow),
-])  # fmt: skip
-def test_an_identifier_that_misbehaves_fails_alone(write_study, tmp_path, bad_identifiers, undisturbed, name, words):
-    file = write_study(1, change=(CHAIN, f'name = "{name}"\nnoise_deg_s = 0.3'))
-    told = {"jobs": 2, "out": tmp_path / "out", "plugins": [f"{bad_identifiers}:{name}"], "only": "row 1",
-            "time_limit": 30.0 if name == "hangs" else 600.0}  # fmt: skip
-    found = run_study(file, **told)
-    failed = found.runs[found.runs["status"] == "failed"]
-    assert list(failed["identifier"]) == [name]
-    assert words in failed["error"].iloc[0]
+def fail_alone(write_study, out, plugins, undisturbed, errors, **more):
+    """Check that identifiers that misbehave fail, each with its error, and the other runs are what they were."""
+    bad = "\n[[identifiers]]\n".join(f'name = "{name}"\nnoise_deg_s = 0.3' for name in errors)
+    told = {"jobs": 2, "out": out, "plugins": [f"{plugins}:{name}" for name in errors], "only": "row 1", **more}
+    found = run_study(write_study(1, change=(CHAIN, bad)), **told)
+    failed = found.runs[found.runs["status"] == "failed"].set_index("identifier")["error"]
+    assert {name: words for name, words in errors.items() if words in failed[name]} == errors
     done = found.runs[found.runs["status"] == "done"]["run"]
     assert len(done) == RUNS_A_SEED / 2 - 2
     assert set(done) < set(undisturbed.runs["run"])
-    assert found.study["n_failed"] == 1
-    # it has failed, and is not tried again unless someone asks for it
-    assert run_study(file, **told).runs.equals(found.runs)
+    assert found.study["n_failed"] == len(errors)
+    # they have failed, and are not tried again unless someone asks for it
+    assert run_study(write_study(1, change=(CHAIN, bad)), **told).runs.equals(found.runs)
+
+
+def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identifiers, undisturbed):
+    errors = {
+        "raises": "ZeroDivisionError: nothing to divide by",
+        "leaves": "SystemExit: 3",
+        "segfaults": "the worker process ended by SIGSEGV, 2 times",
+    }
+    fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors)
+
+
+def test_an_identifier_that_hangs_is_stopped(write_study, tmp_path, bad_identifiers, undisturbed):
+    errors = {"hangs": "stopped at the time limit of 10 s"}
+    fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors, time_limit=10.0)
 
 
 def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(write_study, tmp_path, bad_identifiers):
     mine = tmp_path / "mine.py"
     shutil.copy(bad_identifiers, mine)
     file = write_study(1, change=(CHAIN, 'name = "raises"'))
-    told = {"jobs": 1, "out": tmp_path / "out", "plugins": [f"{mine}:raises"]}
+    told = {"jobs": 1, "out": tmp_path / "out", "plugins": [f"{mine}:raises"], "only": "row 1/ra*"}
     first = run_study(file, **told)
     retried = run_study(file, **told, retry=True)
     assert list(retried.runs["run"]) == list(first.runs["run"])

@@ -1,4 +1,5 @@
-"""Whatever ends a runner: no finished run is lost, none is there twice, and the rest is made as if nothing had been."""
+"""Whatever ends a runner or a worker: no finished run is lost, none is there twice, and the rest is made as if nothing
+had been; runners share the work; and the clock may jump."""
 
 import os
 import random
@@ -12,21 +13,30 @@ import pytest
 from small_study import RUNS_A_SEED, same_results
 
 from armid.study.results import load_study
+from armid.study.runner import run_study
 from armid.study.store import FILE_NAME
 
 SEEDS = 6
+N_RUNS = SEEDS * RUNS_A_SEED
+# What a process has of the wall clock goes back by an hour at every look.
+BACKWARD = """\
+import itertools
+import time
+
+now, steps = time.time(), itertools.count(1)
+time.time = lambda: now - 3600.0 * next(steps)
+time.time_ns = lambda: int(time.time() * 1e9)
+"""
 
 
 def kept(out):
     """Run -> everything that the store holds of it."""
-    if not (out / FILE_NAME).exists():
-        return {}
     try:
         with closing(sqlite3.connect(f"file:{out / FILE_NAME}?mode=ro", uri=True)) as connection:
             rows = connection.execute("SELECT r.*, t.trace FROM runs r JOIN traces t USING (run)").fetchall()
             return {row[0]: row for row in rows}
     except sqlite3.OperationalError:
-        # the tables are not made yet
+        # neither file nor tables may be made yet
         return {}
 
 
@@ -38,6 +48,13 @@ def wait_for(process, out, more_than, seconds=600.0):
         time.sleep(0.01)
 
 
+def ended_well(process):
+    """Return what a runner prints that ends without an error."""
+    out, err = process.communicate(timeout=600)
+    assert (process.returncode, err) == (0, "")
+    return out
+
+
 def killed_again_and_again(start, file, out, moments, rng):
     """Kill a runner at random moments, then let it end; return how often it was really killed in the middle."""
     cut = 0
@@ -46,6 +63,8 @@ def killed_again_and_again(start, file, out, moments, rng):
         process = start(file, "--out", out, "--jobs", 2)
         if rng.random() < 0.8:
             wait_for(process, out, len(before))
+            # a store can be read while it is written
+            assert len(before) <= len(load_study(out).runs) <= N_RUNS
             time.sleep(rng.uniform(0.0, 0.05))
         else:
             time.sleep(rng.uniform(0.0, 2.0))
@@ -53,58 +72,37 @@ def killed_again_and_again(start, file, out, moments, rng):
         cut += process.wait() == -signal.SIGKILL
         after = kept(out)
         assert {run: after[run] for run in before} == before
-    ended = start(file, "--out", out, "--jobs", 2)
-    out_text, err = ended.communicate(timeout=600)
-    assert ended.returncode == 0, err
-    assert f"{SEEDS * RUNS_A_SEED} of {SEEDS * RUNS_A_SEED} are in" in out_text
+    assert f"{N_RUNS} of {N_RUNS} are in" in ended_well(start(file, "--out", out, "--jobs", 2))
     return cut
 
 
-def test_killed_at_random_moments(start, write_study, tmp_path, undisturbed):
-    cut = killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 3, random.Random(1))
-    assert cut == 3
+def test_a_runner_killed_at_random_moments(start, write_study, tmp_path, undisturbed):
+    cut = killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 2, random.Random(1))
+    assert cut == 2
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
 @pytest.mark.slow
-def test_killed_fifty_times(start, write_study, tmp_path, undisturbed):
+def test_a_runner_killed_fifty_times(start, write_study, tmp_path, undisturbed):
     killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 50, random.Random(2))
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
-def test_a_store_can_be_read_while_it_is_written_and_after_a_kill(start, write_study, tmp_path):
-    process = start(write_study(50), "--out", tmp_path / "out", "--jobs", 1)
-    wait_for(process, tmp_path / "out", 3)
-    meanwhile = load_study(tmp_path / "out")
-    assert 0 < len(meanwhile.runs) <= meanwhile.study["n_planned"] == 50 * RUNS_A_SEED
-    process.kill()
-    process.wait()
-    assert len(load_study(tmp_path / "out").runs) >= len(meanwhile.runs)
+def stat_of(pid):
+    """Fields of /proc/PID/stat behind the name of the program, none where the process is not there."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+            return file.read().rpartition(")")[2].split()
+    except OSError:
+        return []
 
 
 def children_of(pid):
-    """Processes whose parent is a process."""
-    found = []
-    for entry in filter(str.isdigit, os.listdir("/proc")):
-        try:
-            with open(f"/proc/{entry}/stat", encoding="ascii", errors="replace") as file:
-                if int(file.read().rpartition(")")[2].split()[1]) == pid:
-                    found.append(int(entry))
-        except (OSError, IndexError):
-            continue
-    return found
-
-
-def is_alive(pid):
-    try:
-        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
-            return file.read().rpartition(")")[2].split()[0] not in "ZX"
-    except OSError:
-        return False
+    return [int(entry) for entry in filter(str.isdigit, os.listdir("/proc")) if stat_of(entry)[1:2] == [str(pid)]]
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="looks for processes in /proc")
-def test_workers_end_with_their_runner_and_may_be_killed(start, write_study, tmp_path, undisturbed):
+def test_workers_may_be_killed_and_end_with_their_runner(start, write_study, tmp_path, undisturbed):
     process = start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2)
     wait_for(process, tmp_path / "out", 2)
     os.kill(children_of(process.pid)[0], signal.SIGKILL)
@@ -113,11 +111,18 @@ def test_workers_end_with_their_runner_and_may_be_killed(start, write_study, tmp
     process.kill()
     process.wait()
     end = time.monotonic() + 120.0
-    while any(map(is_alive, workers)):
+    while any(stat_of(worker)[:1] not in ([], ["Z"], ["X"]) for worker in workers):
         assert time.monotonic() < end, "workers outlive their runner"
         time.sleep(0.05)
-    ended = start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2)
-    assert ended.wait() == 0
+    # two processes give what one gives, also after this
+    assert same_results(run_study(write_study(SEEDS), jobs=2, out=tmp_path / "out"), undisturbed)
+
+
+def test_two_runners_share_the_work(start, write_study, tmp_path, undisturbed):
+    file = write_study(SEEDS)
+    both = [start(file, "--out", tmp_path / "out", "--jobs", 1) for _ in range(2)]
+    made = [int(re.search(r"small: (\d+) runs made", ended_well(process))[1]) for process in both]
+    assert sum(made) == N_RUNS
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
@@ -133,13 +138,12 @@ def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(start, write_study,
     assert [p.name for p in (tmp_path / "out").iterdir()] == [FILE_NAME]
 
 
-def test_two_runners_share_the_work(start, write_study, tmp_path, undisturbed):
-    file = write_study(SEEDS)
-    both = [start(file, "--out", tmp_path / "out", "--jobs", 1) for _ in range(2)]
-    made = []
-    for process in both:
-        out, err = process.communicate(timeout=600)
-        assert (process.returncode, err) == (0, "")
-        made.append(int(re.search(r"small: (\d+) runs made", out)[1]))
-    assert sum(made) == SEEDS * RUNS_A_SEED
+@pytest.mark.slow
+def test_a_clock_that_runs_backward_changes_nothing(start, write_study, tmp_path, undisturbed):
+    (tmp_path / "clock").mkdir()
+    (tmp_path / "clock" / "sitecustomize.py").write_text(BACKWARD)
+    path = os.pathsep.join(filter(None, [str(tmp_path / "clock"), os.environ.get("PYTHONPATH")]))
+    told = {"env": os.environ | {"PYTHONPATH": path}}
+    out = ended_well(start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2, "--time-limit", 60, **told))
+    assert f"{N_RUNS} of {N_RUNS} are in" in out
     assert same_results(load_study(tmp_path / "out"), undisturbed)

@@ -1,0 +1,126 @@
+"""A study that cannot be run is refused with one sentence before anything is written."""
+
+import pytest
+
+from armid.errors import ArmidError
+from armid.study.runner import run_study
+from armid.study.tasks import read_study
+
+BOX = "[bounds]\n"
+CHAIN = 'name = "pso+least_squares"'
+# What is changed in the small study (old, new), and what the sentence has to hold.
+REFUSED = [
+    ('question = "Does it run?"', "qestion = 3", "small.toml: key 'qestion' is unknown, did you mean 'question'?"),
+    ("truth = { p0 = 3", "truht = { p0 = 3", "small.toml, case 'row 1': key 'truht' is unknown, did you mean"),
+    ('name = "pso+least_squares"', 'name = "pso+least_squares"\nbugdet = 3',
+     "identifier 'pso+least_squares': key 'bugdet' is unknown, did you mean 'budget'?"),
+    ("shell = true", "shel = true", "case 'row 1', manoeuvre 1: key 'shel' is unknown, did you mean 'shell'?"),
+    ("budget = 40", "", "small.toml: key 'budget' is missing, a whole number of simulations above 0 is expected"),
+    ("budget = 40", "budget = 0", "key 'budget' is 0, a whole number of simulations above 0"),
+    ("budget = 40", "budget = true", "key 'budget' is true, a whole number"),
+    ("seeds = 2", "seeds = []", "key 'seeds' is []"),
+    ("seeds = 2", "seeds = [1, -1]", "key 'seeds.1' is -1"),
+    ("[0.0, 0.3]", "[-0.1]", "key 'noise_deg_s.0' is -0.1, a number of at least 0 in deg/s"),
+    ("[bounds]\n", "[bounds]\nk = [1.1, 0.6]\n",
+     "case 'row 1': bounds of 'k' are 1.1 and 0.6: finite numbers, low < high"),
+    ("[bounds]\n", "[bounds]\neta4 = [0, 1]\n", "parameter 'eta4' is not in the model: did you mean 'eta3'?"),
+    ("p0 = 3.20e6", "p0 = 3.2", "case 'row 1': the truth of 'p0' is 3.2, outside its bounds 2.6e+06 to 3.5e+06"),
+    ("p0 = 3.20e6,", "", "case 'row 1': the truth does not tell 'p0'"),
+    ("p0 = 3.20e6", "p0 = 3.20e6, q = 1", "parameter of the truth 'q' is unknown"),
+    ('[[cases]]\nname = "row 5"', 'published = { eta4 = 1 }\n[[cases]]\nname = "row 5"',
+     "parameter 'eta4' is unknown, did you mean 'eta3'?"),
+    ('name = "pso+least_squares"', 'name = "psoo"', "identifier 'psoo': identifier 'psoo' is not known: did you mean"),
+    ('name = "pso+least_squares"', 'name = "pso+bobiqa"', "identifier 'bobiqa' is not known: did you mean 'bobyqa'?"),
+    ('fitness = "rmse"', 'fitness = "rsme"', "identifier 'random': fitness 'rsme' is unknown, did you mean 'rmse'?"),
+    ('fitness = "rmse"', 'fitness = "rmse"\neffects = ["coulom"]',
+     "effect 'coulom' is unknown, did you mean 'coulomb'?"),
+    ('plant = "shell_', 'plant = "shel_', "plant 'shel_transfer_arm' is unknown, did you mean 'shell_transfer_arm'?"),
+    ("seeds = 2", 'seeds = 2\nreport = "tabel1"', "report 'tabel1' is unknown, did you mean 'table1'?"),
+    ("seeds = 2", 'seeds = 2\nkind = "identfy"', "kind 'identfy' is unknown, did you mean 'identify'?"),
+    ("velocity_limit = 0.2", "velocity_limt = 0.2", "identifier 'pso': "),
+    ("velocity_limit = 0.2", 'velocity_limit = "wide"', "identifier 'pso': "),
+    ('name = "pso+least_squares"', 'name = "pso+least_squares"\nfitness = "similarity"',
+     "needs residual vectors, fitness 'similarity' has none: rmse or likelihood is expected"),
+    ('name = "pso+least_squares"', 'name = "pso+least_squares"\nfitness = "likelihood"',
+     "fitness 'likelihood' needs noise, but noise_deg_s holds 0"),
+    ("[[0.0, 0.3]]", "[[0.29, 0.7]]", "window [0.29, 0.7] holds 11 samples of a manoeuvre of 0.3 s, at least 20"),
+    ("[[0.0, 0.3]]", "[[0.3, 0.0]]", "window [0.3, 0] holds"),
+    ("start_angle_deg = -48.0", "start_angle_deg = -60.0", "case 'row 1', manoeuvre 1: start_angle_deg is -60"),
+    ('"row 5"', '"row 1"', "case 'row 1' is there twice"),
+    ('"row 5"', '"row/5"', "the name of case 'row/5' holds '/'"),
+    ('name = "pso+least_squares"', 'name = "random"',
+     "identifier 'random' is there twice with the same fitness, noise and seeds"),
+    ('name = "pso+least_squares"', 'name = "pso+least_squares"\nlabel = "random"',
+     "label 'random' stands for identifiers of other name or options"),
+    ('name = "small"', 'name = "../small"', "key 'name' is '../small', a plain name"),
+    ('[[cases]]\nname = "row 5"', 'campaign = "c"\n[[cases]]\nname = "row 5"',
+     "manoeuvres to simulate or a campaign to read is expected, both are given"),
+    ("duration_s = 0.3 }]", 'duration_s = 0.3, role = "holdout" }]', "no manoeuvre has the role 'train'"),
+    ("[bounds]\n", "[fixed]\np0 = 3.2e6\nk = 1\neta3 = 0.62\nn = 1\n", "case 'row 1': every parameter is fixed"),
+    ('plant = "shell_transfer_arm"', 'plant = "driven_axis"', "which no manoeuvre tells: a campaign is expected"),
+    ("manoeuvres = [{ start", 'campaign = "../c" #', "campaign '../c' leads out of the folder of the study"),
+    ("manoeuvres = [{ start", 'campaign = "/c" #', "campaign '/c' leads out of the folder of the study"),
+    ("manoeuvres = [{ start", 'campaign = "c" #', "does not exist, a folder with a campaign.toml is expected"),
+]  # fmt: skip
+
+
+def test_refused_with_one_sentence(write_study, tmp_path):
+    for old, new, words in REFUSED:
+        with pytest.raises(ArmidError) as refused:
+            run_study(write_study(change=(old, new), more=BOX), out=tmp_path / "out")
+        sentence = str(refused.value)
+        assert words in sentence, (new, sentence)
+        assert "\n" not in sentence
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_prints_the_sentence_and_leaves(start, write_study, tmp_path):
+    process = start(write_study(change=("budget = 40", "budgt = 40")), "--out", tmp_path / "out")
+    out, err = process.communicate(timeout=600)
+    assert (process.returncode, out) == (2, "")
+    assert err == "armid: small.toml: key 'budgt' is unknown, did you mean 'budget'?\n"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("name = ", "bad.toml is no valid TOML"),
+    (b"\xff\xfe", "line 1: not readable as text"),
+    ("", "key 'name' is missing"),
+])  # fmt: skip
+def test_what_is_no_study(tmp_path, text, words):
+    file = tmp_path / "bad.toml"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(ArmidError, match=words):
+        read_study(file)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(ArmidError, match=r"does not exist, a file that ends in \.toml is expected"):
+        read_study(tmp_path / "no.toml")
+
+
+@pytest.mark.parametrize(("told", "words"), [
+    ({"jobs": 0}, "jobs is 0, a whole number of processes above 0"),
+    ({"time_limit": 0.0}, "the time limit is 0"),
+    ({"jobs": 1, "dask": "tcp://x:1"}, "both jobs and a Dask cluster are given"),
+    ({"only": "row 7"}, "no case is called 'row 7', did you mean 'row"),
+    ({"only": "row 1/pos"}, "no identifier is called 'pos', did you mean 'pso'?"),
+])  # fmt: skip
+def test_arguments_that_no_runner_can_work_with(write_study, tmp_path, told, words):
+    with pytest.raises(ArmidError, match=words.replace("?", r"\?")):
+        run_study(write_study(), out=tmp_path / "out", **told)
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_identifier_of_the_user_that_cannot_be_built(write_study, tmp_path, bad_identifiers):
+    file = write_study(change=(CHAIN, 'name = "cannot_be_built"'))
+    words = "identifier 'cannot_be_built': it cannot be built: ZeroDivisionError: division by zero"
+    with pytest.raises(ArmidError, match=words):
+        run_study(file, out=tmp_path / "out", plugins=[f"{bad_identifiers}:cannot_be_built"])
+
+
+def test_a_link_out_of_the_folder(write_study, tmp_path, paper_arm_folder):
+    (tmp_path / "c").symlink_to(paper_arm_folder)
+    file = write_study(change=("manoeuvres = [{ start", 'campaign = "c" #'))
+    with pytest.raises(ArmidError, match="campaign 'c' links out of the folder of the study"):
+        read_study(file)
