@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -29,112 +30,88 @@ class MadeResults:
     kept: list[RunTrace] = field(default_factory=list)
 
     def iter_traces(self) -> Iterator[RunTrace]:
-        """Return the traces."""
         yield from self.kept
 
     def text_of(self, digest: str) -> str:
-        """Return the text of a hash."""
         return f"equations of {digest}"
 
 
-def paper_cases() -> list[dict[str, Any]]:
-    """Return the five rows of Table I."""
-    return [
-        {"name": f"row {i + 1}", "truth": {p: TRUE[p][i] for p in UNITS}, "published": {p: FOUND[p][i] for p in UNITS}}
-        for i in range(5)
-    ]
-
-
-def random_cases(n: int) -> list[dict[str, Any]]:
-    """Return random truths."""
-    rng = np.random.default_rng(7)
-    return [{"name": f"case {i + 1:02d}", "truth": {p: float(rng.uniform(*BOX[p])) for p in UNITS}} for i in range(n)]
+PAPER_CASES: list[dict[str, Any]] = [
+    {"name": f"row {i + 1}", "truth": {p: TRUE[p][i] for p in UNITS}, "published": {p: FOUND[p][i] for p in UNITS}}
+    for i in range(5)
+]
+LOW, HIGH = np.array([BOX[p] for p in UNITS]).T
 
 
 def one_trace(run: str, truth: np.ndarray, end: np.ndarray, used: int, rng: np.random.Generator) -> RunTrace:
     """Return improvements that start all over the box and end where the run ended."""
-    n = 25
-    evaluations = np.unique(np.concatenate(([1], rng.integers(2, used, n), [used - 3]))).astype(np.int64)
+    evaluations = np.unique(np.concatenate(([1], rng.integers(2, used, 25), [used - 3]))).astype(np.int64)
     share = np.linspace(0.0, 1.0, evaluations.size) ** 0.3
-    low, high = np.array([BOX[p] for p in UNITS]).T
-    start = rng.uniform(low, high)
-    X = end + (start - end) * (1.0 - share[:, np.newaxis])
+    X = end + (rng.uniform(LOW, HIGH) - end) * (1.0 - share[:, np.newaxis])
     values = np.linalg.norm((X - truth) / truth, axis=1) + 1e-12
     return RunTrace(run, evaluations, np.minimum.accumulate(values), X, tuple(UNITS))
 
 
+def make(
+    cases: list[dict[str, Any]] = PAPER_CASES, identifiers: dict[str, float] | None = None,
+    noises: tuple[float, ...] = (0.0, 0.3), seeds: int = 5, fitness: tuple[str, ...] = ("similarity",),
+    windows: tuple[str, ...] = ("0-0.7 s",), failed: int = 0, budget: int = 3000, report: str = "",
+) -> MadeResults:  # fmt: skip
+    """Make up results; identifiers: label -> median error; failed: how many runs at the end fail."""
+    rng = np.random.default_rng(1)
+    identifiers = identifiers or {"pso": 3e-3, "cmaes": 1e-4, "de+bobyqa": 1e-6}
+    runs, parameters, traces = [], [], []
+    settings = list(product(noises, windows, fitness, range(1, seeds + 1)))
+    for case, (label, scale), (noise, window, name, seed) in product(cases, identifiers.items(), settings):
+        run, truth = f"r{len(runs):05d}", np.array([case["truth"][p] for p in UNITS])
+        deviation = 2e-3 * noise / 0.3 * np.abs(truth) + 1e-9 * np.abs(truth)
+        error = scale * np.exp(rng.normal(0.0, 1.0)) * rng.choice([-1.0, 1.0], 4)
+        end = np.clip(truth * (1.0 + error) + (rng.normal(0.0, 1.0, 4) * deviation if noise else 0.0), LOW, HIGH)
+        used = int(rng.integers(budget // 2, budget))
+        trace = one_trace(run, truth, end, used, rng)
+        runs.append({
+            "run": run, "case": case["name"], "identifier": label, "fitness": name, "noise_deg_s": noise,
+            "window": window, "seed": seed, "budget": budget, "used": float(used), "n_failed": 2.0,
+            "value": trace.values[-1], "stopped": "budget used", "status": "done", "error": "",
+            "seconds": rng.uniform(), "train_rmse": 0.01, "train_s": 1.0 - trace.values[-1], "train_s1": 0.99,
+            "train_s2": 1.0, "holdout_rmse": np.nan, "started_at": "never", "model": "m", "versions": "v",
+        })  # fmt: skip
+        parameters += [{
+            "run": run, "parameter": p, "unit": UNITS[p], "value": end[i], "truth": truth[i], "low": LOW[i],
+            "high": HIGH[i], "relative_error": abs(end[i] - truth[i]) / abs(truth[i]), "deviation": deviation[i],
+            "correlation_max": 0.99, "at_bound": end[i] in (LOW[i], HIGH[i]),
+        } for i, p in enumerate(UNITS)]  # fmt: skip
+        traces.append(trace)
+    frame, rows = pd.DataFrame(runs), pd.DataFrame(parameters)
+    if failed:
+        lost = set(frame["run"].iloc[-failed:])
+        at = frame["run"].isin(lost)
+        frame.loc[at, ["status", "error", "stopped"]] = ["failed", "it broke\nin the middle", ""]
+        frame.loc[at, ["used", "n_failed", "value", "train_s"]] = np.nan
+        rows = rows[~rows["run"].isin(lost)]
+        traces = [t for t in traces if t.run not in lost]
+    study = {
+        "name": "made_up", "question": "Does the report hold?", "kind": "identify", "report": report, "text": "",
+        "plant": "shell_transfer_arm", "effects": [], "cases": cases, "identifiers": list(identifiers),
+        "versions": {"armid": "0"}, "n_planned": len(frame), "n_done": len(frame) - failed, "n_failed": failed,
+    }  # fmt: skip
+    return MadeResults(frame, rows, study, traces)
+
+
 @pytest.fixture(scope="session")
 def made() -> Callable[..., MadeResults]:
-    """Return a function that makes up results.
-
-    cases, identifiers (label -> median error), noises, seeds, fitness, failed (how many runs at the end fail).
-    """
-
-    def make(
-        cases: list[dict[str, Any]] | None = None, identifiers: dict[str, float] | None = None,
-        noises: tuple[float, ...] = (0.0, 0.3), seeds: int = 5, fitness: tuple[str, ...] = ("similarity",),
-        windows: tuple[str, ...] = ("0-0.7 s",), failed: int = 0, budget: int = 3000, report: str = "",
-    ) -> MadeResults:  # fmt: skip
-        rng = np.random.default_rng(1)
-        cases = paper_cases() if cases is None else cases
-        identifiers = identifiers or {"pso": 3e-3, "cmaes": 1e-4, "de+bobyqa": 1e-6}
-        runs, parameters, traces = [], [], []
-        for case in cases:
-            truth = np.array([case["truth"][p] for p in UNITS])
-            for label, scale in identifiers.items():
-                for noise, window, name, seed in (
-                    (a, b, c, d) for a in noises for b in windows for c in fitness for d in range(1, seeds + 1)
-                ):
-                    run = f"r{len(runs):05d}"
-                    deviation = 2e-3 * noise / 0.3 * np.abs(truth) + 1e-9 * np.abs(truth)
-                    error = scale * np.exp(rng.normal(0.0, 1.0)) * rng.choice([-1.0, 1.0], 4)
-                    end = truth * (1.0 + error) + (rng.normal(0.0, 1.0, 4) * deviation if noise else 0.0)
-                    low, high = np.array([BOX[p] for p in UNITS]).T
-                    end = np.clip(end, low, high)
-                    used = int(rng.integers(budget // 2, budget))
-                    trace = one_trace(run, truth, end, used, rng)
-                    runs.append({
-                        "run": run, "case": case["name"], "identifier": label, "fitness": name, "noise_deg_s": noise,
-                        "window": window, "seed": seed, "budget": budget, "used": float(used), "n_failed": 2.0,
-                        "value": trace.values[-1], "stopped": "budget used", "status": "done", "error": "",
-                        "seconds": rng.uniform(), "train_rmse": 0.01, "train_s": 1.0 - trace.values[-1],
-                        "train_s1": 0.99, "train_s2": 1.0, "holdout_rmse": np.nan, "started_at": "never",
-                        "model": "m", "versions": "v",
-                    })  # fmt: skip
-                    for i, p in enumerate(UNITS):
-                        parameters.append({
-                            "run": run, "parameter": p, "unit": UNITS[p], "value": end[i], "truth": truth[i],
-                            "low": low[i], "high": high[i], "relative_error": abs(end[i] - truth[i]) / abs(truth[i]),
-                            "deviation": deviation[i], "correlation_max": 0.99, "at_bound": end[i] in (low[i], high[i]),
-                        })  # fmt: skip
-                    traces.append(trace)
-        frame, rows = pd.DataFrame(runs), pd.DataFrame(parameters)
-        if failed:
-            lost = set(frame["run"].iloc[-failed:])
-            at = frame["run"].isin(lost)
-            frame.loc[at, ["status", "error"]] = ["failed", "it broke\nin the middle"]
-            frame.loc[at, ["used", "n_failed", "value", "train_s"]] = np.nan
-            frame.loc[at, "stopped"] = ""
-            rows = rows[~rows["run"].isin(lost)]
-            traces = [t for t in traces if t.run not in lost]
-        study = {
-            "name": "made_up", "question": "Does the report hold?", "kind": "identify", "report": report, "text": "",
-            "plant": "shell_transfer_arm", "effects": [], "cases": cases, "identifiers": list(identifiers),
-            "versions": {"armid": "0"}, "n_planned": len(frame), "n_done": len(frame) - failed,
-            "n_failed": failed,
-        }  # fmt: skip
-        return MadeResults(frame, rows, study, traces)
-
+    """Return the function that makes up results."""
     return make
 
 
 @pytest.fixture(scope="session")
 def table1_cases() -> list[dict[str, Any]]:
     """Return the five rows of Table I."""
-    return paper_cases()
+    return PAPER_CASES
 
 
 @pytest.fixture(scope="session")
 def many_cases() -> list[dict[str, Any]]:
     """Return 24 random truths."""
-    return random_cases(24)
+    rng = np.random.default_rng(7)
+    return [{"name": f"case {i:02d}", "truth": {p: float(rng.uniform(*BOX[p])) for p in UNITS}} for i in range(1, 25)]

@@ -10,16 +10,19 @@ from armid.study.export import WORST, export_ioh, lines
 from armid.study.outcome import RunTrace
 
 
-@pytest.fixture(scope="module")
-def exported(made, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ioh")
-    results = made(seeds=3, failed=2)
-
+def export(results, folder):
     def path_of(name):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         return folder / name
 
-    return folder, results, export_ioh(results, path_of)
+    return export_ioh(results, path_of)
+
+
+@pytest.fixture(scope="module")
+def exported(made, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ioh")
+    results = made(seeds=3, failed=2)
+    return folder, results, export(results, folder)
 
 
 @pytest.fixture(scope="module")
@@ -89,12 +92,7 @@ def test_such_a_run_loads(tmp_path, made):
 
     results = made(seeds=1, noises=(0.0,), identifiers={"pso": 1e-3})
     results.kept[0] = results.kept[0]._replace(evaluations=results.kept[0].evaluations + 4)
-
-    def path_of(name):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        return tmp_path / name
-
-    export_ioh(results, path_of)
+    export(results, tmp_path)
     manager = iohinspector.DataManager()
     manager.add_folder(str(tmp_path))
     rows = manager.load(monotonic=False, include_meta_data=True).to_pandas()

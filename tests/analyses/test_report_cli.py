@@ -3,6 +3,7 @@
 import hashlib
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from armid.cli.main import main
@@ -65,26 +66,21 @@ def refused(arguments, capsys):
 
 @pytest.fixture(scope="module")
 def reported(store):
-    """The folder with its report, what was there before, and what was printed."""
-    capture = pytest.MonkeyPatch()
+    """The folder with its report, and the digest that its store had before."""
     before = digest(store / "study.sqlite")
-    printed = []
-    capture.setattr("builtins.print", lambda *texts, **_: printed.append(" ".join(map(str, texts))))
     with pytest.raises(SystemExit) as ended:
         main(["report", str(store)])
-    capture.undo()
     assert ended.value.code == 0
-    return store, before, printed
+    return store, before
 
 
 def test_a_report_of_a_real_store(reported):
-    store, before, printed = reported
+    store, before = reported
     assert digest(store / "study.sqlite") == before
     text = (store / "report.md").read_text()
     assert "Complete: 4 of 4 runs." in text
     assert "Versions: armid" in text
     assert {"overview.csv", "table1.png", "ecdf.svg", "runs.tex"} <= {p.name for p in store.iterdir()}
-    assert printed[-1].startswith("wrote report.md and ")
     page = (store / "report.html").read_text()
     assert page.count("<svg") == len(list(store.glob("*.svg")))
     for wanted in ("Does a report come out of a real store?", "Nearest to the truth: ", "Complete: 4 of 4 runs.",
@@ -93,24 +89,28 @@ def test_a_report_of_a_real_store(reported):
 
 
 def test_its_numbers_are_those_of_the_store(reported):
-    import pandas as pd
-
     results = load_study(reported[0])
     overview = pd.read_csv(reported[0] / "overview.csv").set_index("variant")
     own = results.parameters.merge(results.runs[["run", "identifier"]], on="run")
     for (identifier, name), group in own.groupby(["identifier", "parameter"]):
         assert overview.loc[identifier, f"{name}_mean"] == pytest.approx(group["relative_error"].mean())
-    found = pd.read_csv(reported[0] / "running_time.csv")
-    assert found["n"].tolist() == [2, 2]
+    assert pd.read_csv(reported[0] / "running_time.csv")["n"].tolist() == [2, 2]
 
 
-def test_the_main_table_and_the_state_are_printed(store, capsys, monkeypatch):
+def test_the_main_table_and_the_state_are_printed_and_a_users_analysis_is_a_section(
+    store, tmp_path, capsys, monkeypatch
+):
+    (tmp_path / "study.sqlite").write_bytes((store / "study.sqlite").read_bytes())
+    (tmp_path / "mine.py").write_text("def best(runs):\n    return runs.groupby('identifier')[['value']].min()\n")
     monkeypatch.setattr(write, "save", lambda figure, *paths: [p.write_text("<svg/>") for p in paths])
     with pytest.raises(SystemExit):
-        main(["report", str(store)])
+        main(["report", str(tmp_path), "--plugin", f"{tmp_path / 'mine.py'}:best"])
     printed = capsys.readouterr().out
-    for wanted in ("the paper's pso", "random", "noise-free", "Complete: 4 of 4 runs.", "wrote report.md"):
+    for wanted in ("the paper's pso", "random", "noise-free", "Complete: 4 of 4 runs.", "wrote report.md and "):
         assert wanted in printed
+    best = pd.read_csv(tmp_path / "own_best.csv").set_index("identifier")["value"]
+    assert best.to_dict() == load_study(store).runs.groupby("identifier")["value"].min().to_dict()
+    assert "mine.py:best" in (tmp_path / "report.md").read_text()
 
 
 def test_a_report_that_fails_leaves_nothing(store, tmp_path, monkeypatch):
