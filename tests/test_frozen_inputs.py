@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import armid
-from armid.cli.main import app, main
+from armid.cli.main import main
 from armid.cli.new import KINDS
 from armid.model import EFFECTS, PLANTS
 from armid.registry import load_plugin, load_registry
@@ -92,21 +92,13 @@ def test_the_plant_of_a_user_is_read_and_composed():
     assert [guard.name for guard in told.guards] == ["upper_limit", "lower_limit"]
 
 
-def commands_of(group, words=()):
-    """Return the words that call a command -> what it takes."""
-    found = {}
-    for name, command in group.commands.items():
-        if hasattr(command, "commands"):
-            found |= commands_of(command, (*words, name))
-        else:
-            taken = {o for p in command.params for o in p.opts if p.param_type_name == "option"}
-            taken |= {f"<{p.name}>" for p in command.params if p.param_type_name == "argument"}
-            found[" ".join((*words, name))] = taken
-    return found
-
-
-def test_every_command_and_option_is_still_there():
-    there = commands_of(app)
+def test_every_command_and_option_is_still_there(every_command):
+    there = {
+        " ".join(words): {
+            f"<{p.name}>" if p.param_type_name == "argument" else o for p in command.params for o in p.opts
+        }
+        for words, command in every_command.items()
+    }
     for line in (FROZEN / "options.txt").read_text(encoding="utf-8").splitlines():
         command = re.split(r" (?=--|<)", line)[0]
         assert set(line.removeprefix(command).split()) <= there[command], command
