@@ -176,3 +176,13 @@ def test_a_warning_is_one_line(run, small_folder, tmp_path, write_axis):
     assert re.fullmatch(r"armid: warning: axis/move\.csv: irregular sampling: .*\n", uneven.err)
     said = "--fix p0=3.05 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa; it is taken as it is"
     assert outside.err == f"armid: warning: {said}\n"
+
+
+def test_a_bad_place_is_refused_before_the_search(refused, paper_arm_folder, tmp_path, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("the search was started")
+
+    monkeypatch.setattr("armid.estimation.identify", never)
+    (tmp_path / "file").write_text("")
+    assert "is a file: a folder is expected" in refused("identify", paper_arm_folder, "--out", tmp_path / "file")
+    assert "Not a directory" in refused("identify", paper_arm_folder, "--out", tmp_path / "file" / "out")

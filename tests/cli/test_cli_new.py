@@ -56,34 +56,6 @@ def test_a_link_that_leads_nowhere_is_not_written_through(refused, tmp_path):
     assert not (tmp_path / "elsewhere.py").exists()
 
 
-@pytest.mark.parametrize(("arguments", "fragments"), [
-    (["effct", "mine"], ["kind 'effct'", "did you mean 'effect'"]),
-    (["effect", "my drag"], ["effect 'my drag' is no usable name", "single underscores are expected"]),
-    (["effect", "../drag"], ["effect '../drag' is no usable name"]),
-    (["plant", "class"], ["plant 'class' is no usable name"]),
-    (["plant", "time"], ["plant 'time' cannot have this name"]),
-    (["effect", "coulomb"], ["effect 'coulomb' is there already", "another name is expected"]),
-    (["effect", "rate"], ["effect 'rate' is there already"]),
-    (["fitness", "rmse"], ["fitness 'rmse' is there already"]),
-    (["identifier", "pso"], ["identifier 'pso' is there already"]),
-    (["plant", "driven_axis"], ["plant 'driven_axis' is there already"]),
-    (["effect", "np"], ["effect 'np'", "the file itself uses"]),
-    (["fitness", "measured"], ["fitness 'measured'", "the file itself uses"]),
-    (["effect", "json"], ["effect 'json'", "json.py would hide the module 'json'"]),
-    (["campaign", "../axis"], ["campaign '../axis' is no usable name"]),
-    (["campaign", ".."], ["campaign '..' is no usable name"]),
-    (["effect", "mine", "--out", "file"], ["--out file is a file"]),
-    (["campaign", "mine", "--out", "file"], ["'file/mine' cannot be written"]),
-    (["effect"], ["Missing argument 'NAME'"]),
-])  # fmt: skip
-def test_bad_names_and_places(refused, tmp_path, arguments, fragments):
-    (tmp_path / "file").write_text("")
-    sentence = refused("new", *arguments)
-    for fragment in fragments:
-        assert fragment in sentence
-    assert [p.name for p in tmp_path.iterdir()] == ["file"]
-
-
 def test_check_takes_a_campaign_and_tells_what_does_not_hold(run, refused, tmp_path):
     assert "campaign 'nowhere' does not exist" in refused("check", "nowhere")
     run("new", "campaign", "my_axis")

@@ -58,18 +58,6 @@ def test_a_user_s_things_are_listed(run, mine, what, name, line):
     assert line in run("list", what, "--plugin", f"{mine}:{name}").out
 
 
-@pytest.mark.parametrize(("arguments", "fragments"), [
-    (["effect"], ["list 'effect'", "did you mean 'effects'"]),
-    ([], ["Missing argument", "effects|plants|fitness|identifiers"]),
-    (["effects", "--plugin", "mine"], ["'mine'", "FILE.py:attribute"]),
-    (["effects", "--plugin", "nowhere.py:drag"], ["'nowhere.py:drag'", "there is no file nowhere.py"]),
-])  # fmt: skip
-def test_list_refuses(refused, arguments, fragments):
-    sentence = refused("list", *arguments)
-    for fragment in fragments:
-        assert fragment in sentence
-
-
 @pytest.mark.parametrize("name", [pytest.param("cubic_drag", marks=pytest.mark.slow), "largest_miss", "evolution"])
 def test_check_runs_the_contract(run, mine, name):
     ran = run("check", f"{mine}:{name}")
@@ -82,12 +70,6 @@ def test_check_tells_what_does_not_hold(run, mine):
     ran = run("check", f"{mine}:diverging")
     assert ran.code == 1
     assert "FAIL" in ran.out
-
-
-def test_check_refuses_what_cannot_be_read(refused, mine):
-    assert "has no 'cubic_dra', did you mean 'cubic_drag'" in refused("check", f"{mine}:cubic_dra")
-    assert "is of type int" in refused("check", f"{mine}:number")
-    assert "Missing argument" in refused("check")
 
 
 @pytest.mark.slow
@@ -112,15 +94,6 @@ def test_import_makes_a_campaign_that_can_be_identified(run, tmp_path):
     assert float(re.search(r"mass +│ ([\d.]+) +│ kg", found.out)[1]) == pytest.approx(10.0, rel=0.01)
 
 
-def test_import_refuses_a_folder_without_the_files(refused, tmp_path):
-    sentence = refused("import", "emps", tmp_path, "--out", tmp_path / "out")
-    assert "DATA_EMPS.mat" in sentence
-    assert "does not exist" in sentence
-    assert not (tmp_path / "out").exists()
-    assert "Missing option '--out'" in refused("import", "emps", tmp_path)
-    assert "No such command 'emp'" in refused("import", "emp")
-
-
 def test_help_tells_every_option(run, every_command):
     for words in ((), *every_command):
         ran = run(*words, "--help")
@@ -142,10 +115,6 @@ def test_without_a_command_the_help_is_shown(run):
     ran = run()
     assert ran.code == 2
     assert "Commands:" in ran.out + ran.err
-
-
-def test_an_unknown_command_is_refused(refused):
-    assert "did you mean 'simulate'" in refused("simulte").lower()
 
 
 def test_version(run):
