@@ -72,8 +72,9 @@ def jobs(tree: Path, folder: Path, data: Path | None) -> dict[str, list[list[str
     done["engine"] = [[sys.executable, "-c", engine_text(tree, folder)]]
     for name in IDENTIFIERS:
         fitness = "rmse" if "least_squares" in name else "similarity"
-        done[f"identify_{name}"] = [[*armid, "identify", loops["paper_arm"], "--identifier", name, "--fitness", fitness,
-                                     "--budget", "1500", "--seed", "3", "--out", str(folder / f"identify_{name}")]]  # fmt: skip
+        words = ["--identifier", name, "--fitness", fitness, "--budget", "1500", "--seed", "3"]
+        out = str(folder / f"identify_{name}")
+        done[f"identify_{name}"] = [[*armid, "identify", loops["paper_arm"], *words, "--out", out]]
     for name, campaign in loops.items():
         done[f"loop_{name}"] = [[*armid, "close-loop", campaign, "--out", str(folder / f"loop_{name}")]]
     done["identifiability"] = [

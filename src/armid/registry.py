@@ -38,7 +38,8 @@ ACCEPTS: dict[str, Callable[[Any], bool]] = {
 }
 KINDS = tuple(ACCEPTS)
 EXPECTED = (
-    "a Plant, an Effect, a fitness function (measured, simulated), an analysis (runs) or an algorithm of pymoo is expected"
+    "a Plant, an Effect, a fitness function (measured, simulated), an analysis (runs) or an algorithm of pymoo is "
+    "expected"
 )
 
 

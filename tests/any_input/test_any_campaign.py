@@ -15,13 +15,13 @@ def test_the_writer_of_toml_is_right():
     assert read_whatever(toml_of(AXIS), AXIS_CSV.encode()) is not None
 
 
-@many(300)
+@many(120)
 @given(mutated(ARM))
 def test_any_value_for_the_arm(table):
     read_whatever(toml_of(table), ARM_CSV.encode())
 
 
-@many(300)
+@many(120)
 @given(mutated(AXIS))
 def test_any_value_for_an_axis(table):
     read_whatever(toml_of(table), AXIS_CSV.encode())

@@ -11,31 +11,31 @@ def test_the_originals_read():
     assert read_whatever(AXIS_TOML.encode(), AXIS_CSV.encode()) is not None
 
 
-@many(300)
+@many(120)
 @given(edits, edits)
 def test_edited_arm(toml, csv):
     read_whatever(edited(ARM_TOML, toml), edited(ARM_CSV, csv))
 
 
-@many(300)
+@many(120)
 @given(edits, edits)
 def test_edited_axis(toml, csv):
     read_whatever(edited(AXIS_TOML, toml), edited(AXIS_CSV, csv))
 
 
-@many(300)
+@many(120)
 @given(edits)
 def test_edited_numbers(csv):
     read_whatever(AXIS_TOML.encode(), edited(AXIS_CSV, csv))
 
 
-@many(300)
+@many(120)
 @given(edits)
 def test_edited_declarations(toml):
     read_whatever(edited(ARM_TOML, toml), ARM_CSV.encode())
 
 
-@many(300)
+@many(120)
 @given(st.lists(st.tuples(st.floats(), st.floats(), st.floats(), st.floats()), min_size=15, max_size=40), st.booleans())
 def test_any_numbers(rows, sort):
     ordered = sorted(rows) if sort else rows
@@ -43,7 +43,7 @@ def test_any_numbers(rows, sort):
     read_whatever(AXIS_TOML.replace("restart_s = 0.03", "").encode(), text.encode())
 
 
-@many(300)
+@many(120)
 @given(st.lists(st.integers(1, 10**12), min_size=19, max_size=60), st.sampled_from([1e-12, 1e-3, 1e17]),
        st.sampled_from([1e30, 1.0, 1e-20, 5e-324]))  # fmt: skip
 def test_any_increasing_times(steps, unit, size):
@@ -56,7 +56,7 @@ def test_any_increasing_times(steps, unit, size):
     read_whatever(arm.encode(), ("time_s,angular_velocity_deg_s,a,b\n" + "".join(rows)).encode())
 
 
-@many(300)
+@many(120)
 @given(st.binary(max_size=300), st.binary(max_size=300))
 def test_any_bytes(toml, csv):
     read_whatever(toml, ARM_CSV.encode())

@@ -32,7 +32,7 @@ PARTS = st.one_of(st.sampled_from(["p0", "k", "eta3", "n", "q", "", "=", ":"]), 
 ARM = Model(PLANTS["shell_transfer_arm"])
 
 
-@many(400)
+@many(160)
 @given(st.sampled_from(NAMES), st.lists(st.tuples(st.one_of(st.sampled_from(OPTIONS), st.text(max_size=5)), TEXTS),
                                         min_size=1, max_size=2))  # fmt: skip
 @example("pso", [("seed", "2")])
@@ -65,7 +65,7 @@ def test_any_name_of_an_identifier(name):
     outcome(lambda: identifier_of(name, IDENTIFIERS).build(BUDGET))
 
 
-@many(200)
+@many(100)
 @given(st.lists(st.tuples(PARTS, PARTS, PARTS), max_size=2), st.lists(st.tuples(PARTS, PARTS), max_size=2))
 def test_any_bounds_and_fixed_values(bounds, fixed):
     def space():

@@ -75,7 +75,7 @@ def test_the_original_is_a_study():
     assert study_of(toml_of(TABLE))
 
 
-@many(150)
+@many(80)
 @given(mutated(TABLE))
 def test_any_value(table):
     study_of(toml_of(table))

@@ -117,6 +117,18 @@ def refused(run: Callable[..., Ran]) -> Callable[..., str]:
 
 
 @pytest.fixture(scope="session")
+def small_folder(paper_arm_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The committed campaign with one lowering to train on and one to hold out: two records are drawn, not seven."""
+    folder = tmp_path_factory.mktemp("small")
+    head, *records = (paper_arm_folder / "campaign.toml").read_text(encoding="utf-8").split("[[records]]")
+    kept = [text for text in records if '"lower.csv"\nrole' in text or '"lower_low_voltage.csv"' in text]
+    (folder / "campaign.toml").write_text("[[records]]".join([head, *kept]), encoding="utf-8")
+    for name in ("lower.csv", "lower_low_voltage.csv"):
+        (folder / name).write_bytes((paper_arm_folder / name).read_bytes())
+    return folder
+
+
+@pytest.fixture(scope="session")
 def mine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file of plug-ins."""
     file = tmp_path_factory.mktemp("plugins") / "mine.py"

@@ -26,9 +26,9 @@ def read_until(terminal, word, seconds=60.0):
     return shown
 
 
-def test_ctrl_c_loses_nothing(paper_arm_folder, tmp_path):
+def test_ctrl_c_loses_nothing(small_folder, tmp_path):
     terminal, theirs = pty.openpty()
-    command = [sys.executable, "-m", "armid", "identify", str(paper_arm_folder), "--budget", "100000000",
+    command = [sys.executable, "-m", "armid", "identify", str(small_folder), "--budget", "100000000",
                "--window", "0:0.7", "--out", str(tmp_path / "out")]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
         os.close(theirs)
@@ -102,9 +102,3 @@ def test_a_search_in_another_thread_leaves_signals_alone(lowering, arm, arm_spac
     with ThreadPoolExecutor(1) as pool:
         told = (lowering, arm, arm_space, FITNESS["rmse"], IDENTIFIERS["pso"], 80)
         assert pool.submit(identify, *told).result().stopped == "budget used"
-
-
-def test_no_bar_without_a_terminal(other_process, paper_arm_folder):
-    ran = other_process("identify", paper_arm_folder, "--budget", 80, "--window", "0:0.3")
-    assert (ran.returncode, ran.stderr) == (0, "")
-    assert "\x1b" not in ran.stdout

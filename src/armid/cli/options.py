@@ -92,8 +92,8 @@ def opened(
     read = read_campaign(campaign, registry.plants, registry.effects)
     if window:
         read = read.with_window(*interval(window, "--window"))
-    model = Model(read.plant)
-    for text in [*read.effects, *(name.strip() for name in effects.split(",") if name.strip())]:
+    model = read.model(registry.effects)
+    for text in (name.strip() for name in effects.split(",") if name.strip()):
         name, _, form = text.partition(":")
         effect: Effect = chosen(name, registry.effects, "effect")
         model = model + (effect.in_form(form) if form else effect)
