@@ -40,6 +40,8 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
         while n <= first + length:
             plain.sample = first
             run = plain.integrated(begin, states, closed, times[n : first + length + 1])
+            if run.status < 0:
+                raise ArmidError(f"scipy does not get beyond {begin:.3g} s: {run.message}")
             hit = [(t[-1], y[-1]) for t, y in zip(run.t_events or [], run.y_events or [], strict=True) if len(t)]
             begin, states = hit[0] if run.status == 1 else (run.t[-1], run.y[:, -1])
             before, closed = closed, plain.switched(float(begin), states, closed)
