@@ -24,7 +24,6 @@ def is_fitness(thing: Any) -> bool:
 
 
 def is_identifier(thing: Any) -> bool:
-    """Tell whether an object is an Identifier, or a class or a function that may make an algorithm."""
     return hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing)
 
 

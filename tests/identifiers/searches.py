@@ -49,6 +49,12 @@ def identifier(name: str, **options: Any) -> Identifier:
     return identifier_of(name, IDENTIFIERS).with_options(options)
 
 
+def asked_of(problem: Bowl) -> tuple[Array, Array]:
+    """All that was asked for and its height."""
+    asked = np.concatenate(problem.batches)
+    return asked, np.asarray(((problem.unit(asked) @ problem.A.T - problem.b) ** 2).sum(axis=1))
+
+
 def ran(name: str, problem: Problem, budget: int = 300, seed: int = 1, **options: Any) -> Result:
     """The result of one run with pymoo's own termination."""
     algorithm = identifier(name, **options).build(budget)

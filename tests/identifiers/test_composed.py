@@ -12,7 +12,7 @@ from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
 from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
-from searches import Bowl, identifier, ran
+from searches import Bowl, asked_of, identifier, ran
 
 from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
@@ -25,24 +25,14 @@ OWN = IDENTIFIERS | {
 }  # fmt: skip
 
 
-def heights(problem: Bowl, X: Array) -> Array:
-    return np.asarray(((problem.unit(X) @ problem.A.T - problem.b) ** 2).sum(axis=1))
-
-
-def cut(problem: Bowl) -> tuple[Array, Array]:
-    """All that was asked for and its height."""
-    asked = np.concatenate(problem.batches)
-    return asked, heights(problem, asked)
-
-
 @pytest.mark.parametrize(("share", "end"), [(None, 100), (0.3, 60), ("0.3", 60), ([0.3], 60), (0.005, 1)])
 def test_the_first_phase_gets_its_share_exactly_and_the_second_starts_at_its_best(share: Any, end: int) -> None:
     problem, alone = Bowl(), Bowl()
     options = {} if share is None else {"share": share}
     ran("random+bobyqa", problem, 200, **options, **{"random.n_candidates": 16})
     minimize(alone, identifier("random", n_candidates=16).build(end), ("n_eval", end), seed=1)
-    asked, f = cut(problem)
-    np.testing.assert_array_equal(asked[:end], cut(alone)[0][:end])
+    asked, f = asked_of(problem)
+    np.testing.assert_array_equal(asked[:end], asked_of(alone)[0][:end])
     assert len(problem.batches[-(-end // 16) - 1]) == (end - 1) % 16 + 1
     start = problem.unit(asked[end])
     # a quadratic model wants a step of room at the bounds
@@ -57,7 +47,7 @@ def test_three_phases_and_the_budget_that_an_early_end_leaves() -> None:
     sizes = [len(batch) for batch in problem.batches]
     assert sizes[0] == 40
     assert sizes[1:] == [1] * len(sizes[1:])
-    asked, f = cut(problem)
+    asked, f = asked_of(problem)
     # bobyqa converges within its 80, the simplex takes over at the best so far: its first point is an old one
     again = [i for i in range(60, 121) if (asked[:i] == asked[i]).all(axis=1).any()]
     assert again
@@ -69,7 +59,7 @@ def test_a_swarm_in_a_chain_has_the_inertia_schedule_of_its_share() -> None:
     ran("pso+bobyqa", problem, 100, share=0.64, **{"pso.n_particles": 8, "pso.velocity_limit": 0.2})
     seed = int(np.random.default_rng(1).integers(1, 2**31 - 1))
     minimize(alone, identifier("pso", n_particles=8, velocity_limit=0.2).build(64), seed=seed)
-    np.testing.assert_array_equal(cut(problem)[0][:64], cut(alone)[0])
+    np.testing.assert_array_equal(asked_of(problem)[0][:64], asked_of(alone)[0])
 
 
 @pytest.mark.parametrize(("name", "options", "sentence"), [
@@ -116,7 +106,7 @@ def test_a_user_s_own_takes_part(name: str) -> None:
     problem = Bowl()
     algorithm: Algorithm = identifier_of(name, OWN).build(400)
     result = minimize(problem, algorithm, ("n_eval", 400), seed=1, copy_algorithm=False)
-    asked, f = cut(problem)
+    asked, f = asked_of(problem)
     assert result.F[0] == f.min() < 1.0
     assert f.min() < f[:100].min()
     if name == "evolution+mine":
@@ -170,7 +160,7 @@ def test_cma_es_is_silent_and_draws_from_nobody_else(
     for _ in range(2):
         problem = Bowl()
         ran(name, problem, 1000, seed=0)
-        runs.append(cut(problem)[0])
+        runs.append(asked_of(problem)[0])
     np.testing.assert_array_equal(*runs)
     assert list(tmp_path.iterdir()) == []
     assert capfd.readouterr() == ("", "")

@@ -143,31 +143,20 @@ def test_failed_neighbours_leave_the_other_side_or_nothing() -> None:
     np.testing.assert_array_equal(slopes(forward, quadratic(here[np.newaxis])[0], values)[2], 0.0)
 
 
-@pytest.mark.parametrize(("name", "kind", "size"), [
-    ("lbfgs", "central", 7), ("slsqp", "central", 7), ("lbfgs", "forward", 4), ("slsqp", "forward", 4),
-])  # fmt: skip
-def test_a_gradient_is_one_population_and_counted(name: str, kind: str, size: int) -> None:
-    problem = Bowl()
-    result = ran(name, problem, 60, differences=kind)
-    sizes = [len(batch) for batch in problem.batches]
-    # where a line search asks for no gradient, a single candidate will do
-    assert set(sizes) - {1} == {size}
-    assert sizes[0] == size
-    assert result.algorithm.evaluator.n_eval == sum(sizes)
-
-
 @pytest.mark.parametrize(("kind", "size"), [("forward", 3), ("central", 6)])
-def test_a_jacobian_is_one_population_and_counted(kind: str, size: int) -> None:
-    problem = Bowl()
-    result = ran("least_squares", problem, 60, differences=kind)
-    assert [len(batch) for batch in problem.batches[:4]] == [1, size, 1, size]
-    assert result.algorithm.evaluator.n_eval == sum(map(len, problem.batches))
+def test_derivatives_are_one_population_and_counted(kind: str, size: int) -> None:
+    for name in ("lbfgs", "slsqp", "least_squares"):
+        problem = Bowl()
+        result = ran(name, problem, 60, differences=kind)
+        sizes = [len(batch) for batch in problem.batches]
+        # a gradient's population holds the point itself, a Jacobian's does not; a line search may need no gradient
+        batch = size if name == "least_squares" else size + 1
+        assert set(sizes) - {1} == {batch}
+        assert batch in sizes[:2]
+        assert result.algorithm.evaluator.n_eval == sum(sizes)
+    assert sizes[:4] == [1, size, 1, size]
     # linear residuals: the first Gauss-Newton step is the solution
     assert result.F[0] == pytest.approx(float(np.linalg.lstsq(problem.A, problem.b, rcond=None)[1][0]), rel=1e-9)
-
-
-def test_residual_vectors_do_not_stay_on_the_individuals() -> None:
-    result = ran("least_squares", Bowl(), 30)
     assert "residuals" not in result.pop[0].data
 
 
@@ -181,7 +170,7 @@ class EnoughError(Exception):
     """Raised by an objective that has had enough."""
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(12))
 def test_an_error_of_the_objective_arrives_whatever_nlopt_makes_of_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((4, 4))

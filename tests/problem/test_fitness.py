@@ -17,8 +17,9 @@ from armid.problem.fitness import (
     as_fitness,
     chi_square,
     dissimilarity,
-    join_records,
+    joined,
     mean_square,
+    record_weights,
     relative_mean_square,
 )  # fmt: skip
 from armid.problem.similarity import numerical_similarity, similarity
@@ -34,10 +35,10 @@ def records() -> list[tuple[Array, Array]]:
     return [(x, x + 0.1 * np.abs(x).max() * rng.standard_normal((5, x.size))) for x in series]
 
 
-def joined(fitness: Fitness, pairs: list[tuple[Array, Array]]) -> Array:
+def whole(fitness: Fitness, pairs: list[tuple[Array, Array]]) -> Array:
     values = [fitness(x, rows, **OF_RECORD) for x, rows in pairs]
     n_samples = np.array([x.size for x, _ in pairs])
-    return join_records(fitness, values, (n_samples - 1) * 0.001, n_samples)
+    return joined(fitness, np.array(values), record_weights(fitness, (n_samples - 1) * 0.001, n_samples))
 
 
 def test_the_campaign_value_of_each_fitness() -> None:
@@ -56,8 +57,8 @@ def test_the_campaign_value_of_each_fitness() -> None:
     }
     assert set(FITNESS) == set(expected)
     for name, values in expected.items():
-        np.testing.assert_allclose(joined(FITNESS[name], pairs), values, rtol=1e-12, err_msg=name)
-        assert joined(FITNESS[name], [(x, x[np.newaxis]) for x, _ in pairs])[0] == 0.0
+        np.testing.assert_allclose(whole(FITNESS[name], pairs), values, rtol=1e-12, err_msg=name)
+        assert whole(FITNESS[name], [(x, x[np.newaxis]) for x, _ in pairs])[0] == 0.0
         assert pickle.loads(pickle.dumps(FITNESS[name])).name == name
 
 
@@ -124,7 +125,7 @@ def test_refuses_an_unknown_join() -> None:
 @pytest.mark.parametrize("weights", [(1.0, 0.0), (1.0, np.nan), (1.0,), ()])
 def test_refuses_weights_that_do_not_fit(weights: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match=r"weighs records|do not match"):
-        join_records(FITNESS["rmse"], np.ones((2, 3)), (1.0, 1.0), weights)
+        joined(FITNESS["rmse"], np.ones((2, 3)), record_weights(FITNESS["rmse"], (1.0, 1.0), weights))
 
 
 def test_likelihood_needs_noise() -> None:

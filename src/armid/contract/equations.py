@@ -66,7 +66,6 @@ def plant_declared(model: Model) -> list[Finding]:
 
 
 def plant_moves(model: Model) -> list[Finding]:
-    """Check how a plant moves."""
     manoeuvres, x = trial_manoeuvres(model.plant), nominal(model)
     moved = [float(np.ptp(simulate(model, m, x).output)) for m in manoeuvres]
     size = f"the signal runs over {', '.join(f'{v:.2g}' for v in moved)} {model.plant.output_unit}"
@@ -279,14 +278,12 @@ def has_null(effect: Effect) -> Finding:
 
 
 def documented(effect: Effect, strict: bool) -> Finding:
-    """Tell whether every function of the effect says what it is."""
     silent = [name for name, f in functions_of(effect) if not (f.__doc__ or "").strip()]
     found = finding("documented", silent, "no docstring: {}", "every function has a docstring")
     return Finding(found.name, found.passed or not strict, found.sentence)
 
 
 def functions_of(effect: Effect) -> Iterator[tuple[str, Equation]]:
-    """Return every function of an effect with the name under which it stands in the graph."""
     yield from ((f"{effect.name}__{port}", f) for port, f in effect.adds.items())
     for state in effect.states:
         yield f"rate__{effect.name}__{state.name}", state.rate

@@ -64,7 +64,9 @@ CUT_AT = 217
 def check_identifier(identifier: Identifier) -> list[Finding]:
     """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed."""
     (meter, problem), (again, _) = (run(identifier, 1, noise=noise) for noise in (1, 2))
-    log = meter.log()
+    log, alike = meter.log(), same(meter, run(identifier, 2)[0])
+    says = "stochastic" if identifier.is_stochastic else "not stochastic"
+    seeded = f"declared {says}, and another seed asks for {'the same' if alike else 'other'} candidates"
     best = f"the best of the log is {np.min(log.F):.3g}, the best that is kept {meter.best_f:.3g}"
     return [
         Finding("exact budget", 0 < meter.used <= BUDGET, f"{meter.used} of {BUDGET} simulations used"),
@@ -72,20 +74,12 @@ def check_identifier(identifier: Identifier) -> list[Finding]:
         Finding("best never lost", meter.best_f == float(np.min(log.F)), best),
         Finding("improves", meter.best_f < float(np.median(log.F[:20])), "better than the median of its first 20"),
         Finding("reproducible", same(meter, again), "the same seed asks for the same candidates, bit for bit"),
-        seeded(identifier, meter),
+        Finding("seed", alike != identifier.is_stochastic, seeded),
         failing(identifier, meter, "survives failures", bare=False),
         failing(identifier, meter, "survives NaN", bare=True),
         raising(identifier),
         resumed(identifier, meter),
     ]
-
-
-def seeded(identifier: Identifier, meter: Meter) -> Finding:
-    """Tell whether another seed changes what is asked for, as it is declared."""
-    alike = same(meter, run(identifier, 2)[0])
-    says = "stochastic" if identifier.is_stochastic else "not stochastic"
-    text = f"declared {says}, and another seed asks for {'the same' if alike else 'other'} candidates"
-    return Finding("seed", alike != identifier.is_stochastic, text)
 
 
 def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -> Finding:

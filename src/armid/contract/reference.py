@@ -40,6 +40,8 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
         while n <= first + length:
             plain.sample = first
             run = plain.integrated(begin, states, closed, times[n : first + length + 1])
+            if run.status < 0:
+                raise ArmidError(f"scipy does not get beyond {begin:.3g} s: {run.message}")
             hit = [(t[-1], y[-1]) for t, y in zip(run.t_events or [], run.y_events or [], strict=True) if len(t)]
             begin, states = hit[0] if run.status == 1 else (run.t[-1], run.y[:, -1])
             before, closed = closed, plain.switched(float(begin), states, closed)
@@ -72,7 +74,6 @@ class PlainModel:
         self.sample = 0
 
     def evaluate(self, keys: list[str], values: dict[str, Any]) -> list[Any]:
-        """Return the values of some nodes."""
         known = self.known | values
         if tuple(keys) not in self.orders:
             self.orders[tuple(keys)] = self.graph.order(keys)
@@ -85,17 +86,14 @@ class PlainModel:
         return [known[k] for k in keys]
 
     def start(self) -> Array:
-        """Return the initial states."""
         return np.array(self.evaluate([f"initial__{s}" for s in self.states], {}), dtype=float)
 
     def moment(self, time: float, states: Array, closed: Latches) -> dict[str, Any]:
-        """Return what moves, by key, at one time."""
         values: dict[str, Any] = dict(zip(self.states, states, strict=True))
         values |= dict(zip(self.latches, closed, strict=True))
         return values | {"time": time} | {name: self.input_at(name, time) for name in self.inputs}
 
     def input_at(self, name: str, time: float) -> float:
-        """Return an input between its samples."""
         samples, place = self.manoeuvre.inputs[name], (time - self.manoeuvre.start_time) / self.manoeuvre.interval
         if self.inputs[name] == "zero":
             return float(samples[self.sample])
@@ -114,15 +112,12 @@ class PlainModel:
         return np.array(self.evaluate(keys, self.moment(time, states, closed)), dtype=float)
 
     def guard(self, key: str, time: float, states: Array, closed: Latches) -> float:
-        """Return the value of a guard."""
         return float(self.evaluate([key], self.moment(time, states, closed))[0])
 
     def output(self, time: float, states: Array, closed: Latches) -> float:
-        """Return the recorded signal."""
         return float(self.evaluate([self.output_key], self.moment(time, states, closed))[0])
 
     def switched(self, time: float, states: Array, closed: Latches) -> Latches:
-        """Return the latches after a look at their guards."""
         return tuple(
             1.0 if c or self.guard(f"guard__{k}", time, states, closed) <= 1e-12 else 0.0
             for k, c in zip(self.latches, closed, strict=True)

@@ -75,8 +75,6 @@ def as_number(part: Any) -> Any:
 
 
 def chain_method(first: Sequence[tuple[Build, int]], last: Build) -> Method:
-    """Return the search that ends each of the first phases at so many simulations, counted from the chain's start."""
-
     def method(task: SearchTask) -> Search:
         seen = Seen(task)
         for build, end in first:

@@ -95,7 +95,6 @@ class Stencil:
 
     @property
     def n(self) -> int:
-        """Number of parameters."""
         return int(self.points.shape[1])
 
 

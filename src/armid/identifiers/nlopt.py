@@ -42,7 +42,6 @@ class NloptSearch(DeclaredSearch):
         return local_search(task, lambda ask, start: self.descend(cube, seed, ask, start))
 
     def descend(self, cube: Cube, seed: int, ask: Asker, start: Array) -> None:
-        """Minimise from a point of the unit cube."""
         # NLopt's generator belongs to the thread and would be seeded by the clock
         nlopt.srand(seed)
         search = nlopt.opt(getattr(nlopt, self.algorithm), cube.n)
@@ -74,7 +73,6 @@ class NloptSearch(DeclaredSearch):
         return value
 
     def with_gradient(self, u: Array, cube: Cube, ask: Asker, height: Height) -> tuple[float, Array]:
-        """Return height and gradient at a point."""
         raise NotImplementedError
 
 
@@ -95,7 +93,6 @@ class NloptGradientSearch(NloptSearch):
         checked_share("step", self.step)
 
     def with_gradient(self, u: Array, cube: Cube, ask: Asker, height: Height) -> tuple[float, Array]:
-        """Return height and gradient at a point, from one batch of perturbed candidates."""
         beside = stencil(u, self.step, self.differences)
         F = ask(cube.candidates(np.vstack([u, beside.points]))).F
         found = height.of(float(F[0]))

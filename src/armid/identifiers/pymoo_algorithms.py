@@ -57,7 +57,6 @@ class PymooAlgorithm:
         return algorithm(evaluator=SwarmEvaluator(finite=True), **checked_values)
 
     def identifier(self) -> Identifier:
-        """Return its identifier."""
         return Identifier(self.name, self, self.note, is_global=True)
 
 

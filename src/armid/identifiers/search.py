@@ -218,8 +218,6 @@ def in_thread(routine: Routine) -> Search:
 
 
 def run_routine(routine: Routine, asked: "SimpleQueue[Any]", told: "SimpleQueue[Told | None]") -> None:
-    """Run a routine in its thread and say how it ended."""
-
     def ask(X: Array, residuals: bool = False) -> Told:
         asked.put(Ask(X, residuals))
         answer = told.get()
@@ -285,7 +283,6 @@ class SwarmEvaluator(Evaluator):  # type: ignore[misc]
 
 @cache
 def blank() -> dict[str, Any]:
-    """Return the attributes of an individual of which nothing is known."""
     return dict(vars(Individual()))
 
 

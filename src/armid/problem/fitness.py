@@ -115,19 +115,10 @@ def finite_or_inf(values: Array, failed: NDArray[np.bool_]) -> Array:
     return values if good.all() else np.where(good, values, np.inf)
 
 
-def join_records(fitness: Fitness, values: ArrayLike, durations: ArrayLike, n_samples: ArrayLike) -> Array:
-    """Join the values of a campaign's records: one finished value per candidate, (n_candidates,), +inf if one failed.
-
-    values: what the fitness returned, (n_records, n_candidates); durations: of the records' windows [s], (n_records,);
-    n_samples: of the records, (n_records,).
-    Raises ArmidError for shapes that do not match and for weights that are not above 0.
-    """
-    return joined(fitness, np.asarray(values, dtype=np.float64), record_weights(fitness, durations, n_samples))
-
-
 def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike) -> Array:
-    """Return what each record weighs, (n_records,); arguments as of `join_records`.
+    """Return what each record weighs, (n_records,).
 
+    durations: of the records' windows [s], (n_records,); n_samples: of the records, (n_records,).
     Raises ArmidError for weights that are not above 0.
     """
     ones = np.ones(np.shape(n_samples))
@@ -138,7 +129,11 @@ def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike)
 
 
 def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
-    """Return what `join_records` does for values, (n_records, n_candidates), of records that weigh so much."""
+    """Join the values of a campaign's records: one finished value per candidate, (n_candidates,), +inf if one failed.
+
+    table: what the fitness returned, (n_records, n_candidates); weight: of `record_weights`, (n_records,).
+    Raises ArmidError for shapes that do not match.
+    """
     if table.ndim != 2 or weight.shape != table.shape[:1] or len(table) == 0:
         raise ArmidError(f"{table.shape} values and {weight.shape} weights of records do not match")
     failed = ~np.asarray(np.isfinite(table).all(axis=0))
@@ -196,7 +191,6 @@ def inverse_noise(noise: float) -> float:
 
 
 def unity(noise: float) -> float:
-    """Return 1, the weight of a residual in the rmse, whatever the noise."""
     return 1.0
 
 

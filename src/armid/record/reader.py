@@ -233,7 +233,6 @@ def check_key(key: ManoeuvreKey, constants: Mapping[str, float], where: str) -> 
 
 
 def range_of(key: ManoeuvreKey) -> str:
-    """Return in words what a key may be."""
     if key.boolean:
         return "true or false"
     if key.low is None and key.high is None:

@@ -86,7 +86,6 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
 
 
 def check_number(n_samples: int, from_rest: bool, file: str) -> None:
-    """Refuse a record that is too short to say anything."""
     if n_samples < FEWEST_SAMPLES:
         place = "after t = 0" if from_rest else "in the record"
         raise ArmidError(f"{file}: {n_samples} samples {place}, at least {FEWEST_SAMPLES} are expected")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, shown
-from armid.model import Input, Plant
+from armid.model import Plant
 
 Array = NDArray[np.float64]
 LARGEST = 1e30
@@ -29,6 +29,7 @@ SPEEDS = {
     "angular_velocity_rad_s": ("rad/s", 1.0),
     "velocity_m_s": ("m/s", 1.0),
 }
+QUANTITIES = ("angular_velocity", "velocity", "time", "drive")
 POSITIONS = {"position_m": ("m/s", 1.0), "angle_rad": ("rad/s", 1.0), "angle_deg": ("rad/s", DEGREE)}
 
 
@@ -196,19 +197,16 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
         if header not in table.columns:
             raise ArmidError(f"{where}: input '{name}' names the column {shown(header)}, which {table.file} does not "
                              f"have, {nearest(header, table.columns)}")  # fmt: skip
-    found = {i.name: named.get(i.name) or declared_column(i, table) for i in plant.inputs}
-    return {name: header for name, header in found.items() if header is not None}
-
-
-def declared_column(wanted: Input, table: CsvTable) -> str | None:
-    """Return the one header that an input is found under by itself, None where an optional one is absent."""
-    found = [name for name in wanted.columns if name in table.columns]
-    header = table.only_one_of(
-        found, f"one column for input '{wanted.name}' is expected, or its name under [records.inputs]"
-    )
-    if header is None and wanted.required:
-        raise missing(table, f"column for input '{wanted.name}'", wanted.columns)
-    return header
+    found = dict(named)
+    for wanted in plant.inputs:
+        if wanted.name not in named:
+            expected = f"one column for input '{wanted.name}' is expected, or its name under [records.inputs]"
+            column = table.only_one_of([name for name in wanted.columns if name in table.columns], expected)
+            if column is not None:
+                found[wanted.name] = column
+            elif wanted.required:
+                raise missing(table, f"column for input '{wanted.name}'", wanted.columns)
+    return found
 
 
 def si_factor(header: str) -> float:
@@ -218,17 +216,13 @@ def si_factor(header: str) -> float:
 
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
     """Return the sentence for a column that is not there, naming a look-alike in another unit where there is one."""
+
+    def quantity_of(header: str) -> str:
+        return next((q for q in QUANTITIES if header == q or header.startswith(f"{q}_")), header)
+
     quantities = {quantity_of(name) for name in expected}
     alike = [name for name in table.columns if quantity_of(name) in quantities]
     wanted = " or ".join(expected) or "a name under [records.inputs]"
     if alike:
         return ArmidError(f"{table.file}, line 1: column {shown(alike[0])} is in an unknown unit, {wanted} is expected")
     return ArmidError(f"{table.file}, line 1: no {what} among {shown(list(table.columns))}, {wanted} is expected")
-
-
-def quantity_of(header: str) -> str:
-    """Return the quantity of a header without its unit: `angular_velocity` of `angular_velocity_rpm`."""
-    for quantity in ("angular_velocity", "velocity", "time", "drive"):
-        if header == quantity or header.startswith(f"{quantity}_"):
-            return quantity
-    return header
