@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armid.cli.main import main
 from armid.errors import ArmidError
 from armid.record import read_campaign
 from bench import __main__ as bench
@@ -250,3 +251,14 @@ def test_large_campaigns_are_identified_in_memory_that_is_told() -> None:
     assert (long.what, many.what) == ("identify, 20,000 samples", "identify, 10 records")
     for row in (long, many):
         assert row.measured is None or row.measured > 50.0
+
+
+def test_the_command_says_where_the_benchmarks_are_when_they_are_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("armid.cli.check.__file__", str(tmp_path / "lib" / "armid" / "cli" / "check.py"))
+    with pytest.raises(SystemExit) as ended:
+        main(["bench", "--quick"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.startswith("armid: there is no studies/bench here")

@@ -107,6 +107,7 @@ def test_campaigns_of_a_part_are_those_of_the_whole() -> None:
     assert sorted(whole) == list(range(len(cases))) != whole
 
 
+@pytest.mark.slow
 def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path) -> None:
     again = tmp_path / "suite"
     assert main([str(again), *words_of(small.with_name("small.toml")), "--processes", "2"]) == 0

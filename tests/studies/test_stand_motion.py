@@ -127,7 +127,8 @@ def test_a_fast_lag_or_tray_is_near_the_declared_arm(name: str, size: float) -> 
     assert np.abs(shown - moved(name="inside_E", duration_s=0.1).gyro).max() < 1e-3
 
 
-def test_refuses_an_effect_too_stiff_to_integrate() -> None:
+def test_refuses_an_effect_too_stiff_to_integrate(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stand.stage.MOST_RATES", 20_000)
     with pytest.raises(RefusalError, match="too stiff"):
         moved(Effects(tachometer_lag=1e-9), "inside_E", 0.1)
 

@@ -15,74 +15,71 @@ PROGRAM = Path(__file__).parents[2] / "studies" / "test_stand.py"
 QUICK = ["--manoeuvres", "short,empty", "--repeats", "2", "--duration", "0.2"]
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ([], "required: OUT_FOLDER"),
-        (["out", "--p0", "much"], "invalid float"),
-        (["out", "--p0", "-1"], "p0 must be a positive number"),
-        (["out", "--eta3", "1.2"], "cannot exceed 1"),
-        (["out", "--n", "nan"], "n must be a positive number"),
-        (["out", "--p0", "9e6"], "leave the travel"),
-        (["out", "--manoeuvres", "jump"], "no manoeuvre 'jump'"),
-        (["out", "--manoeuvres", "a=1:2"], "must read NAME="),
-        (["out", "--manoeuvres", "a=1:x:shell:28"], "no number"),
-        (["out", "--manoeuvres", "a=1:80:shell:28"], "outside the travel"),
-        (["out", "--manoeuvres", "a=1:1:shell:28"], "starts at its target"),
-        (["out", "--manoeuvres", "a=1:2:shell:0"], "positive voltage"),
-        (["out", "--manoeuvres", "a/b=1:2:shell:28"], "must be letters"),
-        (["out", "--manoeuvres", "lower,lower"], "each of them once"),
-        (["out", "--manoeuvres", "lower,lower_2=0:9:shell:28"], "a repeat of lower needs"),
-        (["out", "--holdout", "inside_E"], "none of the campaign's"),
-        (["out", "--holdout", "lower,raise,short,empty"], "nothing to train on"),
-        (["out", "--repeats", "0"], "repeats must be 1"),
-        (["out", "--seed", "-1"], "seed must be 0"),
-        (["out", "--duration", "0"], "between 0.01 and 10"),
-        (["out", "--window-s", "0.5", "0.2"], "window must rise"),
-        (["out", "--noise-deg-s", "-1"], "noise_deg_s must be"),
-        (["out", "--effect", "cool=1"], "no effect"),
-        (["out", "--figure", "sub/a.png"], "mere file name"),
-        (["out", "--figure", "a.png", "--repeats", "1"], "--repeats must be 2"),
-        (["out", "--name", "a b"], "--name"),
-        (["out", "--colour", "red"], "unrecognized"),
-        (["file"], "is a file"),
-        (["file/out"], "cannot be"),
-        (["full"], "not empty"),
-        (["full", "--force"], "holds no campaign.toml"),
-    ],
-)
+REFUSED: list[tuple[list[str], str]] = [
+    ([], "required: OUT_FOLDER"),
+    (["out", "--p0", "much"], "invalid float"),
+    (["out", "--p0", "-1"], "p0 must be a positive number"),
+    (["out", "--eta3", "1.2"], "cannot exceed 1"),
+    (["out", "--n", "nan"], "n must be a positive number"),
+    (["out", "--p0", "9e6"], "leave the travel"),
+    (["out", "--manoeuvres", "jump"], "no manoeuvre 'jump'"),
+    (["out", "--manoeuvres", "a=1:2"], "must read NAME="),
+    (["out", "--manoeuvres", "a=1:x:shell:28"], "no number"),
+    (["out", "--manoeuvres", "a=1:80:shell:28"], "outside the travel"),
+    (["out", "--manoeuvres", "a=1:1:shell:28"], "starts at its target"),
+    (["out", "--manoeuvres", "a=1:2:shell:0"], "positive voltage"),
+    (["out", "--manoeuvres", "a/b=1:2:shell:28"], "must be letters"),
+    (["out", "--manoeuvres", "lower,lower"], "each of them once"),
+    (["out", "--manoeuvres", "lower,lower_2=0:9:shell:28"], "a repeat of lower needs"),
+    (["out", "--holdout", "inside_E"], "none of the campaign's"),
+    (["out", "--holdout", "lower,raise,short,empty"], "nothing to train on"),
+    (["out", "--repeats", "0"], "repeats must be 1"),
+    (["out", "--seed", "-1"], "seed must be 0"),
+    (["out", "--duration", "0"], "between 0.01 and 10"),
+    (["out", "--window-s", "0.5", "0.2"], "window must rise"),
+    (["out", "--noise-deg-s", "-1"], "noise_deg_s must be"),
+    (["out", "--effect", "cool=1"], "no effect"),
+    (["out", "--figure", "sub/a.png"], "mere file name"),
+    (["out", "--figure", "a.png", "--repeats", "1"], "--repeats must be 2"),
+    (["out", "--name", "a b"], "--name"),
+    (["out", "--colour", "red"], "unrecognized"),
+    (["file"], "is a file"),
+    (["file/out"], "cannot be"),
+    (["full"], "not empty"),
+    (["full", "--force"], "holds no campaign.toml"),
+]
+EFFECTS_REFUSED = [
+    (["cool=1"], "no effect 'cool'"),
+    (["coulomb"], "NAME=SIZE"),
+    (["coulomb=40", "coulomb=30"], "twice"),
+    (["coulomb=-1"], "negative"),
+    (["viscous=nan"], "finite"),
+    (["worm_loss=1"], "below 1.0"),
+    (["coulomb=40", "coulomb_width=0"], "above 0"),
+    (["rocking_damping=0.1"], "nothing without rocking_hz"),
+]
+
+
 def test_refuses_with_one_sentence_and_writes_nothing(
-    words: list[str], sentence: str, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("mine")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").write_text("mine")
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.rglob("*"))
-    assert main(words) == 2
-    said = capsys.readouterr()
-    assert sentence in said.err
-    assert said.err.count("\n") == 1
-    assert said.out == ""
-    assert sorted(tmp_path.rglob("*")) == before
+    for words, sentence in REFUSED:
+        assert main(words) == 2, words
+        said = capsys.readouterr()
+        assert sentence in said.err
+        assert (said.err.count("\n"), said.out) == (1, "")
+        assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["cool=1"], "no effect 'cool'"),
-        (["coulomb"], "NAME=SIZE"),
-        (["coulomb=40", "coulomb=30"], "twice"),
-        (["coulomb=-1"], "negative"),
-        (["viscous=nan"], "finite"),
-        (["worm_loss=1"], "below 1.0"),
-        (["coulomb=40", "coulomb_width=0"], "above 0"),
-        (["rocking_damping=0.1"], "nothing without rocking_hz"),
-    ],
-)
-def test_refuses_effects_that_mean_nothing(words: list[str], sentence: str) -> None:
-    with pytest.raises(RefusalError, match=sentence):
-        read_effects(words)
+def test_refuses_effects_that_mean_nothing() -> None:
+    for words, sentence in EFFECTS_REFUSED:
+        with pytest.raises(RefusalError, match=sentence):
+            read_effects(words)
 
 
 def test_force_replaces_a_campaign_whole(tmp_path: Path) -> None:

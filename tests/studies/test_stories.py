@@ -13,6 +13,7 @@ CAMPAIGNS = Path(__file__).parents[2] / "studies" / "campaigns"
 STORIES = ("one_stroke", "four_strokes", "rocking_shell")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STORIES)
 def test_a_story_can_be_made_again(name: str, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.chdir(tmp_path)
