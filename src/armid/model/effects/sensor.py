@@ -16,8 +16,8 @@ def lag_error(time_constant, lagging, omega):
     return time_constant / np.maximum(time_constant, 1e-3) * (lagging - omega)
 
 
-def gyro_rate(slope):
-    """Rate of the gyro's signal."""
+def slope_itself(slope):
+    """Rate of a signal whose slope is a state."""
     return slope
 
 
@@ -29,7 +29,7 @@ def gyro_slope_rate(time_constant, damping_ratio, lagging, slope, omega):
 
 gyro_lag = Effect(
     name="gyro_lag", adds={"output": lag_error},
-    states=(State("lagging", "speed", gyro_rate, start_speed), State("slope", "speed/s", gyro_slope_rate, zero)),
+    states=(State("lagging", "speed", slope_itself, start_speed), State("slope", "speed/s", gyro_slope_rate, zero)),
     parameters=(
         Parameter("time_constant", "s", 0.0, 0.012, null=0.0, note="1/(2 pi bandwidth)"),
         Parameter("damping_ratio", "1", 0.4, 1.2, nominal=0.7, note="damping over critical damping"),
