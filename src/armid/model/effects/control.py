@@ -3,8 +3,8 @@
 import numpy as np
 
 from armid.model.effect import Effect, Guard, State
-from armid.model.effects import start_speed, zero
-from armid.model.effects.sensor import lag_error, lagging_rate, slope_itself
+from armid.model.effects.sensor import lag_error, lagging_rate
+from armid.model.effects.shared import slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 
 tachometer_lag = Effect(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from armid.model.effect import Effect, State
-from armid.model.effects import start_speed, zero
+from armid.model.effects.shared import slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 
 
@@ -14,11 +14,6 @@ def lag_error(time_constant, lagging, omega):
     and a derivative by tau at the null.
     """
     return time_constant / np.maximum(time_constant, 1e-3) * (lagging - omega)
-
-
-def slope_itself(slope):
-    """Rate of a signal whose slope is a state."""
-    return slope
 
 
 def gyro_slope_rate(time_constant, damping_ratio, lagging, slope, omega):
