@@ -57,20 +57,6 @@ def golden_steps(n: int) -> Array:
     return np.asarray(ratio ** -np.arange(1.0, n + 1.0))
 
 
-def difference(a: Simulation, b: Simulation) -> float:
-    """Return the largest difference of two simulations where both hold."""
-    good = ~(a.failed | b.failed)
-    return float(np.max(np.abs(a.output[good] - b.output[good]), initial=0.0))
-
-
-def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:
-    """Return the largest difference of two simulations after the first switch, where long steps have ended."""
-    switched = np.min(list(a.switch_times.values()), axis=0)
-    good = ~(a.failed | b.failed) & np.isfinite(switched)
-    after = np.arange(a.output.shape[1]) * interval > switched[good, None]
-    return float(np.max(np.abs(a.output[good] - b.output[good])[after], initial=0.0))
-
-
 def calibrate(
     model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str = STANDARD, spans: bool = True
 ) -> Calibration:
@@ -173,3 +159,17 @@ def long_steps(
         else:
             break
     return plan if plan.max() > 1 else None
+
+
+def difference(a: Simulation, b: Simulation) -> float:
+    """Return the largest difference of two simulations where both hold."""
+    good = ~(a.failed | b.failed)
+    return float(np.max(np.abs(a.output[good] - b.output[good]), initial=0.0))
+
+
+def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:
+    """Return the largest difference of two simulations after the first switch, where long steps have ended."""
+    switched = np.min(list(a.switch_times.values()), axis=0)
+    good = ~(a.failed | b.failed) & np.isfinite(switched)
+    after = np.arange(a.output.shape[1]) * interval > switched[good, None]
+    return float(np.max(np.abs(a.output[good] - b.output[good])[after], initial=0.0))

@@ -179,6 +179,7 @@ class Emitter:
         return KernelParts(equations, width, **names, jumping_guards=jumping, wide=bool(self.strengths))
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:
+        """Tell whether nodes depend on one of the wanted ones."""
         return any(k in wanted or self.uses(list(self.graph.nodes[k].needs), wanted) for k in keys)
 
     def fixed_keys(self, moving: list[str]) -> list[str]:
@@ -187,6 +188,7 @@ class Emitter:
         return [k for k in self.graph.nodes if k in needed and self.graph.is_static(k) and not self.empty_port(k)]
 
     def empty_port(self, key: str) -> bool:
+        """Tell whether a node is a port to which nothing is added."""
         return self.graph.nodes[key].kind == "port" and not self.graph.nodes[key].terms
 
     def assignments(self, wanted: list[str], static: bool) -> list[str]:

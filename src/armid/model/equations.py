@@ -157,6 +157,7 @@ def is_code_of(node: ast.Lambda, function: LambdaType) -> bool:
 
 
 def make_definition(name: str, arguments: ast.arguments, body: list[ast.stmt]) -> ast.FunctionDef:
+    """Return a definition without annotations."""
     for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
         argument.annotation = None
     empty = ast.parse("def f(): pass").body[0]

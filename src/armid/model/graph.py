@@ -40,6 +40,7 @@ class Graph:
     nodes: dict[str, Node] = field(default_factory=dict)
 
     def add(self, node: Node) -> None:
+        """Add a node; refuse a second one of its key with ArmidError."""
         if node.key in self.nodes:
             raise ArmidError(f"'{node.key.replace('__', '.')}' is there twice: each effect at most once is expected")
         self.nodes[node.key] = node

@@ -67,10 +67,12 @@ class Scales:
 
     @property
     def speed_unit(self) -> str:
+        """Unit of speed."""
         return f"{self.length_unit}/s"
 
     @property
     def inertia_unit(self) -> str:
+        """Unit of effort over acceleration."""
         return "kg" if self.length_unit == "m" else "kg m2"
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from armid.model.effect import Effect, Guard, State
-from armid.model.effects import start_speed, zero
 from armid.model.effects.sensor import lag_error, lagging_rate
+from armid.model.effects.shared import slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 
 tachometer_lag = Effect(
@@ -101,11 +101,6 @@ def late_command(
     return np.where(closed - acting > 0.5, full, K_p * (lateness(delay, period) * smooth + bend * slope))
 
 
-def smooth_rate(slope):
-    """Rate of the smoothed speed w [rad/s2]."""
-    return slope
-
-
 def slope_rate(delay, period, omega, smooth, slope):
     """Second derivative of the smoothed speed w [rad/s3], 12/T^2 (omega - w - T/2 dw/dt)."""
     T = filter_time(delay, period)
@@ -137,7 +132,7 @@ def still_to_wait(closed, delay, period, waiting, clock):
 controller_delay = Effect(
     name="controller_delay", adds={"feedback": late_feedback, "command": late_command},
     states=(
-        State("smooth", "rad/s", smooth_rate, start_speed),
+        State("smooth", "rad/s", slope_itself, start_speed),
         State("slope", "rad/s2", slope_rate, zero),
         State("waiting", "s", waiting_rate, waited),
         State("clock", "s", clock_rate, zero),

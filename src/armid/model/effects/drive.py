@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from armid.model.effect import Effect, State
-from armid.model.effects import SIGN_WIDTH, SIZE_WIDTH, zero
+from armid.model.effects.shared import SIGN_WIDTH, SIZE_WIDTH, zero
 from armid.model.parameter import Parameter
 
 

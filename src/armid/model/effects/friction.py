@@ -3,7 +3,7 @@
 import numpy as np
 
 from armid.model.effect import Effect, State
-from armid.model.effects import SIGN_WIDTH, SIZE_WIDTH
+from armid.model.effects.shared import SIGN_WIDTH, SIZE_WIDTH
 from armid.model.parameter import Parameter
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from armid.model.effect import Effect, State
-from armid.model.effects import start_speed, zero
+from armid.model.effects.shared import slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 
 
@@ -16,11 +16,6 @@ def lag_error(time_constant, lagging, omega):
     return time_constant / np.maximum(time_constant, 1e-3) * (lagging - omega)
 
 
-def gyro_rate(slope):
-    """Rate of the gyro's signal."""
-    return slope
-
-
 def gyro_slope_rate(time_constant, damping_ratio, lagging, slope, omega):
     """Second derivative of the gyro's signal w, (omega - w - 2 zeta T dw/dt) / T^2."""
     t = np.maximum(time_constant, 1e-3)
@@ -29,7 +24,7 @@ def gyro_slope_rate(time_constant, damping_ratio, lagging, slope, omega):
 
 gyro_lag = Effect(
     name="gyro_lag", adds={"output": lag_error},
-    states=(State("lagging", "speed", gyro_rate, start_speed), State("slope", "speed/s", gyro_slope_rate, zero)),
+    states=(State("lagging", "speed", slope_itself, start_speed), State("slope", "speed/s", gyro_slope_rate, zero)),
     parameters=(
         Parameter("time_constant", "s", 0.0, 0.012, null=0.0, note="1/(2 pi bandwidth)"),
         Parameter("damping_ratio", "1", 0.4, 1.2, nominal=0.7, note="damping over critical damping"),
