@@ -192,7 +192,6 @@ def search(
 def run_by_pymoo(
     algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
 ) -> None:
-
     def after_generation(running: Algorithm) -> None:
         if is_over():
             running.termination.terminate()
