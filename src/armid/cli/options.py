@@ -153,8 +153,9 @@ def accuracy_of(text: str) -> str | None:
 
 def model_of(campaign: "Campaign", effects: str, registry: Registry) -> Model:
     """Return the campaign's model with further effects added."""
-    model = campaign.model(registry.effects)
-    for text in (name.strip() for name in effects.split(",") if name.strip()):
+    model = Model(campaign.plant)
+    wanted = [*campaign.effects, *(name.strip() for name in effects.split(",") if name.strip())]
+    for text in wanted:
         name, _, form = text.partition(":")
         effect = registry.effects.get(name)
         if effect is None:

@@ -15,6 +15,7 @@ from pymoo.optimize import minimize
 
 from armid.errors import ArmidError
 from armid.estimation.information import Information, information_at
+from armid.estimation.least_squares import AT_BOUND as AT_BOUND  # noqa: PLC0414 - the study reads it here
 from armid.estimation.least_squares import held_by_bound
 from armid.identifiers import Identifier, can_run_alone, run_alone
 from armid.model import Model

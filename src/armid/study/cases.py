@@ -100,10 +100,9 @@ def campaign_case(entry: CaseSheet, sheet: StudySheet, known: Known, folder: Pat
     campaign = with_records(read_campaign(path, known.plants, known.effects), entry.records, where)
     if campaign.plant.name not in {v.name for v in known.plants[sheet.plant].variants} | {sheet.plant}:
         raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{sheet.plant}' is expected")
-    model = campaign.model(known.effects)
-    for name in dict.fromkeys(sheet.effects):
-        if name not in campaign.effects:
-            model = model + chosen(known.effects, name, "effect", where)
+    model = Model(campaign.plant)
+    for name in dict.fromkeys((*campaign.effects, *sheet.effects)):
+        model = model + chosen(known.effects, name, "effect", where)
     space = box_of(model, campaign.parameters, sheet, entry, where)
     check_windows_of_campaign(campaign, sheet, where)
     files = tuple(r.file for r in campaign.records)

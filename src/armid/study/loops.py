@@ -15,6 +15,7 @@ from numpy.random import default_rng
 
 from armid.errors import ArmidError, nearest, shown
 from armid.loop import close_loop, report_of
+from armid.model import Model
 from armid.record import read_campaign
 from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import any_table, key, list_of, table_of, text, unknown_name, validated
@@ -209,7 +210,9 @@ def close_loop_run(task: Task, workshop: Workshop) -> Outcome:
     if digest_of(folder) != settings["digest"]:
         raise ArmidError(f"campaign {settings['case']} has changed since the study was started: start it again")
     campaign = read_campaign(folder, known.plants, known.effects)
-    model = campaign.model(known.effects)
+    model = Model(campaign.plant)
+    for name in campaign.effects:
+        model = model + chosen(known.effects, name, "effect", "campaign")
     candidates = {name: chosen(known.effects, name, "effect", "settings") for name in settings["candidates"]}
     bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
     found = close_loop(model, campaign, candidates, default_rng(settings["seed"]), bounds, settings["fixed"], threads=1)

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.identify import campaign_errors, search, versions_of
+from armid.estimation.identify import AT_BOUND, campaign_errors, search, versions_of
 from armid.estimation.information import Information, information_at
-from armid.estimation.least_squares import held_by_bound
 from armid.problem.fitness import Fitness
 from armid.problem.meter import Meter
 from armid.problem.problem import IdentificationProblem
@@ -101,9 +100,11 @@ def parameters(space: Space, x: Array, information: Information) -> list[tuple[A
     """Return value, bounds, Cramer-Rao deviation, largest correlation and flag of each free parameter."""
     low, high = space.low[space.free], space.high[space.free]
     units = [u for u, f in zip(space.units, space.free, strict=True) if f]
+    margin = AT_BOUND * (high - low)
+    at_bound = (x <= low + margin) | (x >= high - margin)
     largest = [largest_correlation(information.correlation, i) for i in range(len(x))]
     columns = (space.free_names, units, x.tolist(), low.tolist(), high.tolist(), information.deviation.tolist(),
-               largest, held_by_bound(space, x).tolist())  # fmt: skip
+               largest, at_bound.tolist())  # fmt: skip
     return list(zip(*columns, strict=True))
 
 
