@@ -44,9 +44,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> list[Findi
     """
     told = [roles(campaign), *(noise_told(r) for r in campaign.records)]
     try:
-        model = Model(campaign.plant)
-        for name in campaign.effects:
-            model = model + effects[name]
+        model = campaign.model(effects)
         space = space_of(model, campaign.parameters)
         free = ", ".join(space.free_names) or "nothing"
         found = [Finding("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")]

@@ -1,1 +1,10 @@
-"""Parameters from records, and how well the records pin them down."""
+"""Parameters from records, and how well the records pin them down.
+
+identify        search the free parameters, judge the best candidate on train and holdout
+least_squares   the least-squares problem, its Jacobian, Levenberg-Marquardt, starts
+information     sensitivities, Fisher information, intervals
+collinearity    groups of parameters that move together
+profile         profile likelihood
+design          what one more record would buy
+examine         all of these for one campaign
+"""

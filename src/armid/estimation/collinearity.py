@@ -1,6 +1,5 @@
 """Parameters that move together: groups whose changes the others of the group make up for."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -10,7 +9,8 @@ from numpy.typing import NDArray
 from armid.estimation.information import SINGULAR
 
 Array = NDArray[np.float64]
-# From here on a group is told of; Brun et al. call indices above 10 to 15 poorly identifiable.
+Members = tuple[int, ...]
+# From here on a group is reported; Brun et al. call indices above 10 to 15 poorly identifiable.
 CRITICAL = 10.0
 # A group explains the collinearity of a larger set when its index comes to this share of the set's.
 EXPLAINS = 0.5
@@ -18,7 +18,7 @@ EXPLAINS = 0.5
 MOST_TRIED, LARGEST_TRIED = 12, 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Group:
     """Hold parameters that the records cannot tell apart.
 
@@ -31,11 +31,26 @@ class Group:
     direction: Array
 
 
-def normalised(fisher: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the information matrix of the parameters that are seen, its diagonal scaled to 1, and which they are."""
-    scale = np.sqrt(np.maximum(np.diag(fisher), 0.0))
-    seen = np.isfinite(scale) & (scale > 0.0)
-    return np.asarray(fisher[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])), seen
+def groups(fisher: Array, names: tuple[str, ...], critical: float = CRITICAL) -> tuple[Group, ...]:
+    """Return the groups of parameters that move together, the worst first.
+
+    The smallest set whose index comes to half of that of all parameters is the first group; then the member that does
+    most harm is taken as known, and the rest is looked at again, until its index is below `critical`.
+    fisher: of the parameters in shares of their range, shape (n_free, n_free); a parameter that is not seen at all has
+    a zero row and is in no group.
+    """
+    scaled, seen = normalised(fisher)
+    visible = tuple(n for n, s in zip(names, seen, strict=True) if s)
+    scale = np.sqrt(np.diag(fisher)[seen])
+    left, found = tuple(range(len(visible))), []
+    while (index := index_of(scaled, left)) >= critical:
+        members = smallest(scaled, left, max(critical, EXPLAINS * index))
+        _, vectors = np.linalg.eigh(scaled[np.ix_(members, members)])
+        moves = vectors[:, 0] / scale[list(members)]
+        moves = moves / moves[int(np.argmax(np.abs(moves)))]
+        found.append(Group(tuple(visible[i] for i in members), index_of(scaled, members), moves))
+        left = min((tuple(i for i in left if i != m) for m in members), key=lambda rest: index_of(scaled, rest))
+    return tuple(found)
 
 
 def collinearity_index(fisher: Array) -> float:
@@ -50,51 +65,21 @@ def collinearity_index(fisher: Array) -> float:
     return float(1.0 / np.sqrt(max(float(np.linalg.eigvalsh(scaled)[0]), SINGULAR)))
 
 
-def groups(fisher: Array, names: tuple[str, ...], critical: float = CRITICAL) -> tuple[Group, ...]:
-    """Return the groups of parameters that move together, the worst first.
-
-    The smallest set whose index comes to half of that of all parameters is the first group; then the member that does
-    most harm is taken as known, and the rest is looked at again, until its index is below `critical`.
-    fisher: of the parameters in shares of their range, shape (n_free, n_free); a parameter that is not seen at all has
-    a zero row and is in no group.
-    """
-    scaled, seen = normalised(fisher)
-    told = tuple(n for n, s in zip(names, seen, strict=True) if s)
-    scale = np.sqrt(np.diag(fisher)[seen])
-    left, found = tuple(range(len(told))), []
-    while (index := index_of(scaled, left)) >= critical:
-        members = smallest(scaled, left, max(critical, EXPLAINS * index))
-        found.append(group_of(scaled, scale, told, members))
-        freed = [tuple(i for i in left if i != member) for member in members]
-        left = min(freed, key=lambda rest: index_of(scaled, rest))
-    return tuple(found)
+def normalised(fisher: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the information matrix of the parameters that are seen, its diagonal scaled to 1, and which they are."""
+    scale = np.sqrt(np.maximum(np.diag(fisher), 0.0))
+    seen = np.isfinite(scale) & (scale > 0.0)
+    return np.asarray(fisher[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])), seen
 
 
-def index_of(scaled: Array, members: tuple[int, ...]) -> float:
-    """Return the collinearity index of some of the parameters."""
+def index_of(scaled: Array, members: Members) -> float:
     return collinearity_index(scaled[np.ix_(members, members)])
 
 
-def smallest(scaled: Array, among: tuple[int, ...], index: float) -> tuple[int, ...]:
+def smallest(scaled: Array, among: Members, index: float) -> Members:
     """Return the smallest set, and of its size the worst, that comes to an index; all where none smaller does."""
-    for size, sets in by_size(among):
-        worst = max(sets, key=lambda members: index_of(scaled, members))
+    for size in range(2, (len(among) if len(among) <= MOST_TRIED else LARGEST_TRIED) + 1):
+        worst = max(combinations(among, size), key=lambda members: index_of(scaled, members))
         if index_of(scaled, worst) >= index or size == len(among):
             return worst
     return among
-
-
-def by_size(among: tuple[int, ...]) -> Iterator[tuple[int, list[tuple[int, ...]]]]:
-    """Yield the sets of 2, 3, ... members."""
-    largest = len(among) if len(among) <= MOST_TRIED else LARGEST_TRIED
-    for size in range(2, largest + 1):
-        yield size, list(combinations(among, size))
-
-
-def group_of(scaled: Array, scale: Array, names: tuple[str, ...], members: tuple[int, ...]) -> Group:
-    """Return a group with its index and its direction."""
-    some = list(members)
-    _, vectors = np.linalg.eigh(scaled[np.ix_(some, some)])
-    moves = vectors[:, 0] / scale[some]
-    moves = moves / moves[int(np.argmax(np.abs(moves)))]
-    return Group(tuple(names[i] for i in some), index_of(scaled, members), moves)

@@ -1,7 +1,7 @@
 """What one more record would buy: the intervals to expect from each manoeuvre that could be made next."""
 
 import inspect
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -11,47 +11,29 @@ from numpy.typing import NDArray
 from armid.engine import Schedule, simulate
 from armid.engine.simulate import Simulation
 from armid.estimation.information import Level, inverse
-from armid.estimation.least_squares import STEP
-from armid.model import Manoeuvre, ManoeuvreKey, Model, Plant, State
+from armid.estimation.least_squares import slopes_of, stencil
+from armid.model import Manoeuvre, ManoeuvreKey, Model, Plant
 from armid.problem.replay import Replay
 from armid.problem.space import Space
-from armid.record import Piece, Record
-
-
-def key_travel(plant: Plant) -> dict[str, tuple[float, float]]:
-    """Return state -> its range, SI, where the state starts at the constant of a key that has a range."""
-    found = {}
-    for key in plant.keys:
-        for state in plant.states:
-            if key.low is not None and key.high is not None and starts_at(state, key.constant, key.factor * key.low):
-                ends = sorted((key.factor * key.low, key.factor * key.high))
-                found[state.name] = (ends[0], ends[1])
-    return found
-
-
-def starts_at(state: State, constant: str, value: float) -> bool:
-    """Tell whether a state begins at the value of a constant, tried with one value."""
-    return list(inspect.signature(state.initial).parameters) == [constant] and state.initial(value) == value
-
-
-def is_place(plant: Plant, key: ManoeuvreKey) -> bool:
-    """Tell whether a key is a place of the travel: where a state starts, or a target that must be unlike it."""
-    if key.boolean or key.low is None or key.high is None:
-        return False
-    low = key.factor * key.low
-    starts = {k.constant for k in plant.keys for s in plant.states if starts_at(s, k.constant, low)}
-    return key.constant in starts or key.unlike in starts
-
+from armid.record import Record
 
 Array = NDArray[np.float64]
 Key = float | bool | str
+# Before any record the box is all that is known: variance range^2/12, so 12 of information in shares of the range.
+BOX = 12.0
+VOLUME, WORST, SHRINKAGE = "volume", "worst", "shrinkage"
 # How many places of the travel are tried, its ends left alone by so much of it; start and target are so far apart.
 N_PLACES, MARGIN, APART = 6, 0.05, 0.15
 # Part of its largest recorded value to which another key is turned down (a supply); up is not said to be safe.
 TURNED_DOWN, MOST_LEVELS = 0.85, 3
 # What is done to recorded inputs: size, and how many times as fast.
 SIZES, PACES = (1.0, -1.0, 0.5, -0.5), (1.0, 2.0, 0.5)
-
+# How much finer than the records asked for time is cut: a manoeuvre that nobody calibrated may be stiffer.
+FINER = 2
+# A speed below this part of the fastest record's rms is no motion.
+MOVES = 0.05
+# States of a machine that is driven by inputs may range this much wider than in its records.
+WIDER = 1.05
 # Ends of keys that are units, and how people write them.
 UNITS = {
     "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "N_m": "N m", "rad": "rad", "deg": "deg", "kg": "kg", "V": "V",
@@ -74,12 +56,70 @@ class Feasible:
 
     @property
     def name(self) -> str:
-        """The manoeuvre in words."""
         return words(self.keys, self.repeats)
 
 
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """Hold what one more record of a manoeuvre would give.
+
+    before, after: standard deviations, SI, shape (n_free,), infinite where not determined. gain: what offers are ranked
+    by, above 1 where the record helps: by "volume" the mean factor by which deviations shrink (D-optimality), by
+    "worst" the factor of the worst parameter as a share of its range, by "shrinkage" the largest factor of all.
+    """
+
+    feasible: Feasible
+    before: Array
+    after: Array
+    gain: float
+
+    @property
+    def best(self) -> int:
+        with np.errstate(invalid="ignore"):
+            factors = self.before / self.after
+        return int(np.argmax(np.nan_to_num(factors, nan=1.0, posinf=np.inf)))
+
+
+def offers(
+    motions: "Motions", grid: Iterable[Feasible], space: Space, x: Array, fisher: Array, level: Level,
+    by: str = VOLUME,
+) -> tuple[Offer, ...]:  # fmt: skip
+    """Return what each feasible manoeuvre would buy, the best first.
+
+    F' = F + f J^T J / level^2 with J the sensitivities in the new record; deviations are those of F'^-1. Ranking counts
+    the box as a first record, so that what is not determined yet has a finite deviation, too.
+    motions: at the estimate. x: the estimate, SI, (n_free,). fisher: information of the records, in shares of the
+    range, (n_free, n_free). level: expected of the new record. by: "volume", "worst" or "shrinkage".
+    """
+    low, span = space.low[space.free], space.high[space.free] - space.low[space.free]
+    candidates = space.complete(low + stencil((x - low) / span) * span)
+    before, found = np.sqrt(np.diag(inverse(fisher))) * span, []
+    for feasible, signals in motions.signals(grid, candidates):
+        slopes = slopes_of(signals)
+        more = fisher + level.effective_fraction / level.rms**2 * slopes @ slopes.T
+        found.append(Offer(feasible, before, np.sqrt(np.diag(inverse(more))) * span, gain(fisher, more, by)))
+    return tuple(sorted(found, key=lambda offer: -offer.gain))
+
+
+def gain(fisher: Array, more: Array, by: str) -> float:
+    """Return by what factor deviations shrink from one information matrix to a larger one."""
+    known = BOX * np.eye(len(fisher))
+    if by == VOLUME:
+        volumes = np.linalg.slogdet(more + known)[1] - np.linalg.slogdet(fisher + known)[1]
+        return float(np.exp(0.5 * volumes / len(fisher)))
+    before, after = (np.sqrt(np.diag(np.linalg.inv(m + known))) for m in (fisher, more))
+    return float(before.max() / after.max() if by == WORST else np.max(before / after))
+
+
+def expected_level(levels: Sequence[Level]) -> Level:
+    """Return the level to expect of a new record: the mean square and the mean share of independent samples."""
+    rms = float(np.sqrt(np.mean([level.rms**2 for level in levels])))
+    share = float(np.mean([level.effective_fraction for level in levels]))
+    return Level(rms, share, any(level.from_residual for level in levels), any(level.assumed for level in levels))
+
+
 def manoeuvre_grid(model: Model, records: Sequence[Record]) -> tuple[Feasible, ...]:
-    """Return what a machine could be told to do next, sampled and windowed like the longest of its records.
+    """Return what a machine could be made to do next, sampled and windowed like the longest of its records.
 
     A plant whose records differ by keys: six places of the travel for start and target, well apart; true and false; the
     recorded values of any other key and 0.85 of the largest. A plant that is driven by inputs: each record's at full
@@ -93,89 +133,91 @@ def manoeuvre_grid(model: Model, records: Sequence[Record]) -> tuple[Feasible, .
 
 
 def identity(manoeuvre: Manoeuvre) -> object:
-    """Return what tells two manoeuvres apart."""
     constants = tuple(sorted((name, round(value, 9)) for name, value in manoeuvre.constants.items()))
     return constants, manoeuvre.n_samples, tuple(v.tobytes() for v in manoeuvre.inputs.values())
 
 
 def as_recorded(plant: Plant, record: Record) -> Feasible:
-    """Return a record's manoeuvre once more."""
     piece = record.pieces[0].until_window_end()
-    keys = {k.key: key_of(k, piece.manoeuvre.constants) for k in plant.keys if k.constant in piece.manoeuvre.constants}
+    constants = piece.manoeuvre.constants
+    keys: dict[str, Key] = {
+        k.key: bool(constants[k.constant]) if k.boolean else round(constants[k.constant] / k.factor, 9)
+        for k in plant.keys if k.constant in constants
+    }  # fmt: skip
     return Feasible(keys or {"like": record.file}, piece.manoeuvre, piece.window, record.file)
 
 
-def key_of(key: ManoeuvreKey, constants: Mapping[str, float]) -> Key:
-    """Return the value of a key that gives a constant."""
-    value = constants[key.constant]
-    return bool(value) if key.boolean else round(value / key.factor, 9)
-
-
 def keyed(plant: Plant, records: Sequence[Record]) -> Iterator[Feasible]:
-    """Yield the grid over the plant's keys, everything else as in the longest record."""
     piece = max(records, key=lambda r: r.duration).pieces[0].until_window_end()
-    levels = [key_levels(plant, k, recorded_values(plant, k, records)) for k in plant.keys]
-    for values in product(*levels):
+    by_constant = {k.constant: k for k in plant.keys}
+    pairs = [(k, by_constant[k.unlike]) for k in plant.keys if k.unlike in by_constant]
+    for values in product(*(key_levels(plant, k, records) for k in plant.keys)):
         keys = dict(zip((k.key for k in plant.keys), values, strict=True))
-        if keys and is_apart(plant, keys):
+        # Places that must be unlike each other (start and target) are far enough apart to be a motion.
+        apart = (abs(keys[a.key] - keys[b.key]) >= APART * ((a.high or 0.0) - (a.low or 0.0)) for a, b in pairs)
+        if keys and all(apart):
             constants = {k.constant: float(keys[k.key]) * k.factor for k in plant.keys}
             manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
             yield Feasible(keys, manoeuvre, piece.window)
 
 
-def recorded_values(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> list[float]:
-    """Return the values that a key had in records, in its own unit, the default of its constant where it had none."""
-    default = next(c.value for c in plant.constants if c.name == key.constant)
-    found = {round(r.constants.get(key.constant, default) / key.factor, 9) for r in records}
-    return sorted(found, reverse=True)[:MOST_LEVELS]
-
-
-def key_levels(plant: Plant, key: ManoeuvreKey, recorded: Sequence[float]) -> tuple[float | bool, ...]:
+def key_levels(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> tuple[float | bool, ...]:
     """Return the values that a key takes in the grid, in its own unit."""
     if key.boolean:
         return (True, False)
     if key.low is not None and key.high is not None and is_place(plant, key):
         room = MARGIN * (key.high - key.low)
         return tuple(float(v) for v in np.round(np.linspace(key.low + room, key.high - room, N_PLACES)))
-    values = {*recorded, float(f"{TURNED_DOWN * max(recorded):.2g}")}
+    default = next(c.value for c in plant.constants if c.name == key.constant)
+    recorded = {round(r.constants.get(key.constant, default) / key.factor, 9) for r in records}
+    some = sorted(recorded, reverse=True)[:MOST_LEVELS]
     low, high = -np.inf if key.low is None else key.low, np.inf if key.high is None else key.high
-    return tuple(v for v in sorted(values, reverse=True) if low <= v <= high)
+    levels = sorted({*some, float(f"{TURNED_DOWN * max(some):.2g}")}, reverse=True)
+    return tuple(v for v in levels if low <= v <= high)
 
 
-def is_apart(plant: Plant, keys: Mapping[str, float | bool]) -> bool:
-    """Tell whether places that must be unlike each other (start and target) are far enough apart to be a motion."""
-    by_constant = {k.constant: k for k in plant.keys}
-    pairs = [(k, by_constant[k.unlike]) for k in plant.keys if k.unlike in by_constant]
-    return all(abs(keys[a.key] - keys[b.key]) >= APART * ((a.high or 0.0) - (a.low or 0.0)) for a, b in pairs)
+def is_place(plant: Plant, key: ManoeuvreKey) -> bool:
+    """Tell whether a key is a place of the travel: where a state starts, or a target that must be unlike it."""
+    if key.boolean or key.low is None or key.high is None:
+        return False
+    starts = {k.constant for k in plant.keys for s in plant.states if starts_at(s.initial, k, key.factor * key.low)}
+    return key.constant in starts or key.unlike in starts
+
+
+def starts_at(initial: Callable[..., float], key: ManoeuvreKey, value: float) -> bool:
+    return list(inspect.signature(initial).parameters) == [key.constant] and initial(value) == value
+
+
+def key_travel(plant: Plant) -> dict[str, tuple[float, float]]:
+    """Return state -> its range, SI, where the state starts at the constant of a key that has a range."""
+    found = {}
+    for key, state in product(plant.keys, plant.states):
+        if key.low is not None and key.high is not None and starts_at(state.initial, key, key.factor * key.low):
+            ends = sorted((key.factor * key.low, key.factor * key.high))
+            found[state.name] = (ends[0], ends[1])
+    return found
 
 
 def changed_inputs(records: Sequence[Record]) -> Iterator[Feasible]:
-    """Yield the recorded inputs at other sizes and paces, from the start that they were recorded with."""
-    # the first pair is size 1 and pace 1: what was recorded
-    for record in records:
-        piece = record.pieces[0].until_window_end()
-        for size, pace in list(product(SIZES, PACES))[1:]:
-            keys: dict[str, Key] = {"like": record.file, "size": size, "pace": pace}
-            yield Feasible(keys, changed(piece, size, pace), piece.window)
+    """Yield the recorded inputs at other sizes and paces, from the start that they were recorded with.
 
-
-def changed(piece: Piece, size: float, pace: float) -> Manoeuvre:
-    """Return a manoeuvre whose inputs are so many times as large and as fast; where they end they begin again.
-
-    An input that never changes its sign (a supply, a switch) keeps its size. A reversed manoeuvre starts at the
-    opposite speed.
+    An input that never changes its sign (a supply, a switch) keeps its size; one that ends begins again. A reversed
+    manoeuvre starts at the opposite speed.
     """
-    manoeuvre = piece.manoeuvre
-    constants = dict(manoeuvre.constants)
-    if "start_speed" in constants:
-        constants["start_speed"] *= np.sign(size)
-    inputs = {name: paced(v, pace, manoeuvre.hold) * (size if np.ptp(np.sign(v)) > 1 else 1.0)
-              for name, v in manoeuvre.inputs.items()}  # fmt: skip
-    return replace(manoeuvre, constants=constants, inputs=inputs)
+    # the first pair is size 1 and pace 1: what was recorded
+    for record, (size, pace) in product(records, list(product(SIZES, PACES))[1:]):
+        piece = record.pieces[0].until_window_end()
+        manoeuvre = piece.manoeuvre
+        constants = dict(manoeuvre.constants)
+        if "start_speed" in constants:
+            constants["start_speed"] *= np.sign(size)
+        inputs = {name: paced(v, pace, manoeuvre.hold) * (size if np.ptp(np.sign(v)) > 1 else 1.0)
+                  for name, v in manoeuvre.inputs.items()}  # fmt: skip
+        keys: dict[str, Key] = {"like": record.file, "size": size, "pace": pace}
+        yield Feasible(keys, replace(manoeuvre, constants=constants, inputs=inputs), piece.window)
 
 
 def paced(values: Array, pace: float, hold: str) -> Array:
-    """Return values that run so many times as fast, on the same grid, between samples as they are held."""
     places = (pace * np.arange(values.size)) % values.size
     if hold == "zero":
         return np.asarray(values[places.astype(np.int64)])
@@ -185,29 +227,24 @@ def paced(values: Array, pace: float, hold: str) -> Array:
 def words(keys: Mapping[str, Key], repeats: str) -> str:
     """Return keys in words: "raise, empty, 24 V from 20 to -40 deg" for an arm, else what the keys say."""
     if "size" in keys:
-        told = changed_words(float(keys["size"]), float(keys["pace"]))
-        return f"the inputs of {keys['like']} {told}"
-    text = stroke_words(keys) if {"start_angle_deg", "target_angle_deg"} <= set(keys) else plain_words(keys)
+        size, pace = float(keys["size"]), float(keys["pace"])
+        parts = ["reversed"] if size < 0 else []
+        parts += [f"{abs(size):g} of their size"] if abs(size) != 1.0 else []
+        parts += [f"{pace:g} times as fast"] if pace != 1.0 else []
+        return f"the inputs of {keys['like']} {', '.join(parts) or 'as they were'}"
+    ends = ("start_angle_deg", "target_angle_deg")
+    if set(ends) <= set(keys):
+        start, target = (float(keys[end]) for end in ends)
+        others = [key_words(k, v) for k, v in keys.items() if k not in ends]
+        text = f"{', '.join(['lower' if target > start else 'raise', *others])} from {start:g} to {target:g} deg"
+    else:
+        text = ", ".join(key_words(k, v) for k, v in keys.items())
     if repeats:
         return f"{repeats} once more ({text})" if text and "like" not in keys else f"{repeats} once more"
     return text
 
 
-def stroke_words(keys: Mapping[str, Key]) -> str:
-    """Return the words for a stroke between two angles."""
-    start, target = float(keys["start_angle_deg"]), float(keys["target_angle_deg"])
-    others = [key_words(k, v) for k, v in keys.items() if k not in ("start_angle_deg", "target_angle_deg")]
-    way = "lower" if target > start else "raise"
-    return f"{', '.join([way, *others])} from {start:g} to {target:g} deg"
-
-
-def plain_words(keys: Mapping[str, Key]) -> str:
-    """Return the words for any keys."""
-    return ", ".join(key_words(k, v) for k, v in keys.items())
-
-
 def key_words(key: str, value: Key) -> str:
-    """Return the words for one key: its unit behind the value where its name ends in one."""
     if isinstance(value, bool):
         if key == "shell":
             return "with shell" if value else "empty"
@@ -216,24 +253,8 @@ def key_words(key: str, value: Key) -> str:
         return f"{key} {value}"
     unit = next((u for u in UNITS if key.endswith(f"_{u}")), "")
     name = key.removesuffix(f"_{unit}")
-    told = f"{value:g} {UNITS[unit]}" if unit else f"{value:g}"
-    return told if name == "supply" else f"{name} {told}"
-
-
-def changed_words(size: float, pace: float) -> str:
-    """Return the words for changed inputs."""
-    parts = ["reversed"] if size < 0 else []
-    parts += [f"{abs(size):g} of their size"] if abs(size) != 1.0 else []
-    parts += [f"{pace:g} times as fast"] if pace != 1.0 else []
-    return ", ".join(parts) or "as they were"
-
-
-# How much finer than the records asked for time is cut: a manoeuvre that nobody calibrated may be stiffer.
-FINER = 2
-# A speed below this part of the fastest record's rms is no motion.
-MOVES = 0.05
-# States of a machine that is driven by inputs may range this much wider than in its records.
-WIDER = 1.05
+    text = f"{value:g} {UNITS[unit]}" if unit else f"{value:g}"
+    return text if name == "supply" else f"{name} {text}"
 
 
 def fine_schedule(replays: Sequence[Replay]) -> Schedule:
@@ -242,7 +263,7 @@ def fine_schedule(replays: Sequence[Replay]) -> Schedule:
 
 
 class Motions:
-    """Simulate manoeuvres and pass over those that the machine could not make.
+    """Simulate manoeuvres and leave out those that the machine could not make.
 
     replays: of the train records, they say how finely to cut time and, for a machine driven by inputs, how far it may
     move. candidate: whole, SI, the one that must stay feasible. speed_limit: [unit of the signal], the gyro's range.
@@ -255,7 +276,7 @@ class Motions:
         self.speed_limit = np.inf if speed_limit is None else speed_limit
         self.slowest = MOVES * max(float(np.sqrt(np.mean(r.measured**2))) for r in replays)
         self.travel = key_travel(self.model.plant)
-        self.extents = extents(replays, candidate, self.schedule) if self.model.plant.inputs else {}
+        self.extents = self._recorded_extents(replays) if self.model.plant.inputs else {}
 
     def signals(self, grid: Iterable[Feasible], candidates: Array) -> Iterator[tuple[Feasible, Array]]:
         """Yield each manoeuvre that can be made with the signals of candidates in its window.
@@ -278,92 +299,11 @@ class Motions:
                      for name, (low, high) in self.travel.items())  # fmt: skip
         return moves and inside and all(np.ptp(states[name]) <= wide for name, wide in self.extents.items())
 
-
-def extents(replays: Sequence[Replay], candidate: Array, schedule: Schedule) -> dict[str, float]:
-    """Return state -> how wide it may range: a little more than in the records, for states that files show."""
-    columns = [name for name, state in replays[0].model.states.items() if state.column]
-    widest = dict.fromkeys(columns, 0.0)
-    for replay in replays:
-        for piece in replay.pieces:
-            whole = replace(schedule, plan=None)
-            run = simulate(replay.model, piece.manoeuvre, candidate[np.newaxis], whole, states=True)
-            for name in columns:
-                widest[name] = max(widest[name], WIDER * float(np.ptp(run.states[name])))
-    return widest
-
-
-# Before any record the box is all that is known: variance range^2/12, so 12 of information in shares of the range.
-BOX = 12.0
-VOLUME, WORST, SHRINKAGE = "volume", "worst", "shrinkage"
-
-
-@dataclass(frozen=True, eq=False)
-class Offer:
-    """Hold what one more record of a manoeuvre would give.
-
-    before, after: standard deviations, SI, shape (n_free,), infinite where not determined. gain: what offers are ranked
-    by, above 1 where the record helps: by "volume" the mean factor by which deviations shrink (D-optimality), by
-    "worst" the factor of the worst parameter as a share of its range, by "shrinkage" the largest factor of all.
-    """
-
-    feasible: Feasible
-    before: Array
-    after: Array
-    gain: float
-
-    @property
-    def best(self) -> int:
-        """Place of the parameter whose deviation shrinks most."""
-        with np.errstate(invalid="ignore"):
-            factors = self.before / self.after
-        return int(np.argmax(np.nan_to_num(factors, nan=1.0, posinf=np.inf)))
-
-
-def offers(
-    motions: Motions, grid: Iterable[Feasible], space: Space, x: Array, fisher: Array, level: Level, by: str = VOLUME
-) -> tuple[Offer, ...]:
-    """Return what each feasible manoeuvre would buy, the best first.
-
-    F' = F + f J^T J / level^2 with J the sensitivities in the new record; deviations are those of F'^-1. Ranking counts
-    the box as a first record, so that what is not determined yet has a finite deviation, too.
-    motions: at the estimate. x: the estimate, SI, (n_free,). fisher: information of the records, in shares of the
-    range, (n_free, n_free). level: expected of the new record. by: "volume", "worst" or "shrinkage".
-    """
-    span = space.high[space.free] - space.low[space.free]
-    found = []
-    for feasible, jacobian in jacobians(motions, grid, space, x):
-        more = fisher + level.effective_fraction / level.rms**2 * jacobian.T @ jacobian
-        found.append(Offer(feasible, deviations(fisher) * span, deviations(more) * span, gain(fisher, more, by)))
-    return tuple(sorted(found, key=lambda offer: -offer.gain))
-
-
-def jacobians(motions: Motions, grid: Iterable[Feasible], space: Space, x: Array) -> Iterable[tuple[Feasible, Array]]:
-    """Yield d signal / d share of range of each feasible manoeuvre, shape (n_samples, n_free), central differences."""
-    low, high = space.low[space.free], space.high[space.free]
-    z = np.clip((x - low) / (high - low), STEP, 1.0 - STEP)
-    moves = STEP * np.eye(len(z))
-    candidates = space.complete(low + np.concatenate([z + moves, z - moves]) * (high - low))
-    for feasible, signals in motions.signals(grid, candidates):
-        yield feasible, (signals[: len(z)] - signals[len(z) :]).T / (2.0 * STEP)
-
-
-def deviations(fisher: Array) -> Array:
-    """Return the standard deviations, shares of the range, infinite where not determined."""
-    return np.sqrt(np.diag(inverse(fisher)))
-
-
-def gain(fisher: Array, more: Array, by: str) -> float:
-    """Return by what factor deviations shrink from one information matrix to a larger one."""
-    known = BOX * np.eye(len(fisher))
-    if by == VOLUME:
-        volumes = np.linalg.slogdet(more + known)[1] - np.linalg.slogdet(fisher + known)[1]
-        return float(np.exp(0.5 * volumes / len(fisher)))
-    before, after = (np.sqrt(np.diag(np.linalg.inv(m + known))) for m in (fisher, more))
-    return float(before.max() / after.max() if by == WORST else np.max(before / after))
-
-
-def expected_level(levels: Sequence[Level]) -> Level:
-    """Return the level to expect of a new record: the mean square and the mean share of independent samples."""
-    rms = float(np.sqrt(np.mean([level.rms**2 for level in levels])))
-    share = float(np.mean([level.effective_fraction for level in levels]))
-    return Level(rms, share, any(level.from_residual for level in levels), any(level.assumed for level in levels))
+    def _recorded_extents(self, replays: Sequence[Replay]) -> dict[str, float]:
+        """Return state -> how wide it may range: a little more than in the records, for states that files show."""
+        widest = {name: 0.0 for name, state in self.model.states.items() if state.column}
+        for piece in (piece for replay in replays for piece in replay.pieces):
+            whole = replace(self.schedule, plan=None)
+            run = simulate(self.model, piece.manoeuvre, self.candidate[np.newaxis], whole, states=True)
+            widest = {name: max(wide, WIDER * float(np.ptp(run.states[name]))) for name, wide in widest.items()}
+        return widest

@@ -9,7 +9,7 @@ from armid.errors import ArmidError
 from armid.estimation.collinearity import Group, groups
 from armid.estimation.design import VOLUME, Motions, Offer, expected_level, manoeuvre_grid, offers
 from armid.estimation.information import Information, information_at, level_weights, levels_of
-from armid.estimation.least_squares import WeightedRecords, estimate, refine
+from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine
 from armid.estimation.profile import Profile, profiles
 from armid.model import Model
 from armid.problem.replay import Replay, replays
@@ -17,7 +17,6 @@ from armid.problem.space import Space
 from armid.record import Campaign
 
 Array = NDArray[np.float64]
-AT_BOUND = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +45,7 @@ class Examination:
     @property
     def at_bound(self) -> NDArray[np.bool_]:
         """Which free parameters of the minimum sit on a bound."""
-        low, high = self.space.low[self.space.free], self.space.high[self.space.free]
-        margin = AT_BOUND * (high - low)
-        return np.asarray((self.minimum <= low + margin) | (self.minimum >= high - margin))
+        return held_by_bound(self.space, self.minimum)
 
 
 def examine(
@@ -62,15 +59,39 @@ def examine(
 ) -> Examination:
     """Examine the train records of a campaign; holdout records are not looked at.
 
-    x: free parameters, SI, shape (n_free,), at which sensitivities are taken; None: the least-squares estimate. noise:
-    rms [unit of the records] to assume in place of what was measured. by: how offers are ranked, see `Offer`.
+    Parameters
+    ----------
+    campaign, model, space
+        The records, the model and the box of its parameters.
+    x : array, SI, (n_free,)
+        Free parameters at which sensitivities are taken; None: the least-squares estimate, the records weighed by how
+        far they scatter about it.
+    noise : float, unit of the records
+        Rms to assume in place of what was measured.
+    by : str
+        How offers are ranked, see `Offer`.
+    accuracy : {"standard", "fine"}
+        Of the engine; None: as the noise of each record asks for.
 
-    Raises ArmidError when no parameter is free, x is outside the box, or everything diverges.
+    Raises
+    ------
+    ArmidError
+        When no parameter is free, x is outside the box, or everything diverges.
     """
     if not space.free.any():
         raise ArmidError("no parameter is free: at least one is expected to be examined")
     train = replays(campaign.train, model, space, accuracy)
-    start = weighed_estimate(train, space, noise) if x is None else inside(space, np.asarray(x, dtype=np.float64))
+    if x is None:
+        first = estimate(train, space)
+        start = refine(train, space, first, level_weights(levels_of(train, space, first, noise)))
+    else:
+        start = np.asarray(x, dtype=np.float64)
+        low, high = space.low[space.free], space.high[space.free]
+        for name, value, a, b in zip(space.free_names, start, low, high, strict=True):
+            if not a <= value <= b:
+                raise ArmidError(
+                    f"{name} is {value:g}, a value from {a:g} to {b:g} is expected: other bounds can be given"
+                )
     records = WeightedRecords(train, space, level_weights(levels_of(train, space, start, noise)))
     if not np.isfinite(records.chi2(records.shares(start))[0]):
         raise ArmidError("the simulation diverges at the point that was given: another point is expected")
@@ -81,20 +102,5 @@ def examine(
     motions = Motions(train, space.complete(at[np.newaxis])[0], campaign.gyro_range)
     grid = manoeuvre_grid(model, [r.record for r in train])
     bought = offers(motions, grid, space, at, information.fisher, expected_level(information.levels), by)
-    told = groups(information.fisher, space.free_names)
-    return Examination(campaign, model, space, train, at, x is not None, minimum, information, told, found, bought, by)
-
-
-def weighed_estimate(train: tuple[Replay, ...], space: Space, noise: float | None) -> Array:
-    """Return the least-squares estimate, the records weighed by how far they scatter about it."""
-    first = estimate(train, space)
-    return refine(train, space, first, level_weights(levels_of(train, space, first, noise)))
-
-
-def inside(space: Space, x: Array) -> Array:
-    """Return the point; refuse one that is outside the box."""
-    low, high = space.low[space.free], space.high[space.free]
-    for name, value, a, b in zip(space.free_names, x, low, high, strict=True):
-        if not a <= value <= b:
-            raise ArmidError(f"{name} is {value:g}, a value from {a:g} to {b:g} is expected: other bounds can be given")
-    return x
+    return Examination(campaign, model, space, train, at, x is not None, minimum, information,
+                       groups(information.fisher, space.free_names), found, bought, by)  # fmt: skip

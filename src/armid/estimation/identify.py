@@ -15,6 +15,8 @@ from pymoo.optimize import minimize
 
 from armid.errors import ArmidError
 from armid.estimation.information import Information, information_at
+from armid.estimation.least_squares import AT_BOUND as AT_BOUND  # noqa: PLC0414 - the study reads it here
+from armid.estimation.least_squares import held_by_bound
 from armid.identifiers import Identifier, can_run_alone, run_alone
 from armid.model import Model
 from armid.problem.fitness import Fitness
@@ -27,6 +29,9 @@ from armid.problem.space import Space
 from armid.record import Campaign
 
 Array = NDArray[np.float64]
+
+
+INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,162 @@ class Errors:
     s: float
     s1: float
     s2: float
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Hold the result of one run.
+
+    candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
+    (None without such records). trace: evaluations and best fitness at each improvement.
+    """
+
+    campaign: Campaign
+    model: Model
+    space: Space
+    fitness: Fitness
+    identifier: str
+    candidate: Array
+    value: float
+    information: Information
+    train: Errors
+    holdout: Errors | None
+    trace: tuple[NDArray[np.int64], Array]
+    train_replays: tuple[Replay, ...]
+    holdout_replays: tuple[Replay, ...]
+    budget: int
+    used: int
+    n_failed: int
+    seed: int
+    stopped: str
+
+    @property
+    def at_bound(self) -> NDArray[np.bool_]:
+        """Which of all parameters are free and sit on a bound."""
+        found = self.space.free.copy()
+        found[found] = held_by_bound(self.space, self.candidate[self.space.free])
+        return found
+
+
+def identify(
+    campaign: Campaign,
+    model: Model,
+    space: Space,
+    fitness: Fitness,
+    identifier: Identifier,
+    budget: int = 12_000,
+    seed: int = 1,
+    target: float | None = None,
+    accuracy: str | None = None,
+    progress: Callable[[Meter], None] | None = None,
+) -> Identification:
+    """Search the free parameters on the train records, then judge the best candidate on train and holdout.
+
+    Holdout records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so
+    far is judged, `stopped` is "interrupted".
+
+    Parameters
+    ----------
+    campaign, model, space
+        The records, the model and the box of its parameters.
+    fitness, identifier, seed
+        What is minimised, by which method, and the seed of its random numbers.
+    budget : int
+        Simulations; one candidate through all train records counts as one.
+    target : float
+        Fitness at which to stop (the paper's step 7).
+    accuracy : {"standard", "fine"}
+        Of the engine; None: as the noise of each record asks for.
+    progress : callable
+        Called with the meter after each generation.
+
+    Raises
+    ------
+    ArmidError
+        For a negative seed, a fitness that the identifier cannot minimise, and when every candidate diverged.
+    """
+    if seed < 0:
+        raise ArmidError(f"the seed is {seed}, a whole number of at least 0 is expected")
+    identifier.refuse(fitness)
+    identifier.build(Meter(budget, target).budget)  # refuses bad options before anything is calibrated
+    train = replays(campaign.train, model, space, accuracy)
+    meter = Meter(budget, target)
+    if space.free.any():
+        stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
+        if meter.best_x is None:
+            raise ArmidError(
+                f"none of {meter.used} candidates has a fitness: each diverged, or the fitness was no finite number"
+            )
+        x = meter.best_x
+    else:
+        stopped, x = "no parameter is free", np.empty(0)
+    candidate = space.complete(x[np.newaxis])[0]
+    if len(x):
+        value = meter.best_f
+    else:  # nobody has asked for its fitness yet
+        signals = [r.signal(candidate[np.newaxis]) for r in train]
+        value = float(fitness_of(fitness, train, [r.measured for r in train], signals, weights_of(fitness, train))[0])
+    holdout = replays(campaign.holdout, model, space, accuracy)
+    errors = campaign_errors(train, candidate)
+    assert errors is not None
+    trace = meter.trace()
+    return Identification(
+        campaign, model, space, fitness, identifier.name, candidate, value, information_at(train, space, x),
+        errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
+        budget, meter.used, meter.n_failed, seed, stopped,
+    )  # fmt: skip
+
+
+def search(
+    problem: IdentificationProblem,
+    meter: Meter,
+    identifier: Identifier,
+    seed: int,
+    progress: Callable[[Meter], None] | None,
+) -> str:
+    """Run the identifier until the meter, the user or it itself stops it; say which."""
+    algorithm = identifier.build(meter.budget)
+    with ctrl_c_waits() as interrupted:
+
+        def is_over() -> bool:
+            if progress is not None:
+                progress(meter)
+            return interrupted() or meter.reached or meter.exhausted
+
+        try:
+            if can_run_alone(algorithm):
+                run_alone(algorithm, problem, seed, is_over)
+            else:
+                run_by_pymoo(algorithm, problem, meter, seed, is_over)
+        except (KeyboardInterrupt, SystemError) as error:
+            # also where compiled code has wrapped it
+            is_interrupt = isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
+            if meter.best_x is None or not is_interrupt:
+                raise
+            return INTERRUPTED
+    if meter.reached:
+        return "target reached"
+    if interrupted():
+        return INTERRUPTED
+    if meter.exhausted:
+        return "budget used" if meter.target is None else "budget used, target not reached"
+    return f"{identifier.name} stopped by itself"
+
+
+def run_by_pymoo(
+    algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
+) -> None:
+    def after_generation(running: Algorithm) -> None:
+        if is_over():
+            running.termination.terminate()
+            running.termination.update(running)
+
+    options = {"seed": seed, "callback": after_generation, "copy_algorithm": False}
+    minimize(problem, algorithm, MeterTermination(meter), **options)
+
+
+def versions_of(packages: Sequence[str]) -> dict[str, str]:
+    return {"python": platform.python_version(), **{p: version(p) for p in packages}}
 
 
 def record_errors(replay: Replay, candidate: Array) -> Errors:
@@ -98,156 +259,3 @@ def ctrl_c_waits() -> Iterator[Callable[[], bool]]:
         yield lambda: bool(came)
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def is_interrupt(error: BaseException) -> bool:
-    """Say whether an error is Ctrl-C, also where compiled code has wrapped it."""
-    return isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
-
-
-# A parameter this close to its bound, as a share of the range, is held by the bound and not by the records.
-AT_BOUND = 1e-4
-INTERRUPTED = "interrupted"
-
-
-@dataclass(frozen=True, eq=False)
-class Identification:
-    """Hold the result of one run.
-
-    candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
-    (None without such records). trace: evaluations and best fitness at each improvement.
-    """
-
-    campaign: Campaign
-    model: Model
-    space: Space
-    fitness: Fitness
-    identifier: str
-    candidate: Array
-    value: float
-    information: Information
-    train: Errors
-    holdout: Errors | None
-    trace: tuple[NDArray[np.int64], Array]
-    train_replays: tuple[Replay, ...]
-    holdout_replays: tuple[Replay, ...]
-    budget: int
-    used: int
-    n_failed: int
-    seed: int
-    stopped: str
-
-    @property
-    def at_bound(self) -> NDArray[np.bool_]:
-        """Which of all parameters are free and sit on a bound."""
-        margin = AT_BOUND * (self.space.high - self.space.low)
-        low, high = self.candidate <= self.space.low + margin, self.candidate >= self.space.high - margin
-        return self.space.free & (low | high)
-
-
-def identify(
-    campaign: Campaign,
-    model: Model,
-    space: Space,
-    fitness: Fitness,
-    identifier: Identifier,
-    budget: int = 12_000,
-    seed: int = 1,
-    target: float | None = None,
-    accuracy: str | None = None,
-    progress: Callable[[Meter], None] | None = None,
-) -> Identification:
-    """Search the free parameters on the train records, then judge the best candidate on train and holdout.
-
-    budget: simulations, one candidate through all train records counts as one. target: fitness at which to stop (the
-    paper's step 7). progress: called with the meter after each generation. Holdout records are simulated once, after
-    the search. Ctrl-C ends the search and not the run: the best candidate so far is judged, `stopped` is "interrupted".
-
-    Raises ArmidError for a negative seed, a fitness that the identifier cannot minimise, and when every candidate
-    diverged.
-    """
-    if seed < 0:
-        raise ArmidError(f"the seed is {seed}, a whole number of at least 0 is expected")
-    identifier.refuse(fitness)
-    identifier.build(Meter(budget, target).budget)  # refuses bad options before anything is calibrated
-    train = replays(campaign.train, model, space, accuracy)
-    meter = Meter(budget, target)
-    if space.free.any():
-        stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
-        if meter.best_x is None:
-            raise ArmidError(
-                f"none of {meter.used} candidates has a fitness: each diverged, or the fitness was no finite number"
-            )
-        x = meter.best_x
-    else:
-        stopped, x = "no parameter is free", np.empty(0)
-    candidate = space.complete(x[np.newaxis])[0]
-    value = meter.best_f if len(x) else value_of(fitness, train, candidate)
-    holdout = replays(campaign.holdout, model, space, accuracy)
-    errors = campaign_errors(train, candidate)
-    assert errors is not None
-    trace = meter.trace()
-    return Identification(
-        campaign, model, space, fitness, identifier.name, candidate, value, information_at(train, space, x),
-        errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
-        budget, meter.used, meter.n_failed, seed, stopped,
-    )  # fmt: skip
-
-
-def value_of(fitness: Fitness, train: tuple[Replay, ...], candidate: Array) -> float:
-    """Return the fitness of one whole candidate, which nobody searched."""
-    signals = [r.signal(candidate[np.newaxis]) for r in train]
-    return float(fitness_of(fitness, train, [r.measured for r in train], signals, weights_of(fitness, train))[0])
-
-
-def search(
-    problem: IdentificationProblem,
-    meter: Meter,
-    identifier: Identifier,
-    seed: int,
-    progress: Callable[[Meter], None] | None,
-) -> str:
-    """Run the identifier until the meter, the user or it itself stops it; say which."""
-    algorithm = identifier.build(meter.budget)
-    with ctrl_c_waits() as interrupted:
-
-        def is_over() -> bool:
-            if progress is not None:
-                progress(meter)
-            return interrupted() or meter.reached or meter.exhausted
-
-        try:
-            run(algorithm, problem, meter, seed, is_over)
-        except (KeyboardInterrupt, SystemError) as error:
-            if meter.best_x is None or not is_interrupt(error):
-                raise
-            return INTERRUPTED
-    if meter.reached:
-        return "target reached"
-    if interrupted():
-        return INTERRUPTED
-    if meter.exhausted:
-        return "budget used" if meter.target is None else "budget used, target not reached"
-    return f"{identifier.name} stopped by itself"
-
-
-def run(
-    algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
-) -> None:
-    """Run an algorithm until it is over, which is asked after each generation; one of ours without pymoo's loop."""
-    if can_run_alone(algorithm):
-        run_alone(algorithm, problem, seed, is_over)
-        return
-
-    def after_generation(running: Algorithm) -> None:
-        if is_over():
-            running.termination.terminate()
-            running.termination.update(running)
-
-    told = {"seed": seed, "callback": after_generation, "copy_algorithm": False}
-    minimize(problem, algorithm, MeterTermination(meter), **told)
-
-
-def versions_of(packages: Sequence[str]) -> dict[str, str]:
-    """Return package -> version, of Python too."""
-    return {"python": platform.python_version(), **{p: version(p) for p in packages}}

@@ -1,61 +1,27 @@
 """How well records pin down parameters: sensitivities, Fisher information, intervals, correlations."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.engine import Calibration, simulate
-from armid.estimation.least_squares import STEP
+from armid.engine import simulate
+from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
 from armid.problem.replay import Replay
 from armid.problem.space import Space
-from armid.record import Piece
 from armid.record.noise import correlation_sum
 from armid.record.record import NOISE_FREE
 
 Array = NDArray[np.float64]
-
-
-def start_scatter(replay: Replay, space: Space, x: Array, jacobian: Array) -> Array:
-    """Return the covariance of J^T (residual) that comes from noise in the measured starts, (n_free, n_free).
-
-    sum over pieces and start constants c of var(c) g g^T with g = J^T d signal / d c; zero for a machine that starts
-    from rest. jacobian: of the whole record, shape (n_samples, n_free).
-    """
-    scatter = np.zeros((len(x), len(x)))
-    row = 0
-    for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
-        rows = jacobian[row : row + piece.n_samples].T
-        for name, deviation in piece.start_deviation.items():
-            g = rows @ start_sensitivity(replay, piece, calibration, space, x, name) * deviation
-            scatter += np.outer(g, g)
-        row += piece.n_samples
-    return scatter
-
-
-def start_sensitivity(
-    replay: Replay, piece: Piece, calibration: Calibration, space: Space, x: Array, name: str
-) -> Array:
-    """Return d signal / d start constant in the window of a piece (central difference), shape (n_samples,)."""
-    # a speed held for a second is the size of a position
-    move = 1e-4 * replay.model.plant.scales.speed
-    signals = []
-    for sign in (1.0, -1.0):
-        constants = dict(piece.manoeuvre.constants)
-        constants[name] = constants.get(name, 0.0) + sign * move
-        manoeuvre = replace(piece.manoeuvre, constants=constants)
-        run = simulate(replay.model, manoeuvre, space.complete(x[np.newaxis]), calibration.schedule)
-        signals.append(run.output[0, piece.window])
-    return np.asarray((signals[0] - signals[1]) / (2.0 * move))
-
-
 NORMAL_95 = 1.959963984540054
 # Directions whose information is below this share of the strongest cannot be told from nothing.
 SINGULAR = 1e-13
 # A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
 # engine it is the engine's.
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
+# What is assumed for a record without noise, as a share of its rms speed.
+ASSUMED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -64,7 +30,7 @@ class Level:
 
     rms: [unit of the record]; effective_fraction: independent samples per sample; from_residual: the residual was far
     above the noise, so that the residual itself, with its correlation in time, is what scatters; assumed: nothing was
-    measured, the reader was told so.
+    measured, which reports say.
     """
 
     rms: float
@@ -98,43 +64,6 @@ class Information:
         return NORMAL_95 * self.deviation
 
 
-def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
-    """Return d signal / d parameter x range in the windows of a record, shape (n_samples, n_free).
-
-    Central differences with steps of 1e-4 of the range, moved inside the box where they would leave it; all perturbed
-    candidates run as one population.
-    """
-    low, high = space.low[space.free], space.high[space.free]
-    step = STEP * (high - low)
-    centre = np.clip(x, low + step, high - step)
-    moves = np.diag(step)
-    signal = replay.signal(space.complete(np.concatenate([centre + moves, centre - moves])))
-    n = len(x)
-    return (signal[:n] - signal[n:]).T / (2.0 * STEP)
-
-
-def level_of(replay: Replay, space: Space, x: Array) -> Level:
-    """Return the measured noise of a record, or its residual where that is far above the noise.
-
-    A model that lacks something leaves a residual that is large and smooth; intervals from the noise alone would then
-    be too narrow by orders of magnitude.
-    """
-    noise = replay.record.noise
-    residual = residual_of(replay, space, x)
-    rms = float(np.sqrt(np.mean(residual**2)))
-    # How well the noise itself is known: its mean square scatters by 2/n_eff.
-    doubt = 1.0 + 3.0 * np.sqrt(2.0 / (noise.n_samples * noise.effective_fraction))
-    noise_like = rms**2 <= MISFIT * doubt * noise.rms**2
-    if not np.isfinite(rms) or noise_like or rms <= ENGINE_ERRORS * replay.engine_error:
-        return Level(noise.rms, noise.effective_fraction)
-    return Level(rms, 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
-
-
-def residual_of(replay: Replay, space: Space, x: Array) -> Array:
-    """Return measured minus simulated signal in the windows of a record [its unit]."""
-    return np.asarray(replay.measured - replay.signal(space.complete(x[np.newaxis]))[0])
-
-
 def information_at(
     replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...] | None = None
 ) -> Information:
@@ -143,38 +72,82 @@ def information_at(
     Fisher information F = sum over records of f J^T J / level^2 with f the share of samples that are independent;
     covariance = F^-1 (the Cramer-Rao bound of an unbiased estimate). The level is the noise, or the residual where that
     is far above it. A record without noise and without residual gives an interval of width 0. Where records start from
-    a measured state, what its noise does to the estimate is added (see `start_scatter`).
-    x: free parameters, SI, shape (n_free,). levels: one for each record, None: as measured.
+    a measured state, what its noise does to the estimate is added (see `start_changes`).
+
+    Parameters
+    ----------
+    replays, space
+        The records, ready to be simulated, and the box.
+    x : array, SI, (n_free,)
+        Free parameters.
+    levels : tuple of Level
+        One for each record; None: as measured, see `level_of`.
     """
-    span = space.high[space.free] - space.low[space.free]
     levels = tuple(level_of(r, space, x) for r in replays) if levels is None else levels
     noise_free = any(level.rms == 0.0 for level in levels)
-    total, started, slope = np.zeros((len(x), len(x))), np.zeros((len(x), len(x))), np.zeros(len(x))
-    for replay, level in zip(replays, levels, strict=True):
-        jacobian = sensitivities(replay, space, x)
-        weight = 1.0 if noise_free else level.effective_fraction / level.rms**2
-        total += weight * jacobian.T @ jacobian
-        slope += weight * jacobian.T @ residual_of(replay, space, x)
-        if not noise_free:
-            started += weight**2 * start_scatter(replay, space, x, jacobian)
+    records = WeightedRecords(replays, space, (1.0,) * len(replays) if noise_free else level_weights(levels))
+    found = replace(information_of(records, records.shares(x)), levels=levels)
+    if not noise_free:
+        return found
+    shown = np.where(np.isfinite(found.deviation), 0.0, found.deviation)
+    return replace(found, deviation=shown, step=np.zeros(len(x)))
+
+
+def information_of(records: LeastSquaresProblem, z: Array, trust: Array | None = None) -> Information:
+    """Return intervals and correlations at a candidate, in shares of the range, from the weights of a problem.
+
+    trust: 1 for each sample whose residual is noise, below it where the residual is larger, (n_samples,).
+    """
+    residual, jacobian = records.residual_and_slopes(z)
+    rows = np.ones(len(residual)) if trust is None else np.sqrt(trust)
+    residual, jacobian = rows * residual, rows[:, np.newaxis] * jacobian
+    total = jacobian.T @ jacobian
     covariance = inverse(total)
     determined = np.where(np.isfinite(covariance), covariance, 0.0)
-    step = step_inside(determined @ slope, x / span, space.low[space.free] / span, space.high[space.free] / span)
-    covariance = covariance + determined @ started @ determined
+    step = np.clip(z + determined @ (jacobian.T @ residual), 0.0, 1.0) - z
+    started = np.array([jacobian.T @ (rows * change) for change in start_changes(records, z)]).reshape(-1, len(z))
+    covariance = covariance + determined @ (started.T @ started) @ determined
     deviation = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(deviation, deviation)
+        steps = step / deviation
     correlation[~np.isfinite(correlation)] = np.nan
-    known = np.isfinite(deviation)
-    with np.errstate(invalid="ignore"):
-        steps = np.zeros(len(x)) if noise_free else step / deviation
-    shown = np.where(known & noise_free, 0.0, deviation * span)
-    return Information(space.free_names, shown, correlation, levels, steps, total)
+    return Information(records.space.free_names, deviation * records.span, correlation, (), steps, total)
 
 
-def step_inside(step: Array, x: Array, low: Array, high: Array) -> Array:
-    """Return a step cut at the box; all in shares of the range."""
-    return np.asarray(np.clip(x + step, low, high) - x)
+def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
+    """Return d signal / d parameter x range in the windows of a record, shape (n_samples, n_free).
+
+    Central differences with steps of 1e-4 of the range, moved inside the box where they would leave it; all perturbed
+    candidates run as one population. x: free parameters, SI, (n_free,).
+    """
+    records = WeightedRecords((replay,), space, (1.0,))
+    return records.residual_and_slopes(records.shares(x))[1]
+
+
+def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
+    """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,).
+
+    By central differences; nothing for a machine that starts from rest.
+    """
+    candidate = records.space.complete(records.values(z)[np.newaxis])
+    for i, replay in enumerate(records.replays):
+        row = 0
+        # a speed held for a second is the size of a position
+        move = 1e-4 * replay.model.plant.scales.speed
+        for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
+            for name, deviation in piece.start_deviation.items():
+                runs = []
+                for sign in (1.0, -1.0):
+                    constants = dict(piece.manoeuvre.constants)
+                    constants[name] = constants.get(name, 0.0) + sign * move
+                    manoeuvre = replace(piece.manoeuvre, constants=constants)
+                    runs.append(simulate(replay.model, manoeuvre, candidate, calibration.schedule).output[0])
+                changes = [np.zeros(r.record.n_samples) for r in records.replays]
+                slope = (runs[0] - runs[1])[piece.window] / (2.0 * move)
+                changes[i][row : row + piece.n_samples] = deviation * slope
+                yield records.weighted(changes)
+            row += piece.n_samples
 
 
 def inverse(matrix: Array) -> Array:
@@ -207,8 +180,21 @@ def collinear(information: Information, above: float = 0.95) -> list[tuple[str, 
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-# What is assumed for a record without noise, as a share of its rms speed.
-ASSUMED = 1e-3
+def level_of(replay: Replay, space: Space, x: Array) -> Level:
+    """Return the measured noise of a record, or its residual where that is far above the noise.
+
+    A model that lacks something leaves a residual that is large and smooth; intervals from the noise alone would then
+    be too narrow by orders of magnitude.
+    """
+    noise = replay.record.noise
+    residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
+    rms = float(np.sqrt(np.mean(residual**2)))
+    # How well the noise itself is known: its mean square scatters by 2/n_eff.
+    doubt = 1.0 + 3.0 * np.sqrt(2.0 / (noise.n_samples * noise.effective_fraction))
+    noise_like = rms**2 <= MISFIT * doubt * noise.rms**2
+    if not np.isfinite(rms) or noise_like or rms <= ENGINE_ERRORS * replay.engine_error:
+        return Level(noise.rms, noise.effective_fraction)
+    return Level(rms, 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
 
 
 def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | None = None) -> tuple[Level, ...]:
@@ -220,15 +206,13 @@ def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | 
     """
     if noise is not None:
         return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
-    return tuple(shown_level(r, level_of(r, space, x)) for r in replays)
-
-
-def shown_level(replay: Replay, level: Level) -> Level:
-    """Return the level, an assumed one where there is neither noise nor residual to speak of."""
-    least = NOISE_FREE * float(np.max(np.abs(replay.measured)))
-    if not replay.record.is_noise_free or level.rms > least:
-        return level
-    return Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
+    found = []
+    for replay in replays:
+        level = level_of(replay, space, x)
+        if replay.record.is_noise_free and level.rms <= NOISE_FREE * float(np.max(np.abs(replay.measured))):
+            level = Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
+        found.append(level)
+    return tuple(found)
 
 
 def level_weights(levels: Sequence[Level]) -> tuple[float, ...]:

@@ -1,4 +1,8 @@
-"""Least squares inside the box, from a start that is near: what a search or a neighbouring fit has found."""
+"""Least squares inside the box: the problem, its Jacobian, Levenberg-Marquardt from several starts, the set of starts.
+
+Free parameters stand as shares z of their range, in 0 to 1; residuals are measured minus simulated, weighted. The
+engine runs eight candidates in the time of one, so that whatever can be asked at once is one population.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,28 +10,42 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from armid.engine import probes
 from armid.errors import ArmidError
+from armid.model import Model
 from armid.problem.replay import Replay
 from armid.problem.space import Space
 
 Array = NDArray[np.float64]
-# Step of the central differences, as a share of the range: above rounding, below curvature.
+# Step of the differences, as a share of the range: above rounding, below curvature.
 STEP = 1e-4
+# A parameter this close to its bound, as a share of the range, is held by the bound and not by the records.
+AT_BOUND = 1e-4
+# Relative fall of chi2 in one step at which a fit has arrived.
+TOLERANCE = 1e-9
+
+
+def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
+    """Return which of the free parameters x (SI) lie on a bound, shape (n_free,)."""
+    low, high = space.low[space.free], space.high[space.free]
+    margin = AT_BOUND * (high - low)
+    return np.asarray((x <= low + margin) | (x >= high - margin))
 
 
 @dataclass(frozen=True, eq=False)
-class WeightedRecords:
-    """Hold records, the space, and the weight of each record: chi2(x) = sum over records of weight^2 |residual|^2.
+class LeastSquaresProblem:
+    """Pose records and a model as min chi2(z), chi2 = |measured - signals(z)|^2 over the box 0 <= z <= 1.
 
-    weights: [1/unit of the record], shape (n_records,); free parameters stand as shares z of their range, in 0 to 1.
+    replays: the records, ready to be simulated. space: the box, SI. A subclass says how signals are weighted.
     """
 
     replays: tuple[Replay, ...]
     space: Space
-    weights: tuple[float, ...]
+
+    @property
+    def model(self) -> Model:
+        return self.replays[0].model
 
     @property
     def span(self) -> Array:
@@ -43,64 +61,81 @@ class WeightedRecords:
         low, high = self.space.low[self.space.free], self.space.high[self.space.free]
         return np.clip(low + z * self.span, low, high)
 
+    def weighted(self, signals: Sequence[Array]) -> Array:
+        """Return signals of all records, (..., n_samples of the record), in units of their noise, end to end."""
+        raise NotImplementedError
+
     @cached_property
     def measured(self) -> Array:
-        """Weighted measured signals of all records, end to end, shape (n_samples,)."""
-        return np.concatenate([w * r.measured for w, r in zip(self.weights, self.replays, strict=True)])
+        return self.weighted([r.measured for r in self.replays])
 
     def signals(self, Z: Array) -> Array:
         """Return weighted simulated signals of candidates in shares, shape (n_candidates, n_samples)."""
         whole = self.space.complete(self.values(Z))
-        parts = [w * r.signal(whole) for w, r in zip(self.weights, self.replays, strict=True)]
-        return np.concatenate(parts, axis=1)
+        return self.weighted([r.signal(whole) for r in self.replays])
 
-    def residual(self, z: Array) -> Array:
-        """Return simulated minus measured at one candidate, weighted, (n_samples,); NaN where it diverges."""
-        return np.asarray(self.signals(z[np.newaxis])[0] - self.measured)
+    def residuals(self, Z: Array) -> Array:
+        """Return measured minus simulated of candidates, (n_candidates, n_samples); NaN where one diverges."""
+        return np.asarray(self.measured - self.signals(np.atleast_2d(Z)))
 
     def chi2(self, Z: Array) -> Array:
-        """Return the weighted sum of squares of candidates, (n_candidates,), infinite where one diverges."""
-        total = np.sum((self.signals(np.atleast_2d(Z)) - self.measured) ** 2, axis=1)
+        """Return the sum of squares of candidates, (n_candidates,), infinite where one diverges."""
+        total = np.sum(self.residuals(Z) ** 2, axis=1)
         return np.where(np.isfinite(total), total, np.inf)
 
     def residual_and_slopes(self, z: Array) -> tuple[Array, Array]:
-        """Return the residual (n_samples,) and d residual / d z (n_samples, n_free), all in one population.
+        """Return the residual (n_samples,) and d signal / d z (n_samples, n_free), all in one population.
 
         Central differences, their steps moved inside the box; where one side diverges the other stands alone, where
         both do the slope is 0.
         """
-        n, moves = len(z), STEP * np.eye(len(z))
-        centre = np.clip(z, STEP, 1.0 - STEP)
-        points = np.concatenate([z[np.newaxis], centre + moves, centre - moves])
-        signals = self.signals(points)
-        above, below = signals[1 : n + 1], signals[n + 1 :]
-        slopes = (above - below) / (2.0 * STEP)
+        signals = self.signals(np.concatenate([z[np.newaxis], stencil(z)]))
+        here, slopes, n = signals[0], slopes_of(signals[1:]), len(z)
         for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1)):
-            slopes[i] = self.one_sided(signals[0], above[i], below[i], float(centre[i] - z[i]))
-        return np.asarray(signals[0] - self.measured), np.ascontiguousarray(slopes.T)
-
-    @staticmethod
-    def one_sided(here: Array, above: Array, below: Array, shift: float) -> Array:
-        """Return the slope from the side that holds, 0 where neither does; shift: of the centre from the candidate."""
-        for signal, step in ((above, STEP + shift), (below, shift - STEP)):
-            if step != 0.0 and np.isfinite(signal).all() and np.isfinite(here).all():
-                return np.asarray((signal - here) / step)
-        return np.zeros_like(here)
+            shift = float(np.clip(z[i], STEP, 1.0 - STEP) - z[i])
+            sides = ((signals[1 + i], shift + STEP), (signals[1 + n + i], shift - STEP))
+            whole = [(signal - here) / step for signal, step in sides if step != 0.0 and np.isfinite(signal).all()]
+            slopes[i] = whole[0] if whole and np.isfinite(here).all() else 0.0
+        return np.asarray(self.measured - here), np.ascontiguousarray(slopes.T)
 
 
-def noise_weights(replays: Sequence[Replay]) -> tuple[float, ...]:
-    """Return 1/noise rms of each record; 1 for all where one record has no noise (the noise-free cannot be weighed)."""
+def stencil(z: Array) -> Array:
+    """Return the candidates of central differences about z, moved inside the box, (2 n_free, n_free)."""
+    centre, moves = np.clip(z, STEP, 1.0 - STEP), STEP * np.eye(len(z))
+    return np.concatenate([centre + moves, centre - moves])
+
+
+def slopes_of(signals: Array) -> Array:
+    """Return d signal / d z from the signals of a stencil, (n_free, n_samples)."""
+    n = len(signals) // 2
+    return np.asarray((signals[:n] - signals[n:]) / (2.0 * STEP))
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedRecords(LeastSquaresProblem):
+    """Weigh the records: chi2(z) = sum over records of weight^2 |residual|^2.
+
+    weights: [1/unit of the record], shape (n_records,).
+    """
+
+    weights: tuple[float, ...]
+
+    def weighted(self, signals: Sequence[Array]) -> Array:
+        """Return signals of all records, (..., n_samples of the record), weighted and end to end."""
+        return np.concatenate([w * s for w, s in zip(self.weights, signals, strict=True)], axis=-1)
+
+
+def weighted_records(
+    replays: tuple[Replay, ...], space: Space, weights: Sequence[float] | None = None
+) -> WeightedRecords:
+    """Return records with weights; None: 1/noise rms, or 1 for all where a record has no noise to weigh by."""
     levels = [r.record.noise.rms for r in replays]
-    return tuple(1.0 if min(levels) == 0.0 else 1.0 / level for level in levels)
+    by_noise = (1.0 if min(levels, default=0.0) == 0.0 else 1.0 / level for level in levels)
+    return WeightedRecords(replays, space, tuple(by_noise if weights is None else map(float, weights)))
 
 
-MOST_EVALUATIONS = 60
-# What holds a parameter that the records do not see where it is, as a share of the slopes: below any rounding of chi2.
-ANCHOR = 1e-8
-# An estimate this close to the box, as a share of the range, is tried on the box itself.
-NEAR = 1e-3
 # How many candidates are spread over the box, and from how many of the best a fit starts.
-N_SPREAD, N_STARTS = 400, 4
+N_SPREAD, N_STARTS = 512, 4
 
 
 def refine(
@@ -112,84 +147,183 @@ def refine(
 ) -> Array:
     """Return the candidate near x0 that minimises sum over records of weight^2 |measured - simulated|^2 in the box.
 
-    A reusable local re-fit: scipy's trust-region reflective least squares on the residuals of all records, residual and
-    Jacobian from one population of 2 n_free + 1 candidates. A step into a region that diverges is shortened; an
-    estimate that the box holds ends on the box exactly.
-    x0: free parameters, SI, shape (n_free,), moved into the box. weights: one for each record [1/unit], None: 1/noise
-    rms, or 1 for all where a record has no noise. tolerance: relative change of cost and of step at which to stop.
-    Returns free parameters, SI, shape (n_free,).
+    Levenberg-Marquardt, see `descend`. A step into a region that diverges is shortened; an estimate that the box holds
+    ends on the box exactly.
 
-    Raises ArmidError when the start diverges.
-    Source: Branch, Coleman, Li 1999, doi:10.1137/S1064827595289108.
+    Parameters
+    ----------
+    replays, space
+        The records, ready to be simulated, and the box.
+    x0 : array, SI, (n_free,)
+        Free parameters, moved into the box.
+    weights : (n_records,), 1/unit of the record
+        None: 1/noise rms, or 1 for all where a record has no noise.
+    tolerance : float
+        Relative fall of the sum of squares in one step at which to stop.
+
+    Returns
+    -------
+    array, SI, (n_free,)
+
+    Raises
+    ------
+    ArmidError
+        When the start diverges.
     """
-    told = noise_weights(replays) if weights is None else tuple(float(w) for w in weights)
-    records = WeightedRecords(replays, space, told)
     if not space.free.any():
         return np.empty(0)
+    records = weighted_records(replays, space, weights)
     return records.values(fit(records, records.shares(np.asarray(x0, dtype=np.float64)), tolerance))
-
-
-def fit(records: WeightedRecords, z0: Array, tolerance: float = 1e-9) -> Array:
-    """Return the local least-squares estimate from a start, both as shares of the range."""
-    start = np.clip(z0, 0.0, 1.0)
-    known: dict[bytes, tuple[Array, Array]] = {}
-
-    def both(z: Array) -> tuple[Array, Array]:
-        if z.tobytes() not in known:
-            known.clear()
-            known[z.tobytes()] = records.residual_and_slopes(z)
-        return known[z.tobytes()]
-
-    if not np.isfinite(both(start)[0]).all():
-        raise ArmidError("a fit cannot start where the simulation diverges: another start is expected")
-    anchor = ANCHOR * (float(np.linalg.norm(both(start)[1])) or 1.0)
-
-    def residual(z: Array) -> Array:
-        return np.concatenate([both(z)[0], anchor * (z - start)])
-
-    def slopes(z: Array) -> Array:
-        return np.concatenate([both(z)[1], anchor * np.eye(len(z))])
-
-    found = least_squares(
-        residual, start, slopes, bounds=(0.0, 1.0), method="trf", x_scale="jac",
-        ftol=tolerance, xtol=tolerance, gtol=None, max_nfev=MOST_EVALUATIONS,
-    )  # fmt: skip
-    best = np.asarray(found.x, dtype=np.float64)
-    return start if records.chi2(start)[0] < 2.0 * found.cost else onto_the_box(records, best, 2.0 * float(found.cost))
-
-
-def onto_the_box(records: WeightedRecords, z: Array, chi2: float) -> Array:
-    """Return the estimate with shares near 0 or 1 put there, one by one, where that does not raise the sum of squares.
-
-    The search keeps strictly inside, so that an estimate that the box holds stops short of it.
-    """
-    best = z
-    for i in np.flatnonzero((z < NEAR) | (z > 1.0 - NEAR)):
-        tried = best.copy()
-        tried[i] = np.round(best[i])
-        value = float(records.chi2(tried)[0])
-        if value <= chi2:
-            best, chi2 = tried, value
-    return best
 
 
 def estimate(replays: tuple[Replay, ...], space: Space, weights: Sequence[float] | None = None) -> Array:
     """Return the least-squares estimate without a start: the best of fits from the best of candidates over the box.
 
-    Deterministic: 400 candidates of a Kronecker sequence, fits from the 4 best of them. Free parameters, SI, (n_free,).
+    Deterministic: see `spread_starts`. weights: as in `refine`. Returns free parameters, SI, (n_free,).
 
     Raises ArmidError when every candidate diverges.
     """
-    told = noise_weights(replays) if weights is None else tuple(float(w) for w in weights)
-    records = WeightedRecords(replays, space, told)
-    n = int(space.free.sum())
-    if n == 0:
+    if not space.free.any():
         return np.empty(0)
+    records = weighted_records(replays, space, weights)
+    return records.values(descend(records, spread_starts(records), TOLERANCE, central=True))
+
+
+def fit(records: LeastSquaresProblem, z0: Array, tolerance: float = TOLERANCE) -> Array:
+    """Return the local least-squares estimate from a start, both as shares of the range.
+
+    Raises ArmidError when the start diverges.
+    """
+    start = np.clip(z0, 0.0, 1.0)
+    if not np.isfinite(records.chi2(start)[0]):
+        raise ArmidError("a fit cannot start where the simulation diverges: another start is expected")
+    return descend(records, [start], tolerance, central=True)
+
+
+def spread_starts(records: LeastSquaresProblem) -> list[Array]:
+    """Return from where to look for the estimate: the best 4 of 512 candidates of a Kronecker sequence over the box.
+
+    Raises ArmidError when every candidate diverges.
+    """
+    n = int(records.space.free.sum())
     spread = probes(np.zeros(n), np.ones(n), N_SPREAD)
-    values = records.chi2(spread)
-    order = np.argsort(values, kind="stable")[:N_STARTS]
-    starts = [spread[i] for i in order if np.isfinite(values[i])]
+    chi2 = records.chi2(spread)
+    starts = [spread[i] for i in np.argsort(chi2, kind="stable")[:N_STARTS] if np.isfinite(chi2[i])]
     if not starts:
         raise ArmidError(f"each of {N_SPREAD} candidates spread over the box diverged: other bounds are expected")
-    fits = [fit(records, start) for start in starts]
-    return records.values(fits[int(np.argmin([records.chi2(z)[0] for z in fits]))])
+    return starts
+
+
+MOST_STEPS = 50
+# Dampings that are tried beside the last that was best, as factors of it; where none helps, all are raised so much.
+LADDER, RAISED = (1e-3, 0.1, 1.0, 10.0), 1e3
+FIRST, LEAST, LARGEST = 1e-3, 1e-9, 1e6
+# Two starts that have come this close to each other, in shares of the range, are one.
+SAME = 1e-3
+
+
+@dataclass(eq=False)
+class Descent:
+    """Hold one start on its way down: shares of the range, residual there, damping of the last step."""
+
+    z: Array
+    residual: Array
+    damping: float = FIRST
+    done: bool = False
+
+    @property
+    def chi2(self) -> float:
+        return float(self.residual @ self.residual)
+
+
+def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: float, central: bool = False) -> Array:
+    """Return the best of the least-squares estimates in the box from some starts that do not diverge, (n_free,).
+
+    Levenberg-Marquardt with steps cut at the box, which hold what the box holds (More 1978, doi:10.1007/BFb0067700).
+    starts: shares of the range. tolerance: relative fall of chi2 in one step at which a start has arrived. central:
+    take slopes from central differences, at twice the price, for an estimate to the last digits.
+    """
+    first = np.clip(np.array(starts), 0.0, 1.0)
+    paths = [Descent(z, r) for z, r in zip(first, records.residuals(first), strict=True)]
+    for _ in range(MOST_STEPS):
+        moving = [p for p in paths if not p.done]
+        if not moving:
+            break
+        advance(records, moving, tolerance, central)
+        apart: list[Descent] = []
+        for path in sorted(paths, key=lambda p: p.chi2):
+            if all(np.max(np.abs(path.z - better.z), initial=0.0) > SAME for better in apart):
+                apart.append(path)
+        paths = apart
+    return min(paths, key=lambda p: p.chi2).z
+
+
+def advance(records: LeastSquaresProblem, paths: Sequence[Descent], tolerance: float, central: bool) -> None:
+    slopes = [records.residual_and_slopes(p.z)[1] for p in paths] if central else forward_slopes(records, paths)
+    left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
+    while left:
+        dampings = [[max(f * p.damping, LEAST) for f in LADDER] for p, *_ in left]
+        tried = [[step_in_box(square, slope, p.z, d) for d in ds]
+                 for (p, square, slope), ds in zip(left, dampings, strict=True)]  # fmt: skip
+        residuals = records.residuals(np.concatenate(tried)).reshape(len(left), len(LADDER), -1)
+        left = [one for one, z, r, d in zip(left, tried, residuals, dampings, strict=True)
+                if not taken(one[0], z, r, d, tolerance)]  # fmt: skip
+
+
+def taken(path: Descent, tried: Sequence[Array], residuals: Array, dampings: Sequence[float], tolerance: float) -> bool:
+    """Move a path to the best of the trials, or raise its damping; tell whether this step is over."""
+    chi2 = np.sum(residuals**2, axis=1)
+    best = int(np.argmin(np.where(np.isfinite(chi2), chi2, np.inf)))
+    before = path.chi2
+    if chi2[best] < before:
+        path.z, path.residual, path.damping = tried[best], residuals[best].copy(), dampings[best]
+        path.done = before - chi2[best] <= tolerance * before
+        return True
+    moved = max(float(np.max(np.abs(z - path.z), initial=0.0)) for z in tried)
+    path.damping *= RAISED
+    path.done = path.damping > LARGEST or moved < tolerance
+    return path.done
+
+
+def step_in_box(square: Array, slope: Array, z: Array, damping: float) -> Array:
+    """Return the candidate to which a damped step leads.
+
+    A parameter that would leave the box stops on it, and the others make up for that.
+    square, slope: J^T J and J^T r with J = d signal / d z and r measured minus simulated.
+    """
+    scale = np.diag(square)
+    damped = square + np.diag(damping * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
+    step = np.zeros(len(z))
+    free = ~((z <= 0.0) & (slope < 0.0) | (z >= 1.0) & (slope > 0.0))
+    while free.any():
+        known = slope[free] - damped[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], known)
+        outside = free & ((z + step < 0.0) | (z + step > 1.0))
+        if not outside.any():
+            break
+        step[outside] = np.clip(z + step, 0.0, 1.0)[outside] - z[outside]
+        free &= ~outside
+    return np.clip(z + step, 0.0, 1.0)
+
+
+def forward_slopes(records: LeastSquaresProblem, paths: Sequence[Descent]) -> list[Array]:
+    """Return d signal / d z of every path, (n_samples, n_free), from differences towards the middle of the box.
+
+    Half the price of central differences, and exact enough for a step. A side that diverges is replaced by the other;
+    where both do, the slope is 0.
+    """
+    n = len(paths[0].z)
+    signs = np.array([np.where(p.z > 0.5, -1.0, 1.0) for p in paths])
+    points = np.concatenate([p.z + np.diag(STEP * s) for p, s in zip(paths, signs, strict=True)])
+    residuals = records.residuals(points)
+    found = []
+    for i, (path, sign) in enumerate(zip(paths, signs, strict=True)):
+        columns = (path.residual - residuals[i * n :][:n]) / (STEP * sign)[:, np.newaxis]
+        for k in np.flatnonzero(~np.isfinite(columns).all(axis=1)):
+            z = path.z.copy()
+            z[k] -= sign[k] * STEP
+            other = records.residuals(z)[0]
+            inside = 0.0 <= z[k] <= 1.0 and bool(np.isfinite(other).all())
+            columns[k] = (path.residual - other) / (-sign[k] * STEP) if inside else 0.0
+        found.append(np.ascontiguousarray(columns.T))
+    return found

@@ -8,9 +8,17 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.estimation.information import NORMAL_95, inverse
-from armid.estimation.least_squares import WeightedRecords, fit
+from armid.estimation.least_squares import LeastSquaresProblem, fit
 
 Array = NDArray[np.float64]
+# chi2 of one degree of freedom at 95 %.
+THRESHOLD = NORMAL_95**2
+# The ends of an interval by curvature and by profile disagree when they differ by more than this share of its half.
+AGREE = 0.15
+# A profile that falls by more than this below its minimum has found a better one.
+BETTER, MOST_RESTARTS = 0.01, 5
+# First step along a profile: so many standard deviations, at most this share of the range.
+FIRST_STEP, LONGEST_STEP = 0.5, 0.1
 # The walk ends where the rise comes to this many thresholds: what the figure shows.
 SHOWN_TO = 1.7
 # Wanted change of sqrt(rise) from point to point; steps grow and shrink by at most these factors.
@@ -20,102 +28,6 @@ MOST_POINTS, MOST_SECANTS = 60, 12
 FEWEST = 4
 # How closely the rise is brought to the threshold.
 CLOSE = 0.01
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """Hold one point of a profile: place (share of the range), rise of chi2, whole candidate (shares)."""
-
-    place: float
-    rise: float
-    z: Array
-
-    @property
-    def height(self) -> float:
-        """Square root of the rise: straight along a parabola."""
-        return float(np.sqrt(max(self.rise, 0.0)))
-
-
-Held = Callable[[float, Array], Point]
-
-
-def walk(held: Held, middle: Point, step: float, threshold: float) -> list[Point]:
-    """Return points from the minimum outwards until the rise is well above the threshold, or the box ends.
-
-    held: fits the others with the parameter at a place, from a start. step: the first, signed, share of the range; it
-    grows where the profile is flatter than expected and shrinks where it is steeper.
-    """
-    points = [middle]
-    edge = 1.0 if step > 0.0 else 0.0
-    while points[-1].place != edge and points[-1].rise < SHOWN_TO * threshold and len(points) < MOST_POINTS:
-        last = points[-1]
-        place = float(np.clip(last.place + step, 0.0, 1.0))
-        points.append(held(place, start_at(points, place)))
-        change = abs(points[-1].height - last.height)
-        if not np.isfinite(change):
-            break
-        step *= float(np.clip(WANTED / max(change, 1e-9), SHRINKAGE, GROWTH))
-    return points
-
-
-def start_at(points: list[Point], place: float) -> Array:
-    """Return where to start a fit: the last two fits drawn on to the place, inside the box."""
-    last = points[-1]
-    if len(points) < 2 or last.place == points[-2].place:
-        return last.z
-    along = (place - last.place) / (last.place - points[-2].place)
-    return np.clip(last.z + along * (last.z - points[-2].z), 0.0, 1.0)
-
-
-def crossing(held: Held, side: list[Point], threshold: float) -> tuple[float | None, list[Point]]:
-    """Return where a side comes to the threshold (None: nowhere inside the box), and the points tried to find it.
-
-    A secant on the square root of the rise, halved where the simulation diverges.
-    """
-    above = next((k for k, p in enumerate(side) if p.rise >= threshold), None)
-    if above is None:
-        return None, []
-    low, high = side[above - 1], side[above]
-    goal, tried = float(np.sqrt(threshold)), []
-    for _ in range(MOST_SECANTS):
-        place = between(low, high, goal)
-        tried.append(held(place, low.z))
-        if abs(tried[-1].rise - threshold) < CLOSE:
-            break
-        low, high = (tried[-1], high) if tried[-1].rise < threshold else (low, tried[-1])
-    return between(low, high, goal), tried
-
-
-def between(low: Point, high: Point, goal: float) -> float:
-    """Return the place at which the straight line through two points comes to a height."""
-    if not np.isfinite(high.rise):
-        return 0.5 * (low.place + high.place)
-    share = (goal - low.height) / (high.height - low.height)
-    return low.place + float(np.clip(share, 0.05, 0.95)) * (high.place - low.place)
-
-
-def between_points(held: Held, points: list[Point], end: float) -> list[Point]:
-    """Return further points between the minimum (the first) and the end of the interval, where few were tried there."""
-    middle = points[0]
-    inside = [p for p in points if abs(p.place - middle.place) < abs(end - middle.place)]
-    if len(inside) > FEWEST or end == middle.place:
-        return []
-    found = [middle]
-    for share in np.arange(1, FEWEST + 1) / (FEWEST + 1):
-        place = middle.place + float(share) * (end - middle.place)
-        found.append(held(place, start_at(found, place)))
-    return found[1:]
-
-
-# chi2 of one degree of freedom at 95 %.
-THRESHOLD = NORMAL_95**2
-# The ends of an interval by curvature and by profile disagree when they differ by more than this share of its half.
-AGREE = 0.15
-# A profile that falls by more than this below its minimum has found a better one.
-BETTER = 0.01
-# First step along a profile: so many standard deviations, at most this share of the range.
-FIRST_STEP, LONGEST_STEP = 0.5, 0.1
-MOST_RESTARTS = 5
 # Relative change of chi2 at which a fit along a profile stops: far below what the threshold could see.
 TOLERANCE = 1e-7
 
@@ -150,16 +62,32 @@ class Profile:
 
     @property
     def agrees(self) -> bool:
-        """Tell whether curvature and profile tell the same interval, as far as it lies in the box."""
-        ends = zip((self.low, self.high), self.curvature, strict=True)
+        """Tell whether curvature and profile give the same interval, as far as it lies in the box."""
         half = NORMAL_95 * self.deviation
         if not np.isfinite(half):
             return not any(self.bounded)
-        misses = [abs(end - float(np.clip(told, *self.box))) for end, told in ends]
-        return bool(max(misses) <= AGREE * half)
+        ends = zip((self.low, self.high), self.curvature, strict=True)
+        return bool(max(abs(end - float(np.clip(other, *self.box))) for end, other in ends) <= AGREE * half)
 
 
-def profiles(records: WeightedRecords, z: Array) -> tuple[Array, tuple[Profile, ...]]:
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Hold one point of a profile: place (share of the range), rise of chi2, whole candidate (shares)."""
+
+    place: float
+    rise: float
+    z: Array
+
+    @property
+    def height(self) -> float:
+        return float(np.sqrt(max(self.rise, 0.0)))
+
+
+# Fits the others with the parameter at a place (share of its range), from a start.
+HeldFit = Callable[[float, Array], Point]
+
+
+def profiles(records: LeastSquaresProblem, z: Array) -> tuple[Array, tuple[Profile, ...]]:
     """Return the least-squares minimum and the profile of each free parameter about it.
 
     Where a profile comes upon a lower minimum, all start again from there. records: weighted so that chi2 is that of
@@ -176,7 +104,7 @@ def profiles(records: WeightedRecords, z: Array) -> tuple[Array, tuple[Profile, 
     return best, found
 
 
-def profile(records: WeightedRecords, z: Array, i: int) -> Profile:
+def profile(records: LeastSquaresProblem, z: Array, i: int) -> Profile:
     """Return the profile of one free parameter about the least-squares minimum.
 
     rise(v) = min over the other free parameters of chi2, given that parameter i is v, minus chi2 at the minimum; the
@@ -185,41 +113,36 @@ def profile(records: WeightedRecords, z: Array, i: int) -> Profile:
     z: the minimum, as shares of the range, shape (n_free,). i: the place of the parameter.
     Source: Raue et al. 2009, doi:10.1093/bioinformatics/btp358.
     """
-    rest, slopes = records.residual_and_slopes(z)
-    least = float(rest @ rest)
+    residual, slopes = records.residual_and_slopes(z)
     deviation = float(np.sqrt(inverse(slopes.T @ slopes)[i, i]))
-    held = held_fit(records, z, i, least)
-    middle = Point(float(z[i]), 0.0, z)
-    step = min(FIRST_STEP * deviation, LONGEST_STEP)
-    sides = [walk(held, middle, sign * step, THRESHOLD) for sign in (-1.0, 1.0)]
-    ends = [crossing(held, side, THRESHOLD) for side in sides]
-    told = [box if end is None else end for end, box in zip((e[0] for e in ends), (0.0, 1.0), strict=True)]
-    tried = [[*side, *end[1]] for side, end in zip(sides, ends, strict=True)]
-    more = [p for side, end in zip(tried, told, strict=True) for p in between_points(held, side, end)]
-    points = [middle, *(p for side in tried for p in side[1:]), *more]
+    held = held_fit(records, z, i, float(residual @ residual))
+    points, ends, bounded = [Point(float(z[i]), 0.0, z)], [], []
+    for sign, edge in ((-1.0, 0.0), (1.0, 1.0)):
+        side = walk(held, points[0], sign * min(FIRST_STEP * deviation, LONGEST_STEP))
+        end, tried = crossing(held, side)
+        bounded.append(end is not None)
+        ends.append(edge if end is None else end)
+        tried = [*side, *tried]
+        points += [*tried[1:], *between_points(held, tried, ends[-1])]
     points = sorted((p for p in points if np.isfinite(p.rise)), key=lambda p: p.place)
     where = np.array([records.values(p.z) for p in points])
-    low, high = records.values(np.zeros(len(z))), records.values(np.ones(len(z)))
-    names, units = records.space.free_names, np.array(records.space.units)[records.space.free]
-    bounded = (ends[0][0] is not None, ends[1][0] is not None)
+    low, high = (float(records.values(np.full(len(z), edge))[i]) for edge in (0.0, 1.0))
+    units = np.array(records.space.units)[records.space.free]
     return Profile(
-        names[i], str(units[i]), where[:, i], np.array([p.rise for p in points]), where, float(records.values(z)[i]),
-        float(low[i] + told[0] * (high[i] - low[i])), float(low[i] + told[1] * (high[i] - low[i])), bounded,
-        deviation * float(high[i] - low[i]), (float(low[i]), float(high[i])),
+        records.space.free_names[i], str(units[i]), where[:, i], np.array([p.rise for p in points]), where,
+        float(records.values(z)[i]), low + ends[0] * (high - low), low + ends[1] * (high - low),
+        (bounded[0], bounded[1]), deviation * (high - low), (low, high),
     )  # fmt: skip
 
 
-def held_fit(records: WeightedRecords, z: Array, i: int, least: float) -> Callable[[float, Array], Point]:
+def held_fit(records: LeastSquaresProblem, z: Array, i: int, least: float) -> HeldFit:
     """Return the function that fits the others with parameter i held at a place; its rise is infinite if that fails."""
-    free = records.space.free
-    others = np.arange(len(z)) != i
+    name, others = records.space.free_names[i], np.arange(len(z)) != i
 
     def at(place: float, start: Array) -> Point:
         whole = start.copy()
         whole[i] = place
-        value = float(records.values(whole)[i])
-        space = records.space.with_fixed(np.array(records.space.names)[free][i], value)
-        part = replace(records, space=space)
+        part = replace(records, space=records.space.with_fixed(name, float(records.values(whole)[i])))
         try:
             whole[others] = fit(part, whole[others], TOLERANCE) if others.any() else whole[others]
         except ArmidError:
@@ -227,3 +150,69 @@ def held_fit(records: WeightedRecords, z: Array, i: int, least: float) -> Callab
         return Point(place, float(records.chi2(whole)[0]) - least, whole)
 
     return at
+
+
+def walk(held: HeldFit, middle: Point, step: float) -> list[Point]:
+    """Return points from the minimum outwards until the rise is well above the threshold, or the box ends.
+
+    step: the first, signed, share of the range; it grows where the profile is flatter than expected and shrinks where
+    it is steeper.
+    """
+    points = [middle]
+    edge = 1.0 if step > 0.0 else 0.0
+    while points[-1].place != edge and points[-1].rise < SHOWN_TO * THRESHOLD and len(points) < MOST_POINTS:
+        last = points[-1]
+        place = float(np.clip(last.place + step, 0.0, 1.0))
+        points.append(held(place, start_at(points, place)))
+        change = abs(points[-1].height - last.height)
+        if not np.isfinite(change):
+            break
+        step *= float(np.clip(WANTED / max(change, 1e-9), SHRINKAGE, GROWTH))
+    return points
+
+
+def start_at(points: list[Point], place: float) -> Array:
+    """Return where to start a fit: the last two fits drawn on to the place, inside the box."""
+    last = points[-1]
+    if len(points) < 2 or last.place == points[-2].place:
+        return last.z
+    along = (place - last.place) / (last.place - points[-2].place)
+    return np.clip(last.z + along * (last.z - points[-2].z), 0.0, 1.0)
+
+
+def crossing(held: HeldFit, side: list[Point]) -> tuple[float | None, list[Point]]:
+    """Return where a side comes to the threshold (None: nowhere inside the box), and the points tried to find it.
+
+    A secant on the square root of the rise, halved where the simulation diverges.
+    """
+    above = next((k for k, p in enumerate(side) if p.rise >= THRESHOLD), None)
+    if above is None:
+        return None, []
+    low, high, tried = side[above - 1], side[above], []
+    for _ in range(MOST_SECANTS):
+        tried.append(held(secant(low, high), low.z))
+        if abs(tried[-1].rise - THRESHOLD) < CLOSE:
+            break
+        low, high = (tried[-1], high) if tried[-1].rise < THRESHOLD else (low, tried[-1])
+    return secant(low, high), tried
+
+
+def secant(low: Point, high: Point) -> float:
+    """Return the place at which the straight line through two points comes to the threshold."""
+    if not np.isfinite(high.rise):
+        return 0.5 * (low.place + high.place)
+    share = (float(np.sqrt(THRESHOLD)) - low.height) / (high.height - low.height)
+    return low.place + float(np.clip(share, 0.05, 0.95)) * (high.place - low.place)
+
+
+def between_points(held: HeldFit, points: list[Point], end: float) -> list[Point]:
+    """Return further points between the minimum (the first) and the end of the interval, where few were tried there."""
+    middle = points[0]
+    inside = [p for p in points if abs(p.place - middle.place) < abs(end - middle.place)]
+    if len(inside) > FEWEST or end == middle.place:
+        return []
+    found = [middle]
+    for share in np.arange(1, FEWEST + 1) / (FEWEST + 1):
+        place = middle.place + float(share) * (end - middle.place)
+        found.append(held(place, start_at(found, place)))
+    return found[1:]

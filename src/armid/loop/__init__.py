@@ -1,4 +1,20 @@
-"""The closed loop: residual, missing effect, extended model, error before and after."""
+"""The closed loop: residual, missing effect, extended model, error before and after.
+
+How it decides, in reading order:
+
+close_loop       the whole way, and the verdict
+whitening        train records with their noise -> residuals whose noise is white
+candidates       the effects that may be missing, compiled together; the grid on which they are tried
+score_test       how far each candidate would bring the residual down, to first order
+fit              a model at its least-squares estimate
+search, select   refits, exchanges, models with one effect more; whether an effect earns its parameters
+equivalence      effects that the records cannot tell apart
+diagnose         whether what remains is more than noise, and where
+
+Beside it: missing_signal and empirical (where no effect will do), advice (the record to make next), result
+(report.json). The train records with their noise are `data`, a model at its estimate is a `Fit`, an effect of it an
+`EffectKey`, what it leaves on records `Residuals`.
+"""
 
 from armid.loop.close_loop import close_loop
 from armid.loop.diagnose import Diagnosis, Finding, diagnose

@@ -1,4 +1,8 @@
-"""Which manoeuvre would tell rival models apart: the record to make next when the ones there are cannot."""
+"""Which manoeuvre would tell rival models apart: the record to make next when the ones there are cannot.
+
+All manoeuvres are predicted (linear in the parameters, see `chance`); for the best of them the whole is simulated: a
+record from each rival in turn, as uncertain as it is known by now, and all rivals fitted again (see `simulate_refits`).
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,11 +17,39 @@ from scipy.stats import norm
 from armid.engine import probes, simulate
 from armid.errors import ArmidError
 from armid.estimation.design import BOX, Feasible, Key, Motions, fine_schedule, manoeuvre_grid
-from armid.estimation.least_squares import WeightedRecords
-from armid.loop.fit import descend, side_by_side
+from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords, descend
+from armid.loop.candidates import side_by_side
 
 Array = NDArray[np.float64]
 Whitening = Callable[[Array], Array]
+Pair = tuple[int, int]
+Powers = Mapping[Pair, tuple[float, float]]
+# Difference of the criterion from which on the loop takes one model for better than another.
+THRESHOLD = 6.0
+# Draws of what the parameters may be: in the linear prediction, and of each rival whose record is simulated.
+N_DRAWS, N_REFIT_DRAWS = 512, 4
+# So many fits all simulations may take; it decides how many manoeuvres are simulated, but not below the fewest.
+MOST_FITS, FEWEST = 160, 4
+# Rivals that a manoeuvre tells apart no more often than this are not said to be separated by it.
+OFTEN = 0.5
+TOLERANCE = 1e-5
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Advise a manoeuvre.
+
+    manoeuvre: key -> value as campaign.toml would say it. words: the same for people. separates: names of the rivals
+    that its record is expected to tell apart. power: chance that the right one of any two of them wins by more than the
+    threshold, the lowest of the pairs, whichever of the two is right. delta: distance of their predictions after both
+    were fitted again to old and new records, in standard deviations of the noise, of that pair.
+    """
+
+    manoeuvre: Mapping[str, Key]
+    words: str
+    separates: tuple[str, ...]
+    power: float
+    delta: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +61,12 @@ class Rival:
     """
 
     name: str
-    records: WeightedRecords
+    records: LeastSquaresProblem
     z: Array
     criterion: float
 
     @property
     def candidate(self) -> Array:
-        """The estimate as a whole candidate, SI."""
         return np.asarray(self.whole(self.z[np.newaxis])[0])
 
     def whole(self, Z: Array) -> Array:
@@ -53,9 +84,79 @@ class Rival:
         """Factor so that root root^T is the covariance of z: each column is a move of one standard deviation."""
         return np.asarray(np.linalg.inv(self.precision).T)
 
+    def drawn(self, draw: Array) -> Array:
+        move = self.root @ draw[: len(self.z)]
+        both = np.array([self.z + move, self.z - move])
+        return np.asarray(both[int(np.argmin(outside(both)))])
+
+
+def advise(
+    rivals: Sequence[Rival],
+    white: Whitening | None = None,
+    grid: Sequence[Feasible] | None = None,
+    speed_limit: float | None = None,
+    threshold: float = THRESHOLD,
+    threads: int = 1,
+) -> tuple[Advice, ...]:
+    """Rank feasible manoeuvres by how well one record of each would tell the rivals apart, the best first.
+
+    Only manoeuvres that were simulated are returned, ranked by the mean power over pairs, then by the mean distance.
+    rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_signals, n_samples), into
+    units of white noise, None: the mean weight of the records. grid: None: `manoeuvre_grid`. speed_limit: of the gyro,
+    [unit of the signal]. threshold: difference of the criterion at which one model counts as better.
+    threads: among which rivals and manoeuvres are shared.
+
+    Raises ArmidError for fewer than two rivals.
+    Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
+    """
+    if len(rivals) < 2:
+        raise ArmidError(f"{len(rivals)} model was given to be told apart from others: at least two are expected")
+    first = rivals[0].records
+    if white is None:
+        assert isinstance(first, WeightedRecords)
+        mean_weight = float(np.mean(np.square(1.0 / np.array(first.weights))) ** -0.5)
+        white = lambda signals: mean_weight * signals  # noqa: E731
+    grid = grid or manoeuvre_grid(first.model, [r.record for r in first.replays])
+    predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
+    draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
+    possible = [f for f in grid if all(f in known for known in predictions)]
+    ranks = {f: rank(predicted_powers(rivals, [p[f] for p in predictions], draws, threshold)) for f in possible}
+    most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
+    promising = sorted(possible, key=lambda f: ranks[f], reverse=True)[:most]
+    draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
+    powers = side_by_side(lambda f: simulated_powers(rivals, f, white, draws, threshold), promising, threads)
+    ranked = sorted(zip(promising, powers, strict=True), key=lambda pair: rank(pair[1]), reverse=True)
+    return tuple(advice_of(rivals, feasible, found) for feasible, found in ranked)
+
+
+def rank(powers: Powers) -> tuple[float, float]:
+    """Return what manoeuvres are ranked by: mean power in steps of a hundredth, then mean distance."""
+    power, delta = (float(np.mean([p[k] for p in powers.values()])) for k in (0, 1))
+    return round(power, 2), delta
+
+
+def advice_of(rivals: Sequence[Rival], feasible: Feasible, powers: Powers) -> Advice:
+    """Return the advice for one manoeuvre: the largest set of rivals that it often tells apart, or the best pair."""
+    for size in range(len(rivals), 1, -1):
+        weakest = {s: min(powers[pair] for pair in combinations(s, 2)) for s in combinations(range(len(rivals)), size)}
+        best = max(weakest, key=lambda s: weakest[s])
+        if weakest[best][0] >= OFTEN:
+            break
+    return Advice(dict(feasible.keys), feasible.name, tuple(rivals[i].name for i in best), *weakest[best])
+
+
+def normal_draws(n_dimensions: int, n_draws: int) -> Array:
+    """Return evenly spread standard normal draws, (n_draws, n_dimensions): the same at every call."""
+    return np.asarray(norm.ppf(probes(np.zeros(n_dimensions), np.ones(n_dimensions), n_draws)))
+
+
+def outside(Z: Array) -> Array:
+    """Return how far candidates in shares of the range reach out of the box, (n_candidates,)."""
+    return np.asarray(np.abs(Z - np.clip(Z, 0.0, 1.0)).max(axis=-1))
+
 
 @dataclass(frozen=True, eq=False)
-class Forecast:
+class Prediction:
     """Hold what one rival predicts for one manoeuvre, whitened: the signal (n_samples,) and its spread.
 
     spread: (n_samples, n_free) so that spread spread^T is the covariance of the prediction that the uncertainty of the
@@ -66,14 +167,9 @@ class Forecast:
     spread: Array
 
 
-def outside(Z: Array) -> Array:
-    """Return how far candidates in shares of the range reach out of the box, (n_candidates,)."""
-    return np.asarray(np.abs(Z - np.clip(Z, 0.0, 1.0)).max(axis=-1))
-
-
-def forecasts_of(
+def predictions_of(
     rival: Rival, grid: Sequence[Feasible], white: Whitening, speed_limit: float | None
-) -> Mapping[Feasible, Forecast]:
+) -> Mapping[Feasible, Prediction]:
     """Return what a rival predicts for each manoeuvre that the machine could make if the rival were right.
 
     The spread comes from differences over a standard deviation to either side, not from derivatives: a switch that
@@ -87,7 +183,7 @@ def forecasts_of(
     upward = np.where(outside(above) < outside(below), 1.0, np.where(outside(above) > outside(below), 0.0, 0.5))
     for feasible, signals in motions.signals(grid, points):
         seen = white(signals)
-        found[feasible] = Forecast(seen[0], spread_of(seen[0], seen[1 : n + 1], seen[n + 1 :], upward))
+        found[feasible] = Prediction(seen[0], spread_of(seen[0], seen[1 : n + 1], seen[n + 1 :], upward))
     return found
 
 
@@ -96,7 +192,19 @@ def spread_of(here: Array, above: Array, below: Array, upward: Array) -> Array:
     return np.asarray(((above - here).T * upward) + ((here - below).T * (1.0 - upward)))
 
 
-def chance(right: Forecast, wrong: Forecast, old: float, draws: Array, threshold: float) -> tuple[float, float]:
+def predicted_powers(
+    rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array, threshold: float
+) -> Powers:
+    found = {}
+    for a, b in combinations(range(len(rivals)), 2):
+        old = rivals[b].criterion - rivals[a].criterion
+        one = chance(predictions[a], predictions[b], old, draws, threshold)
+        other = chance(predictions[b], predictions[a], -old, draws, threshold)
+        found[a, b] = (0.5 * (one[0] + other[0]), float(np.sqrt(0.5 * (one[1] + other[1]))))
+    return found
+
+
+def chance(right: Prediction, wrong: Prediction, old: float, draws: Array, threshold: float) -> tuple[float, float]:
     """Return the chance that the right model wins by more than a threshold, and the squared distance delta^2.
 
     After both are fitted again, the criterion of the wrong one less that of the right one is
@@ -119,11 +227,8 @@ def chance(right: Forecast, wrong: Forecast, old: float, draws: Array, threshold
     return float(np.mean(old + gained > threshold)), float(d[:, 0] @ weight @ d[:, 0])
 
 
-TOLERANCE = 1e-5
-
-
 @dataclass(frozen=True, eq=False)
-class Joint(WeightedRecords):
+class OldAndNew(LeastSquaresProblem):
     """Pose the old records, as a parabola about their estimate, and one new record as one least-squares problem.
 
     rival: fitted to the old records. feasible, white: the new record's manoeuvre and what makes its noise white.
@@ -135,28 +240,35 @@ class Joint(WeightedRecords):
     white: Whitening = field(kw_only=True)
     seen: Array = field(kw_only=True)
 
-    def predicted(self, Z: Array) -> Array:
-        """Return the whitened signal in the new record of candidates in shares, (n_candidates, n_samples)."""
-        return foreseen(self.rival, self.feasible, self.white, Z)
-
     @cached_property
     def measured(self) -> Array:
-        """Zeros for the parabola, then the new record."""
         return np.concatenate([np.zeros(len(self.rival.z)), self.seen])
 
     def signals(self, Z: Array) -> Array:
         """Return how far candidates are from the old estimate, in standard deviations, then their new signals."""
-        return np.concatenate([(Z - self.rival.z) @ self.rival.precision, self.predicted(Z)], axis=1)
+        new = whitened_signals(self.rival, self.feasible, self.white, Z)
+        return np.concatenate([(Z - self.rival.z) @ self.rival.precision, new], axis=1)
 
 
-def foreseen(rival: Rival, feasible: Feasible, white: Whitening, Z: Array) -> Array:
+def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Array) -> Array:
     """Return the whitened signal of candidates in shares of the range, (n_candidates, n_samples)."""
-    replays = rival.records.replays
-    run = simulate(replays[0].model, feasible.manoeuvre, rival.whole(Z), fine_schedule(replays))
+    records = rival.records
+    run = simulate(records.model, feasible.manoeuvre, rival.whole(Z), fine_schedule(records.replays))
     return np.asarray(white(run.output[:, feasible.window]))
 
 
-def rehearse(
+def simulated_powers(
+    rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array, threshold: float
+) -> Powers:
+    tried = [simulate_refits(rivals, i, feasible, white, draws, threshold) for i in range(len(rivals))]
+    chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
+    return {
+        (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
+        for a, b in combinations(range(len(rivals)), 2)
+    }
+
+
+def simulate_refits(
     rivals: Sequence[Rival], right: int, feasible: Feasible, white: Whitening, draws: Array, threshold: float
 ) -> tuple[Array, Array]:
     """Return the chance that each other rival loses to the right one by more than a threshold, and its distance.
@@ -170,11 +282,11 @@ def rehearse(
     true = rivals[right]
     chances, distances = [], []
     for draw in draws:
-        seen = foreseen(true, feasible, white, drawn(true, draw)[np.newaxis])[0]
+        seen = whitened_signals(true, feasible, white, true.drawn(draw)[np.newaxis])[0]
         if not np.isfinite(seen).all():
             continue
-        values, predictions = zip(*(fitted_again(r, feasible, white, seen) for r in rivals), strict=True)
-        apart = np.array([np.linalg.norm(p - predictions[right]) for p in predictions])
+        values, signals = zip(*(fitted_again(r, feasible, white, seen) for r in rivals), strict=True)
+        apart = np.array([np.linalg.norm(s - signals[right]) for s in signals])
         margin = np.array(values) - values[right] - threshold
         won = norm.cdf(margin / np.maximum(2.0 * apart, 1e-9))
         won[right] = 1.0
@@ -185,152 +297,14 @@ def rehearse(
     return np.mean(chances, axis=0), np.mean(distances, axis=0)
 
 
-def drawn(rival: Rival, draw: Array) -> Array:
-    """Return what the parameters may be, shares of the range: a draw, or its mirror where that is less outside."""
-    move = rival.root @ draw[: len(rival.z)]
-    both = np.array([rival.z + move, rival.z - move])
-    return np.asarray(both[int(np.argmin(outside(both)))])
-
-
 def fitted_again(rival: Rival, feasible: Feasible, white: Whitening, seen: Array) -> tuple[float, Array]:
     """Return the criterion and the whitened prediction of a rival after a fit to old and new.
 
     A rival that diverges wherever it starts is as far off as a model can be: the record itself is its distance.
     """
-    space = rival.records.space
-    joint = Joint((), space, (), rival=rival, feasible=feasible, white=white, seen=seen)
+    both = OldAndNew((), rival.records.space, rival=rival, feasible=feasible, white=white, seen=seen)
     start = np.clip(rival.z, 0.0, 1.0)
-    if not np.isfinite(joint.chi2(start)[0]):
+    if not np.isfinite(both.chi2(start)[0]):
         return rival.criterion + float(seen @ seen), np.zeros_like(seen)
-    z = descend(joint, [start], TOLERANCE)
-    return rival.criterion + float(joint.chi2(z)[0]), joint.predicted(z[np.newaxis])[0]
-
-
-Pair = tuple[int, int]
-# Difference of the criterion from which on the loop takes one model for better than another.
-THRESHOLD = 6.0
-# Draws of what the parameters may be: in the linear forecast, and of each rival in a rehearsal.
-N_DRAWS, N_REHEARSED_DRAWS = 512, 4
-# So many fits a whole rehearsal may take; it decides how many manoeuvres are rehearsed, but not below the fewest.
-MOST_FITS, FEWEST = 160, 4
-# Rivals that a manoeuvre tells apart no more often than this are not said to be separated by it.
-OFTEN = 0.5
-
-
-@dataclass(frozen=True)
-class Advice:
-    """Advise a manoeuvre.
-
-    manoeuvre: key -> value as campaign.toml would say it. words: the same for people. separates: names of the rivals
-    that its record is expected to tell apart. power: chance that the right one of any two of them wins by more than the
-    threshold, the lowest of the pairs, whichever of the two is right. delta: distance of their predictions after both
-    were fitted again to old and new records, in standard deviations of the noise, of that pair.
-    """
-
-    manoeuvre: Mapping[str, Key]
-    words: str
-    separates: tuple[str, ...]
-    power: float
-    delta: float
-
-
-def advise(
-    rivals: Sequence[Rival],
-    white: Whitening | None = None,
-    grid: Sequence[Feasible] | None = None,
-    speed_limit: float | None = None,
-    threshold: float = THRESHOLD,
-    threads: int = 1,
-) -> tuple[Advice, ...]:
-    """Rank feasible manoeuvres by how well one record of each would tell the rivals apart, the best first.
-
-    All manoeuvres are forecast (linear in the parameters, see `chance`); the best of them are rehearsed: a record is
-    simulated from each rival in turn, as uncertain as it is known by now, and all are fitted again (see `rehearse`).
-    Only rehearsed manoeuvres are returned, ranked by the mean power over pairs, then by the mean distance.
-    rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_signals, n_samples), into
-    units of white noise, None: the mean weight of the records. grid: None: `manoeuvre_grid`. speed_limit: of the gyro,
-    [unit of the signal]. threshold: difference of the criterion at which one model counts as better.
-    threads: among which rivals and manoeuvres are shared.
-
-    Raises ArmidError for fewer than two rivals.
-    Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
-    """
-    if len(rivals) < 2:
-        raise ArmidError(f"{len(rivals)} model was given to be told apart from others: at least two are expected")
-    first = rivals[0].records
-    filtered = white or mean_weight(first)
-    told = grid or manoeuvre_grid(first.replays[0].model, [r.record for r in first.replays])
-    promising = foreseen_best(rivals, told, filtered, speed_limit, threshold, threads)
-    draws = normal_draws(max(len(r.z) for r in rivals), N_REHEARSED_DRAWS)
-    powers = side_by_side(lambda f: rehearsed_powers(rivals, f, filtered, draws, threshold), promising, threads)
-    ranked = sorted(zip(promising, powers, strict=True), key=lambda pair: rank(pair[1]), reverse=True)
-    return tuple(advice_of(rivals, feasible, found) for feasible, found in ranked)
-
-
-def mean_weight(records: WeightedRecords) -> Whitening:
-    """Return the whitening of a record like the others: the weight of their mean square."""
-    weight = float(np.mean(np.square(1.0 / np.array(records.weights))) ** -0.5)
-    return lambda signals: weight * signals
-
-
-def normal_draws(n_dimensions: int, n_draws: int) -> Array:
-    """Return evenly spread standard normal draws, (n_draws, n_dimensions): the same at every call."""
-    return np.asarray(norm.ppf(probes(np.zeros(n_dimensions), np.ones(n_dimensions), n_draws)))
-
-
-def foreseen_best(
-    rivals: Sequence[Rival],
-    grid: Sequence[Feasible],
-    white: Whitening,
-    speed_limit: float | None,
-    threshold: float,
-    threads: int,
-) -> list[Feasible]:
-    """Return the manoeuvres that are worth a rehearsal, by the linear forecast, the best first."""
-    forecasts = side_by_side(lambda rival: forecasts_of(rival, grid, white, speed_limit), rivals, threads)
-    draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
-    possible = [f for f in grid if all(f in known for known in forecasts)]
-    ranks = {f: rank(foreseen_powers(rivals, [k[f] for k in forecasts], draws, threshold)) for f in possible}
-    most = max(MOST_FITS // (len(rivals) ** 2 * N_REHEARSED_DRAWS), FEWEST)
-    return sorted(possible, key=lambda f: ranks[f], reverse=True)[:most]
-
-
-def rank(powers: Mapping[Pair, tuple[float, float]]) -> tuple[float, float]:
-    """Return what manoeuvres are ranked by: mean power in steps of a hundredth, then mean distance."""
-    power, delta = (float(np.mean([p[k] for p in powers.values()])) for k in (0, 1))
-    return round(power, 2), delta
-
-
-def foreseen_powers(
-    rivals: Sequence[Rival], forecasts: Sequence[Forecast], draws: Array, threshold: float
-) -> dict[Pair, tuple[float, float]]:
-    """Return (power, delta) of each pair of rivals for one manoeuvre, by the linear forecast."""
-    found = {}
-    for a, b in combinations(range(len(rivals)), 2):
-        old = rivals[b].criterion - rivals[a].criterion
-        one = chance(forecasts[a], forecasts[b], old, draws, threshold)
-        other = chance(forecasts[b], forecasts[a], -old, draws, threshold)
-        found[a, b] = (0.5 * (one[0] + other[0]), float(np.sqrt(0.5 * (one[1] + other[1]))))
-    return found
-
-
-def rehearsed_powers(
-    rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array, threshold: float
-) -> dict[Pair, tuple[float, float]]:
-    """Return (power, delta) of each pair of rivals for one manoeuvre, by simulated records and fits."""
-    tried = [rehearse(rivals, i, feasible, white, draws, threshold) for i in range(len(rivals))]
-    chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
-    return {
-        (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
-        for a, b in combinations(range(len(rivals)), 2)
-    }
-
-
-def advice_of(rivals: Sequence[Rival], feasible: Feasible, powers: Mapping[Pair, tuple[float, float]]) -> Advice:
-    """Return the advice for one manoeuvre: the largest set of rivals that it often tells apart, or the best pair."""
-    for size in range(len(rivals), 1, -1):
-        weakest = {s: min(powers[pair] for pair in combinations(s, 2)) for s in combinations(range(len(rivals)), size)}
-        best = max(weakest, key=lambda s: weakest[s])
-        if weakest[best][0] >= OFTEN:
-            break
-    return Advice(dict(feasible.keys), feasible.name, tuple(rivals[i].name for i in best), *weakest[best])
+    z = descend(both, [start], TOLERANCE)
+    return rival.criterion + float(both.chi2(z)[0]), whitened_signals(rival, feasible, white, z[np.newaxis])[0]

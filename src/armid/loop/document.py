@@ -9,7 +9,7 @@ import numpy as np
 from armid.estimation.identify import record_errors
 from armid.estimation.identify_document import versions
 from armid.loop.candidates import SHOWN_AS
-from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, View
+from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, Residuals
 from armid.loop.figures import candidate_figure, record_figure
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
@@ -277,7 +277,7 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
     }
 
 
-def record_entries(before: View | None, after: View | None) -> list[dict[str, Any]]:
+def record_entries(before: Residuals | None, after: Residuals | None) -> list[dict[str, Any]]:
     if before is None or after is None:
         return []
     return [
@@ -301,14 +301,14 @@ def candidates_of(found: ClosedLoop) -> dict[str, Any]:
     start = found.before.fit
     reached: dict[str, float] = {}
     for fit in found.search.of_size(1):
-        name = found.library.public(fit.active[0])
+        name = fit.active[0].public
         reached[name] = max(reached.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
     listed: list[dict[str, Any]] = []
-    for score in found.search.trace(start):
-        name = found.library.public(score.name)
+    for score in found.search.scores_at(start):
+        name = score.key.public
         if any(entry["effect"] == name for entry in listed):
             continue
-        behind = projected(start, score.name, found.library)
+        behind = projected(start, score.key, found.library)
         drawn = len(listed) < MOST_DRAWN
         listed.append({
             "effect": name, "drop": finite(score.drop / start.chi2), "p": finite(score.p),
@@ -316,7 +316,7 @@ def candidates_of(found: ClosedLoop) -> dict[str, Any]:
             "curve": curve_entry(np.arange(len(behind.change), dtype=float), behind.change) if drawn else None,
         })  # fmt: skip
     rest = rest_of(start)
-    edges = found.before.train.evidence.edges
+    edges = found.before.train.data.edges
     return {
         "listed": listed,
         "residual": curve_entry(np.arange(len(rest), dtype=float), rest),
@@ -407,15 +407,13 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
-    later = {e.name: e for e in after.estimates}
-    said = []
+    later, said = {e.name: e for e in after.estimates}, []
     for old in before.estimates:
         new = later[old.name]
         if old.low is not None and old.value != new.value and abs(old.value - new.value) > SHIFTED * abs(new.value):
-            bent = (old.value - new.value) / abs(new.value) if new.value else np.inf
-            said.append(
-                f"{old.name} was bent by {bent:+.2%}: {value_text(vars(old))} before, {value_text(vars(new))} after."
-            )
+            share = (old.value - new.value) / abs(new.value) if new.value else np.inf
+            said.append(f"{old.name} was biased by {share:+.2%}: {value_text(vars(old))} before, "
+                        f"{value_text(vars(new))} after.")  # fmt: skip
     return said
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.loop.diagnose import Diagnosis, View
+from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
 from armid.report.common import points, record_axes, small_axes
@@ -176,9 +176,9 @@ def autocorrelation_figure(found: ClosedLoop) -> Any:
     return figure
 
 
-def correlation(view: View) -> Array:
+def correlation(residuals: Residuals) -> Array:
     """Return the autocorrelation at lags from 0 on, pooled over records, (n_lags,)."""
-    parts = view.evidence.by_record(view.residual)
+    parts = residuals.data.by_record(residuals.residual)
     lags = min(MOST_LAGS, *(len(p) - 1 for p in parts))
     table = [[float(p[: len(p) - k] @ p[k:]) for k in range(lags)] for p in parts]
     total = np.sum(table, axis=0)
@@ -219,7 +219,7 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
     model, signal = missing.lacking.records.replays[0].model, missing.signal_at(best.port)
     factor, name = shown(1.0, unit_of(variable, model))
     for motion, values in zip(missing.moved if signal else (), signal.signals if signal else (), strict=True):
-        colour = COLOURS[motion.stretch.group % len(COLOURS)]
+        colour = COLOURS[motion.segment.group % len(COLOURS)]
         axis.plot(factor * motion.variables[variable], values, ".", ms=3, color=colour)
     if signal is not None and variable == best.variable and best.factor == "1":
         knots = np.linspace(best.first, best.last, len(best.heights))

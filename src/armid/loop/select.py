@@ -1,7 +1,6 @@
-"""Tell whether a larger model earns its parameters."""
+"""Tell whether a larger model earns its parameters: significance, criterion, prediction of what was left out."""
 
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,22 +8,20 @@ from scipy.stats import f as f_distribution
 
 from armid.errors import ArmidError
 from armid.estimation.design import BOX
-from armid.loop.candidates import LOOSE, with_evidence
 from armid.loop.fit import Fit, fit_from
-from armid.loop.whitening import BLOCKS, WhiteRecords
+from armid.loop.whitening import BLOCKS
 
-Array = NDArray[np.float64]
 Part = NDArray[np.int64]
 # Chance at which noise alone gets an effect added, all candidates together.
 FAMILYWISE = 1e-3
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Comparison:
     """Say why a model is preferred to a smaller one, or not.
 
     gain: fall of the criterion. p: chance of the fall of chi2 from noise alone, corrected for the number of candidates
-    and of shapes. left_out: sums of squares on left-out parts, before and after.
+    and of shapes. left_out: sums of squares on left-out parts, before and after; NaN where gain or p decided already.
     """
 
     gain: float
@@ -47,19 +44,20 @@ def criterion(fit: Fit, independent: float) -> float:
     return float(independent * np.log(fit.chi2) + fit.n_free * np.log(independent))
 
 
-def compare(smaller: Fit, larger: Fit, n_candidates: int, n_shapes: int) -> Verdict:
-    """Judge an addition; the left-out parts are fitted again only where the first two conditions hold."""
+def compare(smaller: Fit, larger: Fit, n_candidates: int = 1, n_shapes: int = 1, n_extra: int = 1) -> Comparison:
+    """Judge an addition; the left-out parts are fitted again only where the first two conditions hold.
+
+    n_extra: parameters that the addition costs. Shape parameters mean nothing at the null, so they count as a grid of
+    n_shapes that was searched, not as degrees of freedom.
+    """
     # What an effect yet to be found leaves is slow in the one model and may be fast in the other: the faster counts.
     n_eff = max(smaller.independent, larger.independent)
     ratio = n_eff * np.log(smaller.chi2 / larger.chi2)
-    gain = criterion(smaller, n_eff) - criterion(larger, n_eff)
-    # Shape parameters mean nothing at the null, so they count as a grid that was searched, not as degrees of freedom.
+    gain = float(criterion(smaller, n_eff) - criterion(larger, n_eff))
     # The noise of slow signals is known from a rest of so many independent samples, hence F and not chi-square.
-    known = min((level.n_slow for level in larger.records.evidence.levels if level.known), default=n_eff)
-    p = min(1.0, n_candidates * n_shapes * float(f_distribution.sf(max(ratio, 0.0), 1, known)))
-    if p >= FAMILYWISE or gain <= 0.0:
-        return Verdict(float(gain), p, (np.nan, np.nan))
-    return Verdict(float(gain), p, left_out(smaller, larger))
+    known = larger.records.data.n_noise(otherwise=n_eff)
+    p = min(1.0, n_candidates * n_shapes * float(f_distribution.sf(max(ratio, 0.0) / n_extra, n_extra, known)))
+    return Comparison(gain, p, (np.nan, np.nan) if p >= FAMILYWISE or gain <= 0.0 else left_out(smaller, larger))
 
 
 def left_out(smaller: Fit, larger: Fit) -> tuple[float, float]:
@@ -78,7 +76,7 @@ def parts_to_judge(smaller: Fit, larger: Fit) -> list[Part]:
     What one manoeuvre predicts of another says nothing of an effect where the parameters that it leaves undetermined
     may change that prediction by more than the effect is to explain.
     """
-    whole = larger.records.evidence.parts()
+    whole = larger.records.data.parts()
     if len(whole) != 2:
         return whole
     judged = [np.array_split(part, BLOCKS) if is_undetermined(smaller, larger, part) else [part] for part in whole]
@@ -95,24 +93,20 @@ def is_undetermined(smaller: Fit, larger: Fit, part: Part) -> bool:
 
 
 def left_out_part(fit: Fit, part: Part) -> float:
-    """Return the sum of squares on one part of a fit to the others."""
-    records, z = shapes_held(fit)
+    """Return the sum of squares on one part of a fit to the others.
+
+    Shapes that were set free are held where they are: what is asked of the part is the strength. A shape such as the
+    period of a sampled control may rest on one record alone, where the time of its switch jumps.
+    """
+    space, kept = fit.records.space, []
+    for name, value in fit.values.items():
+        is_freed = any(k.free_shape and k.owns(name) for k in fit.active)
+        kept.append(not is_freed or fit.model.parameters[name].fixed is None)
+        space = space if kept[-1] else space.with_fixed(name, value)
+    records = replace(fit.records, space=space, data=fit.records.data.without(part))
     try:
-        again = fit_from(with_evidence(records, records.evidence.without(part)), fit.active, [z])
+        again = fit_from(records, fit.active, [fit.z[np.array(kept, dtype=np.bool_)]])
     except ArmidError:
         return float("inf")
     square = float(np.sum(again.residual[part] ** 2))
     return square if np.isfinite(square) else float("inf")
-
-
-def shapes_held(fit: Fit) -> tuple[WhiteRecords, Array]:
-    """Return the problem and the free parameters of a fit with shapes that were set free held where they are.
-
-    What is asked of a part that is left out is the strength. A shape such as the period of a sampled control may rest
-    on one record alone, where the time of its switch jumps.
-    """
-    records, declared = fit.records, fit.records.replays[0].model.parameters
-    loose = [n for n in fit.values if n.partition(".")[0] + LOOSE in fit.active and declared[n].fixed is not None]
-    space = reduce(lambda known, n: known.with_fixed(n, fit.values[n]), loose, records.space)
-    kept = [n not in loose for n in fit.values]
-    return replace(records, space=space), fit.z[np.array(kept, dtype=np.bool_)]

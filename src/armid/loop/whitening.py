@@ -1,7 +1,12 @@
-"""The train records as whitened residuals: what every fit and every test of the loop looks at."""
+"""The train records as whitened residuals: what every fit and every test of the loop looks at.
+
+Coloured noise (a 40 Hz gyro sampled at 1 kHz) holds far fewer independent samples than samples. An autoregression of
+the sensor's signal at rest, pooled over the records and applied to residuals and sensitivities alike, turns it white
+with a standard deviation of 1: every test then counts samples.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -10,24 +15,18 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
-from armid.estimation.least_squares import WeightedRecords
+from armid.estimation.information import MISFIT
+from armid.estimation.least_squares import LeastSquaresProblem
 from armid.model import Plant
-from armid.problem.replay import Replay
-from armid.problem.space import Space
 from armid.record import Record
 from armid.record.noise import correlation_sum
-
-# The noise of a sensor as its rest before the motion shows it, and the filter that makes it white.
-#
-# Coloured noise (a 40 Hz gyro sampled at 1 kHz) holds far fewer independent samples than samples. An autoregression of
-# the pooled rest, applied to residuals and sensitivities alike, turns it white: every test then counts samples.
 
 Array = NDArray[np.float64]
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 LEAST_NOISE = 5e-5
-MOST_TERMS = 8
-FEWEST_FOR_COLOUR = 50
-LAGS = 500
+MOST_TERMS, FEWEST_FOR_COLOUR, LAGS = 8, 50, 500
+# A single manoeuvre is left out of fits in so many blocks of time.
+BLOCKS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,31 +50,27 @@ class NoiseLevel:
 
     @property
     def is_white(self) -> bool:
-        """Whether the noise shows no correlation in time."""
         return not len(self.terms)
 
     @property
     def known(self) -> bool:
-        """Whether the noise was measured at rest."""
         return self.n_samples > 0
 
     def white(self, values: Array, lengths: Sequence[int]) -> Array:
         """Return signals so filtered that the noise in them is white with a standard deviation of 1.
 
+        The first samples of each piece go through the inverse Cholesky factor of their covariance.
         values: [unit of the records], shape (..., n_samples), pieces end to end; lengths: of the pieces.
         """
         if self.is_white:
             return np.asarray(values / self.innovation)
-        edges = np.cumsum([0, *lengths])
-        pieces = [self.white_piece(values[..., a:b]) for a, b in pairwise(edges)]
+        n, pieces = len(self.terms), []
+        for start, end in pairwise(np.cumsum([0, *lengths])):
+            piece = values[..., start:end]
+            filtered = lfilter(np.concatenate([[1.0], -self.terms]), [1.0], piece, axis=-1) / self.innovation
+            filtered[..., :n] = piece[..., :n] @ self.head.T
+            pieces.append(filtered)
         return np.concatenate(pieces, axis=-1)
-
-    def white_piece(self, values: Array) -> Array:
-        """Return one piece filtered; its first samples through the inverse Cholesky factor of their covariance."""
-        n = len(self.terms)
-        filtered = lfilter(np.concatenate([[1.0], -self.terms]), [1.0], values, axis=-1) / self.innovation
-        filtered[..., :n] = values[..., :n] @ self.head.T
-        return np.asarray(filtered)
 
 
 def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> tuple[NoiseLevel, ...]:
@@ -85,14 +80,13 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
     of the same sensor whose rests count too.
     """
     floor = LEAST_NOISE * plant.scales.speed
-    rests = [*records, *others]
     intervals = [r.manoeuvre.interval for r in records]
-    pooled = {t: pooled_level([r for r in rests if r.manoeuvre.interval == t], floor) for t in set(intervals)}
+    pooled = {t: pooled_level([r for r in (*records, *others) if r.manoeuvre.interval == t], floor)
+              for t in set(intervals)}  # fmt: skip
     return tuple(pooled[t] for t in intervals)
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseLevel:
-    """Return the common noise of records of one sampling interval."""
     rested = [r for r in records if r.noise.source == "rest"]
     if not rested:
         return white_level(max(float(np.median([r.noise.rms for r in records])), floor), 0)
@@ -104,7 +98,6 @@ def pooled_level(records: Sequence[Record], floor: float) -> NoiseLevel:
 
 
 def white_level(rms: float, n_samples: int) -> NoiseLevel:
-    """Return the level of white noise."""
     return NoiseLevel(float(rms), np.empty(0), float(rms), np.empty((0, 0)), n_samples, n_samples, n_samples)
 
 
@@ -113,7 +106,9 @@ def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseLevel:
 
     Yule-Walker on the pooled, biased autocovariance: stable for any data (Brockwell and Davis, section 8.1).
     """
-    covariance = pooled_covariance(rests, MOST_TERMS)
+    total = sum(len(r) for r in rests)
+    covariance = np.array([sum(float(r[lag:] @ r[: len(r) - lag]) for r in rests) / total
+                           for lag in range(MOST_TERMS + 1)])  # fmt: skip
     if covariance[0] <= 0.0:
         return white_level(rms, n)
     fits = [yule_walker(covariance, order) for order in range(MOST_TERMS + 1)]
@@ -122,7 +117,10 @@ def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseLevel:
     if order == 0:
         return white_level(rms, n)
     terms, variance = fits[order]
-    rho = correlations(terms, covariance[: order + 1] / covariance[0])
+    correlation = list(covariance[: order + 1] / covariance[0])
+    while len(correlation) <= LAGS:
+        correlation.append(float(terms @ np.array(correlation[: -order - 1 : -1])))
+    rho = np.array(correlation[1:])
     slow, power = n / max(1.0 + 2.0 * rho.sum(), 1.0), n / (1.0 + 2.0 * float(rho @ rho))
     # Each mean that was taken out took more than one sample's worth of slow noise with it.
     rms *= float(np.sqrt(1.0 / max(1.0 - len(rests) / slow, 0.5)))
@@ -134,20 +132,6 @@ def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseLevel:
     return NoiseLevel(float(rms), terms, innovation, head, n, slow, power)
 
 
-def correlations(terms: Array, first: Array) -> Array:
-    """Return the autocorrelation of an autoregression at lags from 1 to 500; first: at lags 0 to its order."""
-    rho = list(first)
-    while len(rho) <= LAGS:
-        rho.append(float(terms @ np.array(rho[: -len(terms) - 1 : -1])))
-    return np.array(rho[1:])
-
-
-def pooled_covariance(rests: Sequence[Array], most: int) -> Array:
-    """Return the autocovariance at lags 0 to `most`, from all rests together."""
-    total = sum(len(r) for r in rests)
-    return np.array([sum(float(r[lag:] @ r[: len(r) - lag]) for r in rests) / total for lag in range(most + 1)])
-
-
 def yule_walker(covariance: Array, order: int) -> tuple[Array, float]:
     """Return the terms of an autoregression and the variance of its innovations."""
     if order == 0:
@@ -156,11 +140,8 @@ def yule_walker(covariance: Array, order: int) -> tuple[Array, float]:
     return np.asarray(terms, dtype=np.float64), float(covariance[0] - terms @ covariance[1 : order + 1])
 
 
-BLOCKS = 5
-
-
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class WhitenedData:
     """Hold records with their noise.
 
     levels: noise of each record. kept: which of all samples enter fits, (n_samples,).
@@ -182,11 +163,13 @@ class Evidence:
 
     @property
     def known(self) -> bool:
-        """Whether the noise of every record was measured at rest."""
         return all(level.known for level in self.levels)
 
+    def n_noise(self, otherwise: float) -> float:
+        """Return from how many independent samples the noise of slow signals is known; `otherwise` where from none."""
+        return float(min((level.n_slow for level in self.levels if level.known), default=otherwise))
+
     def by_record(self, values: Array) -> list[Array]:
-        """Return the part of each record of a vector of all samples."""
         return [values[..., a:b] for a, b in pairwise(self.edges)]
 
     def white(self, signals: Sequence[Array]) -> Array:
@@ -200,13 +183,11 @@ class Evidence:
         A repeat stays with its original: left in, it would tell what was left out.
         """
         names = [r.repeat_of or r.file for r in self.records]
-        rows = self.by_record(np.arange(self.edges[-1]))
-        pairs = list(zip(rows, names, strict=True))
+        pairs = list(zip(self.by_record(np.arange(self.edges[-1])), names, strict=True))
         whole = [np.concatenate([x for x, n in pairs if n == name]) for name in dict.fromkeys(names)]
         return whole if len(whole) > 1 else list(np.array_split(whole[0], BLOCKS))
 
-    def without(self, part: NDArray[np.int64]) -> "Evidence":
-        """Return the evidence whose fits do not see some samples."""
+    def without(self, part: NDArray[np.int64]) -> "WhitenedData":
         kept = self.kept.copy()
         kept[part] = False
         return replace(self, kept=kept)
@@ -220,40 +201,40 @@ class Evidence:
         parts = [x - np.mean(x) for x in self.by_record(residual)]
         return float(sum(len(x) / (1.0 + 2.0 * correlation_sum(x)) for x in parts))
 
+    def trust(self, residual: Array) -> Array:
+        """Return the weight of each sample in intervals: 1, or n_eff/chi2 in records whose residual is no noise.
 
-def evidence_of(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> Evidence:
-    """Return all of some records as evidence; others: records of the same sensor whose rests tell of its noise too."""
+        There the residual itself, with its correlation in time, is what scatters (as in `information.level_of`).
+        """
+        found = []
+        for level, part in zip(self.levels, self.by_record(residual), strict=True):
+            # How well the noise itself is known: its mean square scatters by 2/n.
+            doubt = 1.0 + 3.0 * np.sqrt(2.0 / (level.n_slow if level.known else len(part)))
+            square = float(np.mean(part**2))
+            misfit = square > MISFIT * doubt
+            found.append(np.full(len(part), 1.0 / square / (1.0 + 2.0 * correlation_sum(part)) if misfit else 1.0))
+        return np.concatenate(found)
+
+
+def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
+    """Return records with their noise; others: records of the same sensor whose rests tell of its noise too."""
     n = sum(r.n_samples for r in records)
-    return Evidence(tuple(records), noise_levels(records, plant, others), np.ones(n, dtype=np.bool_))
+    return WhitenedData(tuple(records), noise_levels(records, plant, others), np.ones(n, dtype=np.bool_))
 
 
 @dataclass(frozen=True, eq=False)
-class WhiteRecords(WeightedRecords):
-    """Give least squares the whitened residuals of the samples that are kept.
+class WhiteRecords(LeastSquaresProblem):
+    """Give least squares the whitened residuals of the samples that are kept."""
 
-    Weights stand for nothing here: the noise levels weigh.
-    """
+    data: WhitenedData
 
-    evidence: Evidence = field(kw_only=True)
-
-    @cached_property
-    def measured(self) -> Array:
-        """Whitened measured signals of the kept samples, (n_kept,)."""
-        return self.evidence.white([r.measured for r in self.replays])[self.evidence.kept]
-
-    def signals(self, Z: Array) -> Array:
-        """Return whitened simulated signals of candidates in shares, (n_candidates, n_kept)."""
-        return self.whole_signals(self.space.complete(self.values(Z)))[:, self.evidence.kept]
+    def weighted(self, signals: Sequence[Array]) -> Array:
+        return self.data.white(signals)[..., self.data.kept]
 
     def whole_signals(self, candidates: Array) -> Array:
-        """Return whitened simulated signals of whole candidates, SI, on all samples, (n_candidates, n_samples)."""
-        return self.evidence.white([r.signal(candidates) for r in self.replays])
+        return self.data.white([r.signal(candidates) for r in self.replays])
 
-    def whole(self) -> "WhiteRecords":
-        """Return the problem that sees every sample."""
-        return replace(self, evidence=replace(self.evidence, kept=np.ones_like(self.evidence.kept)))
-
-
-def white_records(replays: tuple[Replay, ...], space: Space, evidence: Evidence) -> WhiteRecords:
-    """Return records, a space and the evidence as one least-squares problem."""
-    return WhiteRecords(replays, space, (), evidence=evidence)
+    def with_all_samples(self) -> "WhiteRecords":
+        if self.data.kept.all():
+            return self
+        return replace(self, data=replace(self.data, kept=np.ones_like(self.data.kept)))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from armid.errors import ArmidError, nearest, shown
-from armid.model import EFFECTS, PLANTS, Effect, Parameter, Plant
+from armid.model import EFFECTS, PLANTS, Effect, Model, Parameter, Plant
 from armid.model.parameter import resolve
 from armid.record.pieces import with_window
 from armid.record.reader import Shared, campaign_path, folder_name, gravity_of, load_toml, read_record, record_path
@@ -102,6 +102,16 @@ class Campaign:
     def unit(self) -> str:
         """Unit of the recorded speed, "rad/s" or "m/s"."""
         return self.plant.output_unit
+
+    def model(self, effects: Mapping[str, Effect] = EFFECTS) -> Model:
+        """Return the declared model, the plant with the effects of the campaign; effects: name -> those known.
+
+        Raises ArmidError where they do not compose.
+        """
+        model = Model(self.plant)
+        for name in self.effects:
+            model = model + effects[name]
+        return model
 
     def with_window(self, begin: float, end: float) -> "Campaign":
         """Return the campaign with one window [s] for every record, whatever its file says; both ends count.

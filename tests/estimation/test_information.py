@@ -1,4 +1,4 @@
-"""Intervals and correlations: what the records say about the parameters."""
+"""Sensitivities, intervals and correlations: what the records say about the parameters."""
 
 from dataclasses import replace
 
@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from armid.engine import calibrate, probes
 from armid.estimation.information import collinear, information_at, sensitivities
-from armid.model import Effect, Parameter
-from armid.problem.replay import replays
+from armid.model import EFFECTS, Effect, Manoeuvre, Model, Parameter
+from armid.model.plants.driven_axis import linear_axis
+from armid.problem.replay import Replay, replays
 from armid.problem.space import space_of
-from armid.record import read_campaign
+from armid.record import Noise, Piece, Record, read_campaign
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 DEGREE = np.pi / 180.0
@@ -160,3 +162,104 @@ def test_intervals_cover_the_truth(several, arm_space, phi):
     covered = np.mean(np.abs(misses) <= information.half_width, axis=0)
     assert ((covered >= 0.85) & (covered <= 1.0)).all()
     np.testing.assert_allclose(misses.std(axis=0) / information.deviation, 1.0, atol=0.25)
+
+
+INTERVAL, AXIS_NOISE, MASS, SLOPE, SPEED = 2e-3, 0.01, 1.8, 0.4, 0.3
+
+
+def test_at_the_minimum_the_step_is_small_and_away_from_it_is_large(lowering_replays, arm_space):
+    span = arm_space.high - arm_space.low
+    replay = lowering_replays[0]
+
+    def residual(z):
+        return (replay.signal((z * span)[np.newaxis])[0] - replay.measured) / replay.record.noise.rms
+
+    bounds = (arm_space.low / span, arm_space.high / span)
+    best = least_squares(residual, TRUTH / span, bounds=bounds, x_scale="jac", diff_step=1e-5).x * span
+    at_best = information_at(lowering_replays, arm_space, best)
+    assert np.abs(at_best.step).max() < 0.2
+    away = best + 8.0 * np.array([0.0, 1.0, 0.0, 0.0]) * at_best.deviation
+    assert information_at(lowering_replays, arm_space, away).step[1] == pytest.approx(-8.0, rel=0.2)
+
+
+def axis_replay(rng, start_noise):
+    """A linear axis with viscous friction, started from a speed that was measured with noise."""
+    model = Model(replace(linear_axis, scales=replace(linear_axis.scales, effort=2.0, speed=0.5))) + EFFECTS["viscous"]
+    times = INTERVAL * np.arange(1501)
+    drive = 2.0 * np.sin(4.0 * times)
+    given = {"u": drive}
+    true = Manoeuvre(INTERVAL, 1501, {"start_speed": SPEED}, given)
+    told = Manoeuvre(INTERVAL, 1501, {"start_speed": SPEED + start_noise * rng.normal()}, given)
+    space = space_of(model, bounds={"mass": (1.0, 3.0), "viscous.slope": (0.1, 1.0)})
+    calibration = calibrate(model, told, space.complete(probes(space.low[space.free], space.high[space.free])))
+    noise = Noise(AXIS_NOISE, None, 0.0, 1.0, 1501, "differences")
+
+    def replay(manoeuvre, measured):
+        piece = Piece(manoeuvre, measured, slice(0, 1501), start_deviation={"start_speed": start_noise})
+        record = Record("a.csv", "train", "m/s", manoeuvre, measured, np.empty(0), noise, (piece,), (piece,))
+        return Replay(record, model, (piece,), (calibration,))
+
+    clean = replay(true, np.zeros(1501)).signal(np.array([[MASS, SLOPE]]))[0]
+    return replay(told, clean + AXIS_NOISE * rng.normal(size=1501)), space
+
+
+def test_intervals_cover_the_truth_in_spite_of_a_noisy_start():
+    rng = np.random.default_rng(11)
+    start_noise = AXIS_NOISE * np.sqrt(4.0 / 11.0)
+    z = []
+    for _ in range(40):
+        replay, space = axis_replay(rng, start_noise)
+        x = np.array([MASS, SLOPE])
+        for _ in range(4):
+            information = information_at((replay,), space, x)
+            without = information_at((surely_started(replay),), space, x)
+            x = x + without.step * without.deviation
+        z.append((x - [MASS, SLOPE]) / information.deviation)
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.4
+    assert (information.deviation > 2.0 * without.deviation).any()
+
+
+def surely_started(replay):
+    """The same record, said to start from a state that is known: no noise of the start is reckoned with."""
+    return replace(replay, pieces=tuple(replace(piece, start_deviation={}) for piece in replay.pieces))
+
+
+@pytest.fixture(scope="module")
+def axis(write_axis, axis_model, tmp_path_factory):
+    campaign = read_campaign(write_axis(tmp_path_factory.mktemp("sensitivity")))
+    space = space_of(axis_model, bounds={"mass": (1.0, 4.0), "viscous.slope": (1.0, 10.0)})
+    return replays(campaign.train, axis_model, space, "fine")[0], space
+
+
+def closed_form(replay, mass, slope, drive=8.0):
+    """Return d v/d mass and d v/d slope of v = F/c + (v0 - F/c) exp(-c t/m), (n_samples, 2)."""
+    t, v0 = replay.times, replay.pieces[0].manoeuvre.constants["start_speed"]
+    decay, away = np.exp(-slope * t / mass), v0 - drive / slope
+    by_mass = away * decay * slope * t / mass**2
+    by_slope = -drive / slope**2 * (1.0 - decay) - away * decay * t / mass
+    return np.column_stack([by_mass, by_slope])
+
+
+def test_agree_with_the_closed_form_of_an_axis(axis):
+    replay, space = axis
+    # the last on a corner of the box, where the step is moved inside
+    for mass, slope, within in ((2.0, 5.0, 1e-4), (1.3, 9.0, 1e-4), (3.7, 1.5, 1e-4), (1.0, 10.0, 2e-3)):
+        expected = closed_form(replay, mass, slope) * (space.high - space.low)[space.free]
+        found = sensitivities(replay, space, np.array([mass, slope]))
+        np.testing.assert_allclose(found, expected, atol=within * np.max(np.abs(expected)))
+
+
+def test_agree_with_differences_of_another_step(several, arm_space):
+    for replay, step in ((replay, step) for replay in several for step in (1e-5, 1e-3)):
+        found = sensitivities(replay, arm_space, TRUTH)
+        moves = np.diag(step * (arm_space.high - arm_space.low))
+        signal = replay.signal(np.concatenate([TRUTH + moves, TRUTH - moves]))
+        other = (signal[:4] - signal[4:]).T / (2.0 * step)
+        # around the switch E the curvature of a step of 1e-3 shows
+        np.testing.assert_allclose(found, other, atol=(2e-3 if step < 1e-4 else 2e-2) * np.max(np.abs(other)))
+
+
+def test_a_fixed_parameter_has_no_column(lowering_replays, arm_space):
+    some = sensitivities(lowering_replays[0], arm_space.with_fixed("eta3", 0.55), TRUTH[[0, 1, 3]])
+    whole = sensitivities(lowering_replays[0], arm_space, TRUTH)
+    np.testing.assert_allclose(some, whole[:, [0, 1, 3]], rtol=1e-9, atol=1e-12)

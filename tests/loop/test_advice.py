@@ -1,7 +1,6 @@
 """Advice on the next record: chances against brute force, and records that were then made."""
 
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -9,20 +8,19 @@ import pytest
 from armid.engine import Calibration, Schedule, simulate
 from armid.errors import ArmidError
 from armid.estimation.design import Motions, manoeuvre_grid
-from armid.estimation.least_squares import WeightedRecords, estimate, noise_weights, refine
+from armid.estimation.least_squares import LeastSquaresProblem, estimate, refine, weighted_records
 from armid.loop.advice import (
     OFTEN,
     THRESHOLD,
     Advice,
-    Forecast,
+    Prediction,
     Rival,
     advice_of,
     advise,
     chance,
-    drawn,
     normal_draws,
     outside,
-    rehearse,
+    simulate_refits,
     spread_of,
 )
 from armid.model import EFFECTS
@@ -37,15 +35,11 @@ TRUTH = {"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4, "coulomb.level": 10.0, 
 
 
 @dataclass(frozen=True, eq=False)
-class Linear(WeightedRecords):
+class Linear(LeastSquaresProblem):
     """Signals design @ z with noise of 1."""
 
-    design: np.ndarray = field(kw_only=True)
-    seen: np.ndarray = field(kw_only=True)
-
-    @cached_property
-    def measured(self):
-        return self.seen
+    design: np.ndarray
+    measured: np.ndarray
 
     def signals(self, Z):
         return Z @ self.design.T
@@ -64,7 +58,7 @@ def linear_rivals(rng, apart):
     space = Space(tuple("abc"), ("1",) * 3, np.zeros(3), np.ones(3), np.full(3, np.nan))
     rivals = []
     for name, design in zip("AB", old):
-        records = Linear((), space, (), design=design, seen=seen)
+        records = Linear((), space, design, seen)
         z = np.linalg.lstsq(design, seen)[0]
         rivals.append(Rival(name, records, z, float(records.chi2(z)[0])))
     return rivals, old, new, seen
@@ -90,13 +84,13 @@ def test_chances_of_linear_models_are_those_of_brute_force(seed, apart, monkeypa
     rng = np.random.default_rng(seed)
     rivals, old, new, seen = linear_rivals(rng, apart)
     told = brute_force(rivals, old, new, seen, rng)
-    a, b = (Forecast(n @ r.z, n @ r.root) for n, r in zip(new, rivals))
+    a, b = (Prediction(n @ r.z, n @ r.root) for n, r in zip(new, rivals))
     ahead = rivals[1].criterion - rivals[0].criterion
     forecast, _ = chance(a, b, ahead, normal_draws(7, 512), THRESHOLD)
     assert forecast == pytest.approx(told, abs=0.05)
     designs = dict(zip("AB", new))
-    monkeypatch.setattr("armid.loop.advice.foreseen", lambda rival, *_: _[-1] @ designs[rival.name].T)
-    won, apart = rehearse(rivals, 0, None, None, normal_draws(3, 60), THRESHOLD)
+    monkeypatch.setattr("armid.loop.advice.whitened_signals", lambda rival, *_: _[-1] @ designs[rival.name].T)
+    won, apart = simulate_refits(rivals, 0, None, None, normal_draws(3, 60), THRESHOLD)
     assert won[0] == 1.0
     assert won[1] == pytest.approx(told, abs=0.08)
     assert apart[0] == 0.0 < apart[1]
@@ -117,7 +111,7 @@ def test_a_draw_stays_in_the_box_where_its_mirror_does():
     (rival, _), *_ = linear_rivals(rng, 1.0)
     held = replace(rival, z=np.array([0.0, 0.5, 0.5]))
     for draw in normal_draws(3, 40):
-        assert drawn(held, draw)[0] >= 0.0
+        assert held.drawn(draw)[0] >= 0.0
     np.testing.assert_allclose(outside(np.array([[0.2, 1.0], [-0.1, 1.3]])), [0.0, 0.3])
 
 
@@ -146,7 +140,7 @@ def fitted(name, model, records, start=None):
     space = space_of(model)
     ready = tuple(Replay(r, model, r.pieces, (Calibration(Schedule(2), 1e-6, True),)) for r in records)
     x = estimate(ready, space) if start is None else refine(ready, space, start)
-    problem = WeightedRecords(ready, space, noise_weights(ready))
+    problem = weighted_records(ready, space)
     return Rival(name, problem, problem.shares(x), float(problem.chi2(problem.shares(x))[0]))
 
 

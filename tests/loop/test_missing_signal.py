@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from armid.loop.candidates import is_empirical, shown_name
+from armid.loop.candidates import EffectKey
 from armid.loop.empirical import empirical_effect
-from armid.loop.missing_signal import dependences, missing_signal, motions, stretches
+from armid.loop.missing_signal import dependences, missing_signal, motions, segments
 from armid.model import Model
 from armid.problem.replay import replays
 from armid.problem.space import space_of
@@ -53,23 +53,23 @@ def axis(tmp_path_factory):
 @pytest.fixture(scope="module")
 def whole(axis):
     model, space, ready = axis
-    return stretches(model, space, np.empty(0), ready, [NOISE] * 3, ["torque", "output"])
+    return segments(model, space, np.empty(0), ready, [NOISE] * 3, ["torque", "output"])
 
 
 def test_the_gain_of_a_force_is_its_impulse_over_the_mass(whole):
-    stretch = whole[0]
-    width = stretch.knots[1] - stretch.knots[0]
-    assert np.allclose(stretch.gains["torque"][-1, 5:-1] * NOISE, width / MASS, rtol=1e-3)
-    assert np.allclose(stretch.gains["output"][20:380].sum(axis=1) * NOISE, 1.0, rtol=1e-4)
+    segment = whole[0]
+    width = segment.knots[1] - segment.knots[0]
+    assert np.allclose(segment.gains["torque"][-1, 5:-1] * NOISE, width / MASS, rtol=1e-3)
+    assert np.allclose(segment.gains["output"][20:380].sum(axis=1) * NOISE, 1.0, rtol=1e-4)
 
 
 def test_the_missing_force_is_recovered_without_a_form(axis, whole):
     found = missing_signal(whole, "torque")
     assert found.share > 0.99
-    for stretch, signal in zip(whole, found.signals, strict=True):
-        times = stretch.piece.manoeuvre.times()
-        position = np.cumsum(stretch.replay.record.measured) * 0.005
-        truth = spring(np.interp(stretch.knots, times, position))
+    for segment, signal in zip(whole, found.signals, strict=True):
+        times = segment.piece.manoeuvre.times()
+        position = np.cumsum(segment.replay.record.measured) * 0.005
+        truth = spring(np.interp(segment.knots, times, position))
         assert np.sqrt(np.mean((signal - truth)[3:-3] ** 2)) < 0.15 * np.ptp(truth)
 
 
@@ -87,8 +87,8 @@ def test_the_empirical_term_starts_from_the_curve_and_claims_no_name(axis, whole
     model, _, ready = axis
     best = dependences(motions(model, np.array([MASS]), whole))[0]
     effect, start = empirical_effect(model, best)
-    assert is_empirical(effect.name)
-    assert shown_name(effect.name) == "unnamed:torque"
+    assert EffectKey(effect.name).is_empirical
+    assert EffectKey(effect.name).public == "unnamed:torque"
     extended = model + effect
     own = {name: start.get(name, p.fixed) for name, p in extended.parameters.items() if name != "mass"}
     assert None not in own.values()

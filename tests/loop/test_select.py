@@ -14,8 +14,8 @@ PARTS = [np.arange(N), np.arange(N, 2 * N), np.arange(2 * N, 3 * N)]
 def models(slopes, size, n_parts=2):
     """A smaller model that leaves `size` at each sample, and a larger one with two parameters of such slopes."""
     jacobian = np.concatenate([np.tile(row, (N, 1)) for row in slopes[:n_parts]])
-    evidence = SimpleNamespace(parts=lambda: PARTS[:n_parts])
-    larger = SimpleNamespace(jacobian=jacobian, n_free=2, records=SimpleNamespace(evidence=evidence))
+    data = SimpleNamespace(parts=lambda: PARTS[:n_parts])
+    larger = SimpleNamespace(jacobian=jacobian, n_free=2, records=SimpleNamespace(data=data))
     return SimpleNamespace(residual=np.full(n_parts * N, size)), larger
 
 

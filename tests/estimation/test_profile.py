@@ -6,7 +6,7 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from armid.estimation.least_squares import WeightedRecords, estimate, fit, noise_weights
+from armid.estimation.least_squares import estimate, fit, weighted_records
 from armid.estimation.profile import THRESHOLD, profiles
 from armid.problem.replay import replays
 
@@ -26,7 +26,7 @@ def test_of_a_linear_model_it_is_the_parabola():
     records = linear_records(design, seen_by(design, np.array([0.4, 0.5, 0.6]), rng))
     best, found = profiles(records, np.full(3, 0.5))
     deviation = 10.0 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    np.testing.assert_allclose(best, np.linalg.lstsq(design, records.seen)[0], atol=1e-7)
+    np.testing.assert_allclose(best, np.linalg.lstsq(design, records.measured)[0], atol=1e-7)
     for p, d in zip(found, deviation, strict=True):
         assert p.bounded == (True, True)
         assert p.agrees
@@ -45,11 +45,11 @@ def test_with_bounds_it_is_the_bounded_solution(seed):
     design[:, 0] = design[:, 1] - design[:, 2] + 0.5 * rng.normal(size=30)
     records = linear_records(design, seen_by(design, np.array([0.02, 0.5, 0.97]), rng))
     _, found = profiles(records, np.full(3, 0.5))
-    least = 2.0 * lsq_linear(design, records.seen, bounds=(0.0, 1.0), tol=1e-14).cost
+    least = 2.0 * lsq_linear(design, records.measured, bounds=(0.0, 1.0), tol=1e-14).cost
     for i, p in enumerate(found):
         others = [j for j in range(3) if j != i]
         for value, rise in zip(p.values, p.rise, strict=True):
-            rest = records.seen - design[:, i] * (value - 10.0) / 10.0
+            rest = records.measured - design[:, i] * (value - 10.0) / 10.0
             told = 2.0 * lsq_linear(design[:, others], rest, bounds=(0.0, 1.0), tol=1e-14).cost
             assert rise == pytest.approx(told - least, abs=1e-3)
         assert p.low == 10.0 or p.bounded[0]
@@ -97,7 +97,7 @@ class TwoValleys(type(linear_records(np.eye(1), np.zeros(1)))):
 
 def test_a_profile_that_finds_a_deeper_valley_starts_again_there():
     plain = linear_records(np.ones((2, 1)), np.zeros(2))
-    records = TwoValleys((), plain.space, (), design=plain.design, seen=np.zeros(2))
+    records = TwoValleys((), plain.space, plain.design, np.zeros(2))
     assert fit(records, np.array([0.1]))[0] < 0.3
     best, (p,) = profiles(records, np.array([0.1]))
     assert best[0] == pytest.approx(0.8, abs=1e-6)
@@ -107,7 +107,7 @@ def test_a_profile_that_finds_a_deeper_valley_starts_again_there():
 def test_one_stroke_of_the_arm_is_next_to_a_parabola(lowering, arm, arm_space):
     """The truth lies in each interval of one stroke, whose curve is next to a parabola for the arm without effects."""
     (replay,) = replays(lowering.train, arm, arm_space)
-    records = WeightedRecords((replay,), arm_space, noise_weights((replay,)))
+    records = weighted_records((replay,), arm_space)
     best, found = profiles(records, records.shares(estimate((replay,), arm_space)))
     for p, truth in zip(found, (3.05e6, 1.0, 0.55, 1.4), strict=True):
         assert p.agrees

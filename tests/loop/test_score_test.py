@@ -1,0 +1,68 @@
+"""Scores, what stands behind them, and what could take an effect's place: geometry that the score does not use."""
+
+import numpy as np
+import pytest
+
+from armid.loop import close_loop
+from armid.loop.candidates import EffectKey
+from armid.loop.diagnose import square_along
+from armid.loop.equivalence import ALIKE, LIKELY, likest
+from armid.loop.fit import decomposed
+from armid.loop.score_test import projected, rest_of
+from armid.model import EFFECTS, Model
+from armid.record import read_campaign
+
+NAMES = ("coulomb", "quadratic_drag", "viscous")
+T = np.linspace(0.0, 1.0, 400)
+BASIS = np.linalg.qr(np.column_stack([np.ones_like(T), T]))[0]
+CHANGE = 3.0 * np.sin(9.0 * T) + 5.0 * T
+
+
+@pytest.fixture(scope="module")
+def closed(write_axis, tmp_path_factory):
+    """An axis whose viscous friction is not declared, recorded with a little noise."""
+    times = np.arange(401) / 200.0
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(401)
+    speed = 8.0 / 5.0 * (1.0 - np.exp(-5.0 * times / 2.0)) + noise
+    bounds = "[parameters.mass]\nlow = 1\nhigh = 4\n"
+    campaign = read_campaign(write_axis(tmp_path_factory.mktemp("axis"), speed, bounds))
+    return close_loop(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in NAMES})
+
+
+def test_the_drop_is_what_the_change_takes_off_the_residual(closed):
+    current, rest = closed.before.fit, rest_of(closed.before.fit)
+    slopes = current.jacobian / np.linalg.norm(current.jacobian, axis=0)
+    for name in NAMES:
+        behind = projected(current, EffectKey(name), closed.library)
+        (score,) = (s for s in closed.search.scores_at(current) if s.key.name == name)
+        assert rest @ rest - np.sum((rest - behind.change) ** 2) == pytest.approx(score.drop, rel=1e-9)
+        assert score.drop <= behind.alignment**2 * (rest @ rest) * (1.0 + 1e-9)
+        assert 0.0 < behind.share <= 1.0
+        # none that the parameters could make
+        assert np.max(np.abs(slopes.T @ behind.change)) < 1e-6 * np.linalg.norm(behind.change)
+
+
+def test_the_part_along_columns_is_that_of_a_decomposition_whatever_their_rank():
+    for rank in (1, 3, 5):
+        rng = np.random.default_rng(rank)
+        columns = rng.standard_normal((300, rank)) @ rng.standard_normal((rank, 5)) * np.logspace(-3, 3, 5)
+        values = rng.standard_normal(300)
+        basis, inverse = decomposed(columns)
+        square, found = square_along(columns, values)
+        assert found == rank == basis.shape[1]
+        assert square == pytest.approx(float(np.sum((basis.T @ values) ** 2)), rel=1e-9)
+        np.testing.assert_allclose(columns @ (inverse @ values), basis @ (basis.T @ values), atol=1e-8)
+
+
+def test_what_moves_the_signal_alike_is_found_with_its_amplitude():
+    moved = np.array([np.cos(9.0 * T), 12.0 * np.sin(9.0 * T) - 40.0, np.full_like(T, np.nan)])
+    place, correlation, amplitude = likest(CHANGE, moved, BASIS)
+    assert place == 1
+    assert correlation == pytest.approx(1.0, abs=1e-9)
+    assert amplitude == pytest.approx(0.25, rel=1e-9)
+    assert LIKELY < ALIKE
+
+
+def test_none_is_near_where_it_moves_otherwise_the_other_way_or_not_at_all():
+    for moved in (np.cos(9.0 * T), -np.sin(9.0 * T), 2.0 + 7.0 * T, np.zeros_like(T)):
+        assert likest(CHANGE, moved[np.newaxis], BASIS) is None

@@ -1,0 +1,72 @@
+"""Shapes that are fixed by declaration, set free where a model is among the best; work shared among threads."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from armid.loop.candidates import EffectKey, library_of, side_by_side
+from armid.loop.search import Search, best_along, with_free_shapes
+from armid.loop.whitening import whitened
+from armid.model import EFFECTS, Model
+from armid.record import read_campaign
+
+MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
+
+
+def library(folder, name):
+    campaign = read_campaign(folder)
+    model = Model(campaign.plant)
+    data = whitened(campaign.train, model.plant)
+    return library_of(model, {name: EFFECTS[name]}, data, campaign.parameters, {}, {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "effect", "shape", "expected", "within"), [
+    ("shell_rocking", ("rocking_hz=6", "rocking_stop=0.008"), "hardening", 0.0077, 0.001),
+    ("stribeck", ("stribeck=60", "stribeck_exponent=1"), "exponent", 1.0, 0.15),
+    ("controller_delay", ("controller_period=0.012",), "period", 0.012, 0.0015),
+    ("winding_heating", ("winding_heating=5e-5", "winding_cooling=2.5"), "cooling", 2.5, 0.4),
+])  # fmt: skip
+def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, effect, shape, expected, within):
+    found = Search(library(stand(*MANOEUVRES, "--effect", *effect), name))
+    last = found.run()[-1].best
+    assert last.active == (EffectKey(name, free_shape=True),)
+    assert last.values[f"{name}.{shape}"] == pytest.approx(expected, abs=within)
+    usual = found.fits[frozenset((EffectKey(name),))]
+    assert last.chi2 < usual.chi2
+    again = with_free_shapes(usual, EffectKey(name), found.library)
+    assert again.chi2 == pytest.approx(last.chi2, rel=1e-6)
+
+
+class Narrow:
+    """A sum of squares with a narrow valley along its second parameter."""
+
+    def chi2(self, Z):
+        return np.where(np.abs(Z[:, 1] - 0.7123) < 0.002, 1.0, 10.0) + (Z[:, 0] - 0.2) ** 2
+
+
+def test_a_narrow_valley_is_found_along_one_parameter():
+    best = best_along(Narrow(), np.array([0.5, 0.5]), 1)
+    assert best[0] == 0.5
+    assert best[1] == pytest.approx(0.7123, abs=0.002)
+
+
+def test_keys_and_what_they_own():
+    key = EffectKey("flux_saturation", "atan", free_shape=True)
+    assert (key.compiled, key.public, key.declared) == (
+        "flux_saturation_atan", "flux_saturation", EffectKey("flux_saturation", "atan"),
+    )  # fmt: skip
+    assert key.owns("flux_saturation_atan.level")
+    assert not key.owns("flux_saturation_atan2.level")
+    assert EffectKey("unnamed_torque").public == "unnamed:torque"
+
+
+def test_work_is_shared_among_threads_and_comes_in_order():
+    for threads in (1, 2, 5):
+        assert side_by_side(lambda x: x * x, range(20), threads) == [x * x for x in range(20)]
+        assert side_by_side(lambda x: x, [], threads) == []
+    both = threading.Barrier(2, timeout=30.0)
+    assert side_by_side(lambda _: both.wait() >= 0, range(2), 2) == [True, True]
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(lambda x: 1 / x, [1, 0], 2)
