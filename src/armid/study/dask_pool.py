@@ -30,7 +30,7 @@ def perform_batch(runs: tuple[ClaimedRun, ...], setup: WorkerSetup) -> list[Outc
 
 
 class DaskPool:
-    """A pool on a Dask cluster; batches whose worker is lost are sent again.
+    """Perform runs on a Dask cluster, as `LocalPool` does on this machine; batches of a lost worker are sent again.
 
     address: of the scheduler, as tcp://host:8786.
     Raises ArmidError when `distributed` is not installed and when the cluster does not answer.
@@ -45,22 +45,18 @@ class DaskPool:
 
     @property
     def held(self) -> int:
-        """Number of runs that were given and have not come back."""
         return sum(len(runs) for runs, _ in self._batches.values())
 
     def wanted(self) -> int:
-        """Return how many further runs to give now."""
         batches = AHEAD * max(1, sum(self._client.nthreads().values()))
         return int(max(0, batches - len(self._batches)) * self._size.n_runs)
 
     def give(self, runs: Sequence[ClaimedRun]) -> None:
-        """Add runs."""
         size = self._size.n_runs
         for first in range(0, len(runs), size):
             self._submit(tuple(runs[first : first + size]), 0)
 
     def wait(self, seconds: float) -> list[Outcome]:
-        """Return what is finished, at the latest after so many seconds."""
         if self._client.status != "running":
             raise ArmidError(f"the Dask cluster at {self.address} has gone: start again to go on")
         with suppress(Empty):
@@ -70,7 +66,6 @@ class DaskPool:
         return []
 
     def close(self) -> None:
-        """End at once; what is not finished is lost."""
         self._client.cancel(list(self._batches))
         self._client.close()
 

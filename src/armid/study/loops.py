@@ -51,12 +51,10 @@ class LoopStudy:
 
     @property
     def name(self) -> str:
-        """Name of the study and of its folder of results."""
         return self.spec.name
 
     @property
     def case_names(self) -> list[str]:
-        """Names of the campaigns."""
         return [case.name for case in self.cases]
 
     @classmethod

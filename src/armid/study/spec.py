@@ -2,9 +2,9 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from armid.engine.calibrate import ALLOWED
@@ -13,6 +13,7 @@ from armid.identifiers import Identifier, identifier_of
 from armid.model import Effect, Plant
 from armid.problem.fitness import Fitness
 from armid.record.schema import (
+    Kind,
     KindError,
     above_zero,
     any_table,
@@ -41,17 +42,15 @@ MOST_HELD = 10**6
 # Kinds of values, see `armid.record.schema`: each returns a value as it is wanted, or raises KindError.
 
 
-def plain_name(value: object) -> str:
-    """Return a name that is safe as the name of a folder."""
-    if PLAIN_NAME.fullmatch(text(value)) and not text(value).endswith("."):
-        return text(value)
-    raise KindError(value)
+def tested(kind: Kind, test: Callable[[Any], bool]) -> Kind:
+    """Return the kind of a value that is of a kind and passes a test."""
 
+    def both(value: object) -> Any:
+        if test(kind(value)):
+            return kind(value)
+        raise KindError(value)
 
-def line_of_text(value: object) -> str:
-    if text(value).isprintable() and text(value) == text(value).strip():
-        return text(value)
-    raise KindError(value)
+    return both
 
 
 def any_text(value: object) -> str:
@@ -66,13 +65,12 @@ def whole_number(value: object, least: int = 0, most: int = LARGEST_COUNT) -> in
     raise KindError(value)
 
 
-def count(value: object) -> int:
-    return whole_number(value, 1)
-
-
-def held_count(value: object) -> int:
-    """Return a number of things that are all held in memory."""
-    return whole_number(value, 1, MOST_HELD)
+# A name that is safe as the name of a folder.
+plain_name = tested(text, lambda name: bool(PLAIN_NAME.fullmatch(name)) and not name.endswith("."))
+line_of_text = tested(text, lambda line: line.isprintable() and line == line.strip())
+count = partial(whole_number, least=1)
+# A number of things that are all held in memory.
+held_count = partial(whole_number, least=1, most=MOST_HELD)
 
 
 def seeds(value: object) -> tuple[int, ...]:
@@ -251,7 +249,7 @@ class LoopSpec:
 
 @dataclass(frozen=True, eq=False)
 class StudyRegistry:
-    """Hold what a study may name, by name.
+    """Hold what a study may name: name -> plant, effect, fitness or identifier.
 
     plugins: `FILE.py:attribute` of the user's own. digests: (kind, name) -> hash of the file that it was read from; it
     is part of a run's settings, so that results of an older version of that file are not taken for the present one's.
@@ -263,22 +261,18 @@ class StudyRegistry:
 
     @property
     def plants(self) -> dict[str, Plant]:
-        """Name -> Plant."""
         return self.registry.plants
 
     @property
     def effects(self) -> dict[str, Effect]:
-        """Name -> Effect."""
         return self.registry.effects
 
     @cached_property
     def fitness(self) -> dict[str, Fitness]:
-        """Name -> Fitness."""
         return self.registry.fitness
 
     @cached_property
     def identifiers(self) -> dict[str, Identifier]:
-        """Name -> Identifier, those composed of others left out."""
         return self.registry.identifiers
 
     def identifier(self, name: str, where: str) -> Identifier:
