@@ -58,6 +58,13 @@ def test_everything_is_si(lowering_found):
     residual = residual - lowering_found.train_replays[0].signal(lowering_found.candidate[np.newaxis])[0]
     assert result["error"]["train"]["rmse"] == pytest.approx(np.sqrt(np.mean(residual**2)))
     assert result["noise"]["lower.csv"]["rms"] == pytest.approx(np.radians(0.2145), rel=0.01)
+    by_record = result["error_by_record"]
+    assert {file: e["role"] for file, e in by_record.items()} == {
+        "lower.csv": "train",
+        "lower_low_voltage.csv": "holdout",
+    }
+    holdout = record_errors(lowering_found.holdout_replays[0], lowering_found.candidate)
+    assert {k: v for k, v in by_record["lower_low_voltage.csv"].items() if k != "role"} == vars(holdout)
 
 
 def test_intervals_and_correlations_are_those_of_the_information(lowering_found):
@@ -67,13 +74,6 @@ def test_intervals_and_correlations_are_those_of_the_information(lowering_found)
         assert p["low"] < p["value"] < p["high"]
         assert result["correlation"][name][name] == pytest.approx(1.0)
         assert result["correlation"][name]["n"] == pytest.approx(information.correlation[i, 3])
-
-
-def test_each_record_s_errors(lowering_found):
-    told = result_of(lowering_found)["error_by_record"]
-    assert {file: e["role"] for file, e in told.items()} == {"lower.csv": "train", "lower_low_voltage.csv": "holdout"}
-    holdout = record_errors(lowering_found.holdout_replays[0], lowering_found.candidate)
-    assert {k: v for k, v in told["lower_low_voltage.csv"].items() if k != "role"} == vars(holdout)
 
 
 def test_a_fixed_parameter_has_neither_interval_nor_bounds(partly_fixed, shown):

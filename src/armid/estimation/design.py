@@ -56,7 +56,6 @@ class Feasible:
 
     @property
     def name(self) -> str:
-        """The manoeuvre in words."""
         return words(self.keys, self.repeats)
 
 
@@ -76,7 +75,6 @@ class Offer:
 
     @property
     def best(self) -> int:
-        """Place of the parameter whose deviation shrinks most."""
         with np.errstate(invalid="ignore"):
             factors = self.before / self.after
         return int(np.argmax(np.nan_to_num(factors, nan=1.0, posinf=np.inf)))
@@ -150,7 +148,6 @@ def as_recorded(plant: Plant, record: Record) -> Feasible:
 
 
 def keyed(plant: Plant, records: Sequence[Record]) -> Iterator[Feasible]:
-    """Yield the grid over the plant's keys, everything else as in the longest record."""
     piece = max(records, key=lambda r: r.duration).pieces[0].until_window_end()
     by_constant = {k.constant: k for k in plant.keys}
     pairs = [(k, by_constant[k.unlike]) for k in plant.keys if k.unlike in by_constant]
@@ -188,7 +185,6 @@ def is_place(plant: Plant, key: ManoeuvreKey) -> bool:
 
 
 def starts_at(initial: Callable[..., float], key: ManoeuvreKey, value: float) -> bool:
-    """Tell whether a state begins at the constant that a key gives, tried with one value."""
     return list(inspect.signature(initial).parameters) == [key.constant] and initial(value) == value
 
 
@@ -222,7 +218,6 @@ def changed_inputs(records: Sequence[Record]) -> Iterator[Feasible]:
 
 
 def paced(values: Array, pace: float, hold: str) -> Array:
-    """Return values that run so many times as fast, on the same grid, between samples as they are held."""
     places = (pace * np.arange(values.size)) % values.size
     if hold == "zero":
         return np.asarray(values[places.astype(np.int64)])

@@ -15,6 +15,7 @@ from pymoo.optimize import minimize
 
 from armid.errors import ArmidError
 from armid.estimation.information import Information, information_at
+from armid.estimation.least_squares import AT_BOUND as AT_BOUND  # noqa: PLC0414 - the study reads it here
 from armid.estimation.least_squares import held_by_bound
 from armid.identifiers import Identifier, can_run_directly, run_directly
 from armid.model import Model
@@ -191,7 +192,6 @@ def search(
 def run_by_pymoo(
     algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
 ) -> None:
-
     def after_generation(running: Algorithm) -> None:
         if is_over():
             running.termination.terminate()

@@ -67,7 +67,6 @@ class LeastSquaresProblem:
 
     @cached_property
     def measured(self) -> Array:
-        """Weighted measured signals, shape (n_samples,)."""
         return self.weighted([r.measured for r in self.replays])
 
     def signals(self, Z: Array) -> Array:
@@ -260,7 +259,6 @@ def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: fl
 
 
 def advance(records: LeastSquaresProblem, paths: Sequence[Descent], tolerance: float, central: bool) -> None:
-    """Take one step on every path: to the best of the trials, their dampings raised until one is better."""
     slopes = [records.residual_and_slopes(p.z)[1] for p in paths] if central else forward_slopes(records, paths)
     left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
     while left:

@@ -80,7 +80,6 @@ class Point:
 
     @property
     def height(self) -> float:
-        """Square root of the rise: straight along a parabola."""
         return float(np.sqrt(max(self.rise, 0.0)))
 
 

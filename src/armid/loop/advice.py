@@ -85,7 +85,6 @@ class Rival:
         return np.asarray(np.linalg.inv(self.precision).T)
 
     def drawn(self, draw: Array) -> Array:
-        """Return what z may be, from a standard normal draw, or its mirror where that is less outside of the box."""
         move = self.root @ draw[: len(self.z)]
         both = np.array([self.z + move, self.z - move])
         return np.asarray(both[int(np.argmin(outside(both)))])
@@ -196,7 +195,6 @@ def spread_of(here: Array, above: Array, below: Array, upward: Array) -> Array:
 def predicted_powers(
     rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array, threshold: float
 ) -> Powers:
-    """Return (power, delta) of each pair of rivals for one manoeuvre, by the linear prediction."""
     found = {}
     for a, b in combinations(range(len(rivals)), 2):
         old = rivals[b].criterion - rivals[a].criterion
@@ -244,7 +242,6 @@ class OldAndNew(LeastSquaresProblem):
 
     @cached_property
     def measured(self) -> Array:
-        """Zeros for the parabola, then the new record."""
         return np.concatenate([np.zeros(len(self.rival.z)), self.seen])
 
     def signals(self, Z: Array) -> Array:
@@ -263,7 +260,6 @@ def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Arra
 def simulated_powers(
     rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array, threshold: float
 ) -> Powers:
-    """Return (power, delta) of each pair of rivals for one manoeuvre, by simulated records and fits."""
     tried = [simulate_refits(rivals, i, feasible, white, draws, threshold) for i in range(len(rivals))]
     chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
     return {

@@ -48,7 +48,6 @@ class EffectKey:
 
     @property
     def compiled(self) -> str:
-        """Name under which the form is compiled, so that two forms can stand side by side."""
         return f"{self.name}_{self.form}" if self.form else self.name
 
     @property
@@ -103,7 +102,6 @@ class Library:
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
 
     def joinable(self, active: Active) -> list[EffectKey]:
-        """Return the candidates that are not in a model yet, in any form."""
         return [k for k in self.candidates if k.public not in {other.public for other in active}]
 
     def owner(self, parameter: str) -> EffectKey | None:
@@ -136,8 +134,12 @@ class Library:
             if len(alone) < max(len(active), 2):
                 self._problems[key] = self.calibrated(model, space, near or {})
             else:
-                joined = tuple(with_finest(same) for same in zip(*alone, strict=True))
-                self._problems[key] = WhiteRecords(joined, space, self.data)
+                joined = []
+                for same in zip(*alone, strict=True):
+                    each = zip(*(r.calibrations for r in same), strict=True)
+                    finest = tuple(max(c, key=lambda one: one.schedule.substeps) for c in each)
+                    joined.append(replace(same[0], calibrations=finest))
+                self._problems[key] = WhiteRecords(tuple(joined), space, self.data)
         return self._problems[key]
 
     def calibrated(self, model: Model, space: Space, near: Mapping[str, float]) -> WhiteRecords:
@@ -304,11 +306,6 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array) -> Cal
         if error <= MARGIN * allowed and not (runs[n].failed & ~runs[2 * n].failed).any():
             break
     return Calibration(Schedule(n, weights=switch_weights(spread, runs[n])), error, bool(error <= allowed))
-
-
-def with_finest(replays: Sequence[Replay]) -> Replay:
-    each = zip(*(r.calibrations for r in replays), strict=True)
-    return replace(replays[0], calibrations=tuple(max(c, key=lambda one: one.schedule.substeps) for c in each))
 
 
 # Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.

@@ -54,7 +54,6 @@ class Residuals:
 
     @cached_property
     def raw(self) -> list[Array]:
-        """Measured minus simulated of each record [its unit], not whitened."""
         return [r.measured - r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
 
     @cached_property

@@ -407,15 +407,13 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
-    later = {e.name: e for e in after.estimates}
-    said = []
+    later, said = {e.name: e for e in after.estimates}, []
     for old in before.estimates:
         new = later[old.name]
         if old.low is not None and old.value != new.value and abs(old.value - new.value) > SHIFTED * abs(new.value):
-            bent = (old.value - new.value) / abs(new.value) if new.value else np.inf
-            said.append(
-                f"{old.name} was bent by {bent:+.2%}: {value_text(vars(old))} before, {value_text(vars(new))} after."
-            )
+            share = (old.value - new.value) / abs(new.value) if new.value else np.inf
+            said.append(f"{old.name} was biased by {share:+.2%}: {value_text(vars(old))} before, "
+                        f"{value_text(vars(new))} after.")  # fmt: skip
     return said
 
 

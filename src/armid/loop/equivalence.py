@@ -41,7 +41,6 @@ class EffectGroup:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effect and what it cannot be told from."""
         return (self.name, *(r.name for r in self.alike))
 
     @property
@@ -79,7 +78,6 @@ class RivalModel:
 
 
 def rival_models(fit: Fit, others: Sequence[Fit]) -> tuple[RivalModel, ...]:
-    """Return the models within the criterion that differ in more effects than one, the nearest first."""
     mine = {key.public for key in fit.active}
     found: dict[frozenset[str], RivalModel] = {}
     for other in others:

@@ -176,9 +176,9 @@ def autocorrelation_figure(found: ClosedLoop) -> Any:
     return figure
 
 
-def correlation(view: Residuals) -> Array:
+def correlation(residuals: Residuals) -> Array:
     """Return the autocorrelation at lags from 0 on, pooled over records, (n_lags,)."""
-    parts = view.data.by_record(view.residual)
+    parts = residuals.data.by_record(residuals.residual)
     lags = min(MOST_LAGS, *(len(p) - 1 for p in parts))
     table = [[float(p[: len(p) - k] @ p[k:]) for k in range(lags)] for p in parts]
     total = np.sum(table, axis=0)

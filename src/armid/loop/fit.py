@@ -37,7 +37,6 @@ class Fit:
 
     @property
     def chi2(self) -> float:
-        """Sum of squares of the whitened residual."""
         return float(self.residual @ self.residual)
 
     @property
@@ -74,7 +73,6 @@ class Fit:
 
     @cached_property
     def basis(self) -> Array:
-        """Orthonormal basis of what the free parameters can absorb, (n_samples, rank)."""
         return self._decomposed[0]
 
     @cached_property

@@ -312,7 +312,6 @@ def curve_variables(model: Model) -> list[str]:
 
 
 def knows(model: Model, name: str) -> bool:
-    """Tell whether equations of the model may use a name."""
     return model.plant.aliases.get(name, name) in model.graph.nodes
 
 
@@ -395,7 +394,6 @@ class NormalEquations:
         return NormalEquations(self.gram[:n, :n], self.slope[:n], self.square, n)
 
     def rest(self, coefficients: Array) -> float:
-        """Return |residual - design coefficients|^2."""
         fitted = float(coefficients @ self.gram @ coefficients)
         return self.square - 2.0 * float(coefficients @ self.slope) + fitted
 

@@ -73,7 +73,6 @@ class Judgement:
 
     @property
     def significant(self) -> bool:
-        """Whether more than noise is left on train or holdout."""
         return self.diagnosis.significant or (self.holdout_diagnosis is not None and self.holdout_diagnosis.significant)
 
 

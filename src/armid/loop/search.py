@@ -111,7 +111,6 @@ class Search:
         return SearchLevel(tuple(fits), compare(smaller, fits[0], len(self.library.candidates), max(new, default=1)))
 
     def scores_at(self, fit: Fit) -> list[Score]:
-        """Return the scores of the candidates at a fit, best first."""
         active = frozenset(fit.active)
         if active not in self.scores:
             self.scores[active] = scores(fit, self.library)
@@ -157,7 +156,6 @@ class Search:
         self.fits |= {active: fit for active, fit in zip(new, found, strict=True) if fit and np.isfinite(fit.chi2)}
 
     def reduced(self, fit: Fit, rest: Active) -> Fit:
-        """Return the fit with some effects only, from the values that they had."""
         if frozenset(rest) not in self.fits:
             records = self.library.problem(rest, fit.values)
             start = start_of(records, fit.values)
@@ -218,7 +216,6 @@ def fit_near(active: Active, values: Mapping[str, float], library: Library) -> F
 
 
 def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
-    """Return shares of the range of some values, parameters that have none where they rest, (n_free,)."""
     return np.clip(records.shares(free_values(records, values)), 0.0, 1.0)
 
 

@@ -50,12 +50,10 @@ class NoiseLevel:
 
     @property
     def is_white(self) -> bool:
-        """Whether the noise shows no correlation in time."""
         return not len(self.terms)
 
     @property
     def known(self) -> bool:
-        """Whether the noise was measured at rest."""
         return self.n_samples > 0
 
     def white(self, values: Array, lengths: Sequence[int]) -> Array:
@@ -165,7 +163,6 @@ class WhitenedData:
 
     @property
     def known(self) -> bool:
-        """Whether the noise of every record was measured at rest."""
         return all(level.known for level in self.levels)
 
     def n_noise(self, otherwise: float) -> float:
@@ -191,7 +188,6 @@ class WhitenedData:
         return whole if len(whole) > 1 else list(np.array_split(whole[0], BLOCKS))
 
     def without(self, part: NDArray[np.int64]) -> "WhitenedData":
-        """Return the records with some samples that fits do not see."""
         kept = self.kept.copy()
         kept[part] = False
         return replace(self, kept=kept)
@@ -233,11 +229,9 @@ class WhiteRecords(LeastSquaresProblem):
     data: WhitenedData
 
     def weighted(self, signals: Sequence[Array]) -> Array:
-        """Return signals of all records, whitened, the kept samples end to end, (..., n_kept)."""
         return self.data.white(signals)[..., self.data.kept]
 
     def whole_signals(self, candidates: Array) -> Array:
-        """Return whitened simulated signals of whole candidates, SI, on all samples, (n_candidates, n_samples)."""
         return self.data.white([r.signal(candidates) for r in self.replays])
 
     def with_all_samples(self) -> "WhiteRecords":

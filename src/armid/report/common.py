@@ -45,10 +45,13 @@ def error_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]
     digits = {"s": ".4f", "s1": ".4f", "s2": ".4f", "rmse": ".4g", "nrmse": ".3%", "chi2_per_sample": ".4g"}
     headers = {"rmse": f"RMSE, {name}", "nrmse": "NRMSE", "chi2_per_sample": "chi2/sample"}
     numbers = [Column(k, headers.get(k, k.upper()), d, factor if k == "rmse" else 1.0) for k, d in digits.items()]
-    told = [(*texts, *(None if e is None else e[k] for k in digits)) for *texts, e in rows]
-    shown_rows = [(*row[:-1], "no noise") if e is not None and row[-1] is None else row
-                  for row, (*_, e) in zip(told, rows, strict=True)]  # fmt: skip
-    return table(title, [*first, *numbers], shown_rows, note)
+    cells = []
+    for *texts, error in rows:
+        values = dict(error or dict.fromkeys(digits))
+        if error is not None and error["chi2_per_sample"] is None:
+            values["chi2_per_sample"] = "no noise"
+        cells.append((*texts, *(values[k] for k in digits)))
+    return table(title, [*first, *numbers], cells, note)
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:

@@ -62,9 +62,8 @@ def report_of(
         evidence = Evidence(results)
         found = [Section(a.title, tuple(a.parts(evidence))) for a in ANALYSES]
         sections, facts, runs = tuple(s for s in found if s.parts), facts_of(evidence), wide_runs(evidence)
-        table = main_table(evidence)
-        main = (table,)
-        answer = nearest(table.frame, evidence.settings) if evidence.knows_truth else (lowest_fitness(evidence),)
+        main = sections[0].parts
+        answer = nearest(main[0], evidence.settings) if evidence.knows_truth else (lowest_fitness(evidence),)
     else:
         runs = loop_runs(results.loops)
         main = (verdicts(runs),)
@@ -101,8 +100,8 @@ def known_kind(study: dict[str, Any]) -> str:
 
 def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
     """Return who came nearest to the truth, and how the others (or the paper's result) stand to that."""
-    is_paper = overview["variant"] == PAPER
-    ours, paper = overview[~is_paper], overview[is_paper]
+    is_paper = overview.frame["variant"] == PAPER
+    ours, paper = overview.frame[~is_paper], overview.frame[is_paper]
     said = []
     for setting in settings[:MOST_SETTINGS]:
         own = ours[ours["setting"] == setting]

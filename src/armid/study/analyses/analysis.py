@@ -87,7 +87,7 @@ class Evidence:
 
     @cached_property
     def used(self) -> NDArray[np.float64]:
-        """Simulations of each run, (n_runs,); a failed run, which tells none, counts its budget."""
+        """Simulations of each run, (n_runs,); a failed run, which reports none, counts its budget."""
         return self.runs["used"].where(self.runs["status"] == "done", self.runs["budget"]).to_numpy(float)
 
     @cached_property

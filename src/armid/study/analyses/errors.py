@@ -1,4 +1,4 @@
-"""Where the errors are: by identifier and case, and along the valley of parameters that stand in for each other."""
+"""Where the errors are: by identifier and case, and along the valley in which parameters compensate each other."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -14,7 +14,7 @@ from armid.study.analyses.analysis import Analysis, Evidence
 # Range of the colours of the map [%]; cells carry numbers up to so many cases.
 LOWEST, HIGHEST = 1e-6, 1e2
 MOST_NUMBERS = 12
-# The parameters that stand in for each other on the arm; others where a study has others.
+# The parameters that compensate each other on the arm; others where a study has others.
 VALLEY = ("p0", "eta3", "n")
 MOST_PARAMETERS, MOST_COLOURED, MOST_POINTS = 3, 6, 600
 OTHERS = "all others"
@@ -24,7 +24,7 @@ MAP_CAPTION = (
 )
 VALLEY_CAPTION = (
     "Deviation (value - truth)/truth [%] of the results of all finished runs in each pair of parameters, one mark a "
-    "run; counts on the diagonal. Where marks lie along a line, parameters stand in for each other. Of more than 600 "
+    "run; counts on the diagonal. Where marks lie along a line, parameters compensate each other. Of more than 600 "
     "runs of one identifier every n-th is drawn."
 )
 

@@ -22,9 +22,9 @@ FLOOR = 1e-8
 LEAST_CASES = 20
 INTRODUCTION = "How sure is it that one identifier is better than another on cases like these?"
 RANK_CAPTION = (
-    "Largest relative error of a run, median over the seeds: one number a case and identifier, so that a case is one "
-    "block and seeds are no false witnesses. Errors of 1e-6 % and below count as equal. Rank 1 is the best of a case; "
-    "the table shows the mean over the cases."
+    "Largest relative error of a run, median over the seeds: one number a case and identifier. A case is one block, "
+    "since its seeds are repeats and no independent evidence. Errors of 1e-6 % and below count as equal. Rank 1 is the "
+    "best of a case; the table shows the mean over the cases."
 )
 PAIRS_CAPTION = (
     "Wilcoxon's signed-rank test of the logarithms of the same block values (two-sided, Pratt's rule for ties), "

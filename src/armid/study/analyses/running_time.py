@@ -61,7 +61,7 @@ def share_hit(hits: Array, grid: NDArray[np.int64]) -> Array:
     """Return the share of (run, target) pairs that are hit within each number of simulations, (n_grid,).
 
     F(e) = #{(r, t) : h_rt <= e} / (n_runs n_targets). hits: (n_runs, n_targets), infinite for never;
-    grid: simulations, (n_grid,). Runs are not restarted in thought: what ends early stays where it ended.
+    grid: simulations, (n_grid,). No restarts are assumed: a run that ends early stays where it ended.
     Source: Hansen et al., arXiv:1605.03560, section 5.
     """
     return np.searchsorted(np.sort(hits, axis=None), grid, side="right") / hits.size

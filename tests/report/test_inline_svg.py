@@ -37,7 +37,7 @@ def test_layers_get_a_class_that_a_slider_finds():
     assert "other" not in made
 
 
-@pytest.mark.parametrize("evil", [
+EVIL = (
     "<script>alert(1)</script>", '<g onclick="alert(1)"/>', '<a xlink:href="javascript:alert(1)"><path d="M 0 0"/></a>',
     '<image xlink:href="http://elsewhere/x.png"/>', '<image xlink:href="data:image/svg+xml;base64,PHN2Zz4="/>',
     '<use xlink:href="http://elsewhere/x.svg#a"/>', '<path style="fill: url(http://elsewhere/x)"/>',
@@ -46,14 +46,15 @@ def test_layers_get_a_class_that_a_slider_finds():
     '<animate attributeName="href" to="javascript:alert(1)"/>', '<set attributeName="onclick" to="alert(1)"/>',
     "<text>&lt;script>alert(1)&lt;/script></text>",
     '<path id="a&quot; onload=&quot;alert(1)"/><use href="#a&quot; onload=&quot;alert(1)"/>',
-])  # fmt: skip
-def test_nothing_that_runs_or_is_fetched_comes_through(evil):
-    made = str(inline(around(evil), "", ""))
-    assert "elsewhere" not in made
-    assert "javascript" not in made
-    assert not re.search(r"<(script|a|foreignObject|iframe|style|animate|set)\b", made)
-    assert not re.search(r"\son\w+\s*=", re.sub(r'"[^"]*"', '""', made))
-    assert "svg+xml" not in made
+)  # fmt: skip
+
+
+def test_nothing_that_runs_or_is_fetched_comes_through():
+    for evil in EVIL:
+        made = str(inline(around(evil), "", ""))
+        assert not re.search(r"elsewhere|javascript|svg\+xml", made), evil
+        assert not re.search(r"<(script|a|foreignObject|iframe|style|animate|set)\b", made), evil
+        assert not re.search(r"\son\w+\s*=", re.sub(r'"[^"]*"', '""', made)), evil
 
 
 def test_a_picture_inside_stays():
@@ -61,14 +62,9 @@ def test_a_picture_inside_stays():
     assert 'href="data:image/png;base64,AAAA"' in made
 
 
-@pytest.mark.parametrize(("text", "said"), [("", "is no SVG"), ("<svg", "is no SVG"), ("<html/>", "holds <html>")])
-def test_what_is_no_svg_is_refused(text, said):
-    with pytest.raises(ArmidError, match=f"a.svg {said}"):
-        inline(text, "", "", "a.svg")
-
-
-def test_a_bomb_of_entities_is_refused():
+def test_what_is_no_svg_and_a_bomb_of_entities_are_refused():
     levels = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))
     bomb = f'<!DOCTYPE svg [<!ENTITY l0 "lol">{levels}]><svg><text>&l11;</text></svg>'
-    with pytest.raises(ArmidError, match="is no SVG"):
-        inline(bomb, "", "")
+    for text, said in (("", "is no SVG"), ("<svg", "is no SVG"), ("<html/>", "holds <html>"), (bomb, "is no SVG")):
+        with pytest.raises(ArmidError, match=f"a.svg {said}"):
+            inline(text, "", "", "a.svg")

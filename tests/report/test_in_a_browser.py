@@ -33,10 +33,13 @@ def column(page, table, number):
     return [cell.text for cell in table.find_elements(By.CSS_SELECTOR, f"tbody td:nth-child({number + 1})")]
 
 
-@pytest.mark.parametrize("name", ["plain loop", "plain study", "evil loop", "evil study"])
 @pytest.mark.parametrize(("width", "dark"), [(1200, False), (1200, True), (400, False), (400, True)])
-def test_opens_quietly_and_does_not_scroll_sideways(pages, opened, name, width, dark):
-    page = opened(pages[name], width, dark)
+def test_opens_quietly_and_does_not_scroll_sideways(pages, opened, width, dark):
+    for path in pages.values():
+        opens_quietly(opened(path, width, dark), width, dark)
+
+
+def opens_quietly(page, width, dark):
     assert page.get_log("browser") == []
     assert seen(page, "document.documentElement.scrollWidth") <= width
     assert "broken" not in page.title.split("<")[0]
