@@ -101,6 +101,18 @@ def test_a_cache_folder_that_cannot_be_written_is_refused(tmp_path: Path, monkey
         load_module(kernel_parts(Model(PLANTS["driven_axis"]), 2))
 
 
+def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
+    parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
+    name, text = module_name(parts), parts.text()
+    file = tmp_path / f"{name}.py"
+    for damaged in ("", text[:-40], text.replace("0.5", "0.6", 1), "raise SystemExit\n"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        file.write_text(damaged, encoding="utf-8")
+        load_module(parts)
+        assert file.read_text(encoding="utf-8") == text
+
+
 def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     assert cache_folder() == tmp_path

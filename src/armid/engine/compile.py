@@ -78,8 +78,10 @@ def load_module(parts: KernelParts) -> ModuleType:
     path = folder / f"{name}.py"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if not (path.exists() and path.stat().st_size):
-            write_at_once(path, parts.text())
+        if not is_whole(path):
+            text = parts.text()
+            write_at_once(path, text)
+            write_at_once(path.with_suffix(".sha256"), hashlib.sha256(text.encode()).hexdigest())
     except OSError as error:
         raise ArmidError(f"the cache folder {folder} cannot be written ({error.strerror}): set ARMID_CACHE to a "
                          "folder that can") from error  # fmt: skip
@@ -92,9 +94,17 @@ def load_module(parts: KernelParts) -> ModuleType:
     return module
 
 
+def is_whole(path: Path) -> bool:
+    """Tell whether a module is there and is what was written: its digest stands beside it."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest() == path.with_suffix(".sha256").read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
 def write_at_once(path: Path, text: str) -> None:
     """Write a file so that another process sees all of it or nothing."""
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".part", delete=False) as part:
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", newline="\n", dir=path.parent, suffix=".part", delete=False) as part:
         part.write(text)
     os.replace(part.name, path)
 
