@@ -104,8 +104,8 @@ def is_whole(path: Path) -> bool:
 
 def write_at_once(path: Path, text: str) -> None:
     """Write a file so that another process sees all of it or nothing."""
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", newline="\n", dir=path.parent, suffix=".part", delete=False) as part:
-        part.write(text)
+    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
+        part.write(text.encode())
     os.replace(part.name, path)
 
 

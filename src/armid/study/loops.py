@@ -13,7 +13,6 @@ from numpy.random import default_rng
 
 from armid.errors import ArmidError, nearest, shown
 from armid.loop import close_loop, report_of
-from armid.model import Model
 from armid.record import read_campaign
 from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import unknown_name, validated
