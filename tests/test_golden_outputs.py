@@ -192,9 +192,8 @@ def test_the_small_blind_suite(tmp_path):
     try:
         from stand.command import main as stand
 
-        assert (
-            stand(["blind", str(campaigns), "--seed", "1", "--suite", str(ROOT / "studies" / "blind_short.toml")]) == 0
-        )
+        suite = str(ROOT / "studies" / "blind_short.toml")
+        assert stand(["blind", str(campaigns), "--seed", "1", "--suite", suite]) == 0
     finally:
         sys.path.remove(str(ROOT / "studies"))
     armid(f"study {tmp_path}/blind_short.toml --jobs 1 --out {tmp_path}/out")
