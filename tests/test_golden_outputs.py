@@ -10,6 +10,7 @@ import csv
 import json
 import shlex
 import sqlite3
+import subprocess
 import sys
 from contextlib import closing
 from pathlib import Path
@@ -188,13 +189,8 @@ def test_the_small_blind_suite(tmp_path):
     only = f"only = {list(wanted)}\n"
     (tmp_path / "blind_short.toml").write_text(only + text, encoding="utf-8")
     campaigns = tmp_path / "campaigns" / "blind_short"
-    sys.path.insert(0, str(ROOT / "studies"))
-    try:
-        from stand.command import main as stand
-
-        assert stand(["blind", str(campaigns), "--seed", "1", "--suite", str(tmp_path / "blind_short.toml")]) == 0
-    finally:
-        sys.path.remove(str(ROOT / "studies"))
+    stand, suite = ROOT / "studies" / "test_stand.py", ROOT / "studies" / "blind_short.toml"
+    subprocess.run([sys.executable, stand, "blind", campaigns, "--seed", "1", "--suite", suite], check=True)
     armid(f"study {tmp_path}/blind_short.toml --jobs 1 --out {tmp_path}/out")
     assert blind_digest(tmp_path / "out" / "study.sqlite") == wanted
 

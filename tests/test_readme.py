@@ -1,4 +1,7 @@
-"""What README, tour and CONTRIBUTING say can be done, as they say it; what they show is there, and nothing else is."""
+"""What README, tour and CONTRIBUTING say can be done, as they say it; what they show is there, and nothing else is.
+
+Of the tour every file is written, every command run, every output compared.
+"""
 
 import os
 import re
@@ -28,6 +31,10 @@ TEST_COMMAND = '.venv/bin/python -m pytest -q -n 2 -m "not slow and not browser"
 # Megabytes of results/, and lines of a page.
 MOST_MB, MOST_LINES = 5.0, {"README.md": 160, ".github/CONTRIBUTING.md": 120, "studies/make_results.py": 150}
 
+# Of a number in an output, whose last digits are the processor's.
+NUMBER = re.compile(r"-?\d[\d,]*(\.\d+)?(e[+-]?\d+)?")
+STEPS = ("Table I", "fitness", "effect", "identifier", "machine")
+
 
 @pytest.fixture(scope="module")
 def readme(root):
@@ -44,6 +51,12 @@ def blocks(readme):
 def commands(blocks):
     """Every line of a block without a language."""
     return [line for language, text in blocks if not language for line in text.splitlines() if line]
+
+
+@pytest.fixture(scope="module")
+def tour(root):
+    """The tour's text, or that of the draft that ARMID_TOUR names."""
+    return (root / os.environ.get("ARMID_TOUR", TOUR)).read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -115,12 +128,7 @@ def test_the_commands_run(commands, blocks, elsewhere, capsys):
     ours = [line for line in commands if line.startswith("armid ") and not any(part in line for part in LEFT_OUT)]
     assert {line.split()[1] for line in ours} >= {"check", "identify"}
     for line in ours:
-        words = shlex.split(line)[1:] + ["--budget", "160"] * (" identify " in line)
-        with pytest.raises(SystemExit) as left:
-            main(words)
-        captured = capsys.readouterr()
-        assert (left.value.code, captured.err) == (0, ""), line
-        assert captured.out
+        assert ran(line + " --budget 160" * (" identify " in line), capsys)
     assert {path.name for path in elsewhere.iterdir()} == {"studies", "out"}
 
 
@@ -144,22 +152,14 @@ def test_the_campaign_file_is_read(elsewhere, root):
     assert [r.file for r in read_campaign(elsewhere).train] == ["lower.csv"]
 
 
-@pytest.mark.parametrize("page", GUIDES)
-def test_files_that_it_names_are_there(page, root):
-    text = (root / page).read_text(encoding="utf-8")
-    for name in re.findall(r"`((?:studies|results)/[a-z][\w/.]+)`", text):
-        assert (root / name).exists(), name
-
-
-@pytest.mark.parametrize("page", LINKED)
-def test_links_lead_somewhere(page, root):
-    for link in set(LINK.findall((root / page).read_text(encoding="utf-8"))) - set(UNWRITTEN):
-        assert "//" in link or (root / page).parent.joinpath(link).resolve().exists(), link
-
-
-@pytest.mark.parametrize("page", sorted(MOST_LINES))
-def test_pages_stay_short(page, root):
-    assert len((root / page).read_text(encoding="utf-8").splitlines()) <= MOST_LINES[page]
+def test_files_that_pages_name_are_there_links_lead_somewhere_and_pages_stay_short(root):
+    for page in {*LINKED, *MOST_LINES}:
+        text = (root / page).read_text(encoding="utf-8")
+        for name in re.findall(r"`((?:studies|results)/[a-z][\w/.]+)`", text) if page in GUIDES else ():
+            assert (root / name).exists(), name
+        for link in set(LINK.findall(text)) - set(UNWRITTEN) if page in LINKED else ():
+            assert "//" in link or (root / page).parent.joinpath(link).resolve().exists(), (page, link)
+        assert len(text.splitlines()) <= MOST_LINES.get(page, 10**6), page
 
 
 def test_results_hold_what_is_read_and_are_small(root, recipes):
@@ -202,10 +202,9 @@ def test_a_page_loses_the_figures_that_are_not_kept(root):
     assert clean("# note\n\nWords.\n", "s", set()) == "# note\n\nWords.\n"
 
 
-@pytest.mark.parametrize("name", ["advised", "blind", "table1", "rocking_shell", "emps_identified"])
-def test_the_recipes_name_commands_that_exist(name, root, recipes):
-    recipe = recipes[name]
-    for command in (*(command for _, command in recipe.before), *recipe.commands):
+def test_the_recipes_name_commands_that_exist(root, recipes):
+    chosen = [recipes[name] for name in ("advised", "blind", "table1", "rocking_shell", "emps_identified")]
+    for command in (c for recipe in chosen for c in (*(command for _, command in recipe.before), *recipe.commands)):
         program, first, *rest = shlex.split(command)
         if program == "python":
             assert (root / first).is_file()
@@ -213,3 +212,60 @@ def test_the_recipes_name_commands_that_exist(name, root, recipes):
         known = app.commands[first].commands[rest[0]] if first == "export" else app.commands[first]
         assert {word for word in rest if word.startswith("--")} <= {n for p in known.params for n in p.opts}
         assert all(Path(root / word).exists() for word in rest if word.startswith("studies/") and "blind" not in word)
+
+
+def shape(text):
+    """Return the words of each line, numbers as #, without what only frames them."""
+    lines = (re.sub(r"[─━┃│┏┓┗┛┡┩└┘┳┻┴╇┌┐]", " ", NUMBER.sub("#", line)).split() for line in text.splitlines())
+    return [line for line in lines if line]
+
+
+def is_part_of(shown, printed):
+    """Tell whether the lines that are shown come one after the other in what was printed; `...` leaves some out."""
+    left = iter(printed)
+    return all(line == ["..."] or line in left for line in shown)
+
+
+def ran(line, capsys):
+    """Run one line of a block; return what it printed."""
+    if not line.startswith("armid "):
+        return subprocess.run(line, shell=True, check=True, capture_output=True, text=True).stdout
+    with pytest.raises(SystemExit) as left:
+        main(shlex.split(line, comments=True)[1:])
+    captured = capsys.readouterr()
+    errors = [text for text in captured.err.splitlines() if "irregular sampling" not in text]
+    assert (left.value.code, errors) == (0, []), line
+    return captured.out
+
+
+def test_there_are_five_steps(tour):
+    headings = re.findall(r"^## \d\. (.*)$", tour, re.MULTILINE)
+    assert len(headings) == len(STEPS)
+    for word, heading in zip(STEPS, headings, strict=True):
+        assert word in heading
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::armid.record.IrregularSamplingWarning")
+def test_every_snippet_runs_and_every_output_is_true(tour, elsewhere, capsys):
+    printed, seen = "", {"file": 0, "command": 0, "output": 0}
+    for language, text in FENCE.findall(tour):
+        if language in ("python", "toml"):
+            file = elsewhere / re.match(r"# (\S+)\n", text)[1]
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+            seen["file"] += 1
+        elif language == "text":
+            assert is_part_of(shape(text), shape(printed)), f"shown:\n{text}\nprinted:\n{printed}"
+            seen["output"] += 1
+        else:
+            printed = "".join(ran(line, capsys) for line in text.splitlines() if line)
+            seen["command"] += len(text.splitlines())
+    assert min(seen.values()) >= len(STEPS) - 1, seen
+
+
+def test_the_sizes_that_it_promises(tour):
+    files = {re.match(r"# (\S+)\n", text)[1]: text for language, text in FENCE.findall(tour) if language == "python"}
+    lines = sorted(len(text.strip().splitlines()) for text in files.values())
+    assert lines[0] <= lines[1] <= 10
+    assert lines[-1] <= 20

@@ -14,7 +14,6 @@ from armid.identifiers import Identifier
 from armid.model import Effect, Model, Parameter
 from armid.model.plants.driven_axis import driven_axis
 from armid.problem.fitness import Fitness
-from armid.record import read_campaign
 from armid.registry import Registry, load_plugin, load_registry, place_in_plugin
 
 LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
@@ -180,19 +179,3 @@ def test_a_bad_entry_point_is_refused(installed, point, fragments):
         load_registry()
     for fragment in fragments:
         assert fragment in str(refusal.value)
-
-
-@pytest.mark.parametrize(("key", "value", "fragment"), [
-    ("plant", "own.py:plant", "plant 'own.py:plant' is unknown"),
-    ("effects", ["own.py:effect"], "effect 'own.py:effect' is unknown"),
-    ("plugin", ["own.py:effect"], "key 'plugin' is unknown"),
-])  # fmt: skip
-def test_a_campaign_file_loads_no_code(tmp_path, own, key, value, fragment):
-    marker = tmp_path / "ran"
-    (tmp_path / "own.py").write_text(f"open({str(marker)!r}, 'w').close()\n{own.read_text()}")
-    lines = {"name": "c", "plant": "shell_transfer_arm", key: value}
-    text = "\n".join(f"{name} = {value!r}" for name, value in lines.items())
-    (tmp_path / "campaign.toml").write_text(text + '\n[[records]]\nfile = "a.csv"\nrole = "train"\n')
-    with pytest.raises(ArmidError, match=fragment):
-        read_campaign(tmp_path)
-    assert not marker.exists()

@@ -76,25 +76,31 @@ def test_nothing_unpickles_and_nothing_runs_text():
         assert not {"np.load", "joblib.load", "pd.read_pickle"} & calls, path
 
 
-@pytest.mark.parametrize(("key", "value"), [("plant", CODE), ("effects", f'["{CODE}"]'), ("effects", '["evil"]')])
-def test_a_campaign_names_registered_things_only(tmp_path, key, value):
+def test_a_campaign_names_registered_things_only(tmp_path, capsys):
     folder = tmp_path / "c"
     folder.mkdir()
-    told = {"plant": "shell_transfer_arm", "effects": "[]"} | {key: value}
-    (folder / "campaign.toml").write_text(CAMPAIGN.format(**told))
     (folder / "lower.csv").write_text("time_s,angular_velocity_deg_s\n0,1\n")
-    refused("identify", folder)
+    for key, value, more, says in (
+        ("plant", CODE, "", f"plant '{CODE}' is unknown"),
+        ("effects", f'["{CODE}"]', "", f"effect '{CODE}' is unknown"),
+        ("effects", '["evil"]', "", "effect 'evil' is unknown"),
+        ("effects", "[]", f'plugin = ["{CODE}"]\n', "key 'plugin' is unknown"),
+    ):  # fmt: skip
+        told = {"plant": "shell_transfer_arm", "effects": "[]"} | {key: value}
+        (folder / "campaign.toml").write_text(more + CAMPAIGN.format(**told))
+        refused("identify", folder)
+        assert says in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("key", "value"), [
-    ("plant", CODE), ("effects", f'["{CODE}"]'), ("fitness", CODE), ("identifier", CODE),
-    ("identifier", f"multistart:{CODE}"), ("identifier", f"random+{CODE}"), ("name", "../s"), ("name", "/tmp/s"),
-    ("option", 'plugin = "evil.py:thing"'), ("option", "termination = 3"), ("option", "evaluator = 1"),
-])  # fmt: skip
-def test_a_study_names_registered_things_only(tmp_path, key, value):
-    (tmp_path / "s.toml").write_text(STUDY.format(**(GOOD | {key: value})))
-    refused("study", "s.toml")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["evil.py", "s.toml"]
+def test_a_study_names_registered_things_only(tmp_path):
+    for key, value in (
+        ("plant", CODE), ("effects", f'["{CODE}"]'), ("fitness", CODE), ("identifier", CODE),
+        ("identifier", f"multistart:{CODE}"), ("identifier", f"random+{CODE}"), ("name", "../s"), ("name", "/tmp/s"),
+        ("option", 'plugin = "evil.py:thing"'), ("option", "termination = 3"), ("option", "evaluator = 1"),
+    ):  # fmt: skip
+        (tmp_path / "s.toml").write_text(STUDY.format(**(GOOD | {key: value})))
+        refused("study", "s.toml")
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["evil.py", "s.toml"]
 
 
 @pytest.mark.parametrize("name", [

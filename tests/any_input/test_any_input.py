@@ -1,14 +1,32 @@
 """Whatever the files hold, reading ends in a campaign or in an ArmidError, never in another exception."""
 
+import tomllib
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from mutated import mutated, toml_of
 from reading_whatever import ARM_CSV, ARM_TOML, AXIS_CSV, AXIS_TOML, edited, edits, many, read_whatever
 
+ARM, AXIS = tomllib.loads(ARM_TOML), tomllib.loads(AXIS_TOML)
 
-def test_the_originals_read():
-    assert read_whatever(ARM_TOML.encode(), ARM_CSV.encode()) is not None
-    assert read_whatever(AXIS_TOML.encode(), AXIS_CSV.encode()) is not None
+
+def test_the_originals_read_also_as_they_are_written_here():
+    assert tomllib.loads(toml_of(ARM).decode()) == ARM
+    for toml, csv in ((ARM_TOML.encode(), ARM_CSV), (toml_of(ARM), ARM_CSV), (toml_of(AXIS), AXIS_CSV)):
+        assert read_whatever(toml, csv.encode()) is not None
+
+
+@many(120)
+@given(mutated(ARM))
+def test_any_value_for_the_arm(table):
+    read_whatever(toml_of(table), ARM_CSV.encode())
+
+
+@many(120)
+@given(mutated(AXIS))
+def test_any_value_for_an_axis(table):
+    read_whatever(toml_of(table), AXIS_CSV.encode())
 
 
 @many(120)
