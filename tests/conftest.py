@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 from numpy.typing import NDArray
 
 from armid.model import EFFECTS, Model
-from armid.problem.replay import Replay, replays
+from armid.problem.problem import Replay, replays
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, read_campaign, write_table
 

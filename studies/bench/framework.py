@@ -16,8 +16,7 @@ from armid.identifiers import IDENTIFIERS
 from armid.model import PLANTS, Model
 from armid.problem.fitness import FITNESS, Fitness
 from armid.problem.meter import Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem
-from armid.problem.replay import Replay, replays
+from armid.problem.problem import IdentificationProblem, Replay, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
 from bench.measure import CPU, Bound, Row, Stopwatch

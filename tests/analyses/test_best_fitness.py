@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from armid.study.analyses.analysis import Evidence
-from armid.study.analyses.best_fitness import data_profile, data_profile_figure
+from armid.study.analyses.running_time import data_profile, data_profile_figure
 
 
 def test_by_hand():

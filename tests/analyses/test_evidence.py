@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armid.contract.analysis import synthetic_runs
+from armid.contract.check import synthetic_runs
 from armid.study.analyses.analysis import Evidence, outcomes, published_values, wide_runs
 
 

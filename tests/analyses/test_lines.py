@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from armid.study.analyses.drawing import panel_height, spread
+from armid.report.style import panel_height, spread
 
 HEIGHTS = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=18).map(sorted)
 

@@ -5,8 +5,7 @@ import pandas as pd
 import pytest
 
 from armid.cli.new import python_file
-from armid.contract.analysis import check_analysis, parts_of
-from armid.contract.check import check_thing
+from armid.contract.check import check_analysis, check_thing, parts_of
 from armid.errors import ArmidError
 from armid.registry import load_registry
 from armid.study.analyses.catalogue import ANALYSES, own_sections

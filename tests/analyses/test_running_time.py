@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armid.study.analyses.analysis import TARGETS
 from armid.study.analyses.running_time import (
     ecdf_figure,
     expected_running_time,
@@ -16,7 +17,6 @@ from armid.study.analyses.running_time import (
     running_time_figure,
     share_hit,
 )
-from armid.study.traces import TARGETS
 
 HIT = st.one_of(st.integers(1, 100).map(float), st.just(np.inf))
 HITS = st.lists(st.lists(HIT, min_size=3, max_size=3), min_size=1)

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armid.study.analyses.analysis import outcomes
+from armid.study.analyses.analysis import TARGETS, first_hits, held, histories, outcomes, remaining_share
 from armid.study.analyses.success import TOLERANCES
-from armid.study.traces import TARGETS, first_hits, held, histories, remaining_share
 
 POINT = st.tuples(st.integers(1, 500), st.floats(0.0, 2.0))
 SERIES = st.lists(POINT, min_size=1, max_size=20, unique_by=lambda p: p[0]).map(sorted)

@@ -70,7 +70,7 @@ def test_writes_result_and_figures_and_the_same_bits_in_another_process(
 def test_fixed_values_and_bounds_and_the_interval_of_the_information(identified, small_folder):
     from armid.estimation.information import information_at
     from armid.model import Model
-    from armid.problem.replay import replays
+    from armid.problem.problem import replays
     from armid.problem.space import space_of
     from armid.record import read_campaign
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armid.contract.reference import simulate_plainly
+from armid.contract.trials import simulate_plainly
 from armid.model import EFFECTS, PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, State
 
 REFERENCE = Path(__file__).parents[1] / "reference"

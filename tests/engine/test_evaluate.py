@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armid.contract.reference import PlainModel
+from armid.contract.trials import PlainModel
 from armid.engine import Schedule, along, simulate
 from armid.errors import ArmidError
 from armid.model import PLANTS, Manoeuvre, Model

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armid.contract.reference import simulate_plainly
+from armid.contract.trials import simulate_plainly
 from armid.engine import Schedule, Simulation, calibrate, simulate
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Input, Manoeuvre, Model, Parameter, Plant, Scales, State

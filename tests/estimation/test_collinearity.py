@@ -5,10 +5,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from armid.estimation.collinearity import collinearity_index, groups
+from armid.estimation.examine import collinearity_index, groups
 from armid.estimation.information import information_at
 from armid.estimation.least_squares import estimate
-from armid.problem.replay import replays
+from armid.problem.problem import replays
 
 
 def fisher_of(*columns):

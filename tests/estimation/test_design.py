@@ -21,7 +21,7 @@ from armid.estimation.design import (
 from armid.estimation.information import Level, information_at
 from armid.estimation.least_squares import refine
 from armid.model import ManoeuvreKey, Model
-from armid.problem.replay import replays
+from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
 from armid.record.reader import record_constants

@@ -10,15 +10,18 @@ from armid.errors import ArmidError
 from armid.estimation.examine import examine
 from armid.estimation.identifiability_document import (
     deviation_text,
+    draw_profile,
     interval_text,
     offer_table,
     offer_text,
     parameter_table,
+    profile_figure,
     profile_text,
     remarks,
     result_of,
+    sensitivity_figure,
+    smooth,
 )
-from armid.estimation.identifiability_figures import draw_profile, profile_figure, sensitivity_figure, smooth
 from armid.estimation.information import information_at
 from armid.estimation.profile import THRESHOLD
 from armid.model import EFFECTS

@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from armid.estimation.identify_figures import chosen, convergence_figure, figures_of, fit_figure
+from armid.estimation.identify_document import chosen, convergence_figure, figures_of, fit_figure
 from armid.record import read_campaign
 from armid.report.style import DPI, save
 

@@ -17,7 +17,7 @@ from armid.estimation.identify import campaign_errors, identify, record_errors
 from armid.identifiers import IDENTIFIERS
 from armid.model import EFFECTS, Model
 from armid.problem.fitness import FITNESS, Fitness
-from armid.problem.replay import replays
+from armid.problem.problem import replays
 from armid.problem.similarity import similarity
 from armid.problem.space import space_of
 from armid.record import read_campaign

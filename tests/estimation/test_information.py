@@ -10,7 +10,7 @@ from armid.engine import calibrate, probes
 from armid.estimation.information import collinear, information_at, sensitivities
 from armid.model import EFFECTS, Effect, Manoeuvre, Model, Parameter
 from armid.model.plants.driven_axis import linear_axis
-from armid.problem.replay import Replay, replays
+from armid.problem.problem import Replay, replays
 from armid.problem.space import space_of
 from armid.record import Noise, Piece, Record, read_campaign
 

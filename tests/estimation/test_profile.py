@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from armid.estimation.least_squares import estimate, fit, weighted_records
 from armid.estimation.profile import THRESHOLD, profiles
-from armid.problem.replay import replays
+from armid.problem.problem import replays
 
 
 def test_the_threshold_is_that_of_one_degree_of_freedom():

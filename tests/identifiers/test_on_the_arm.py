@@ -13,8 +13,7 @@ from armid.estimation.identify import identify
 from armid.model import Model
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem
-from armid.problem.replay import replays
+from armid.problem.problem import IdentificationProblem, replays
 from armid.problem.space import space_of
 from armid.record import Campaign, read_campaign, write_table
 

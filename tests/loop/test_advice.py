@@ -24,7 +24,7 @@ from armid.loop.advice import (
     spread_of,
 )
 from armid.model import EFFECTS
-from armid.problem.replay import Replay
+from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
 from armid.record import Noise, Piece, Record
 

@@ -7,7 +7,7 @@ from armid.loop.candidates import EffectKey
 from armid.loop.empirical import empirical_effect
 from armid.loop.missing_signal import dependences, missing_signal, motions, segments
 from armid.model import Model
-from armid.problem.replay import replays
+from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
 

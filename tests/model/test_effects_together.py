@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armid.contract.reference import simulate_plainly
-from armid.contract.trials import away, corners, from_null, middle
+from armid.contract.trials import away, corners, from_null, middle, simulate_plainly
 from armid.engine import Schedule, simulate
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, applicable
 from armid.model.plants.driven_axis import linear_axis, rotary_axis

@@ -11,7 +11,7 @@ import pytest
 from numba import njit
 from numpy.typing import NDArray
 
-from armid.problem.fitness import (
+from armid.problem.fitness import (  # fmt: skip
     FITNESS,
     Fitness,
     as_fitness,
@@ -21,7 +21,7 @@ from armid.problem.fitness import (
     mean_square,
     record_weights,
     relative_mean_square,
-)  # fmt: skip
+)
 from armid.problem.similarity import numerical_similarity, similarity
 
 Array = NDArray[np.float64]

@@ -16,8 +16,7 @@ from armid.errors import ArmidError
 from armid.identifiers import PaperPSO
 from armid.problem.fitness import FITNESS, Fitness
 from armid.problem.meter import PENALTY, Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem
-from armid.problem.replay import Replay, replays
+from armid.problem.problem import IdentificationProblem, Replay, replays
 from armid.problem.similarity import similarity
 from armid.problem.space import space_of
 from armid.record import read_campaign

@@ -7,7 +7,7 @@ import pytest
 
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
-from armid.problem.replay import accuracy_for, replay_of, replays
+from armid.problem.problem import accuracy_for, replay_of, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
 

@@ -8,8 +8,7 @@ from pymoo.core.population import Population
 from armid.errors import ArmidError
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import RESIDUALS, Meter
-from armid.problem.problem import IdentificationProblem
-from armid.problem.replay import replays, residuals
+from armid.problem.problem import IdentificationProblem, replays, residuals
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 ASKED = ["F", "G", "H", RESIDUALS]

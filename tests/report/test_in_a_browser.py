@@ -7,7 +7,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from stored import EVIL, SVG, study_document, write_loop
 
-from armid.cli.results import LOOP, document_of
+from armid.cli.report import LOOP, document_of
 from armid.report.html import html
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

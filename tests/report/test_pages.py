@@ -7,8 +7,7 @@ from html.parser import HTMLParser
 import pytest
 from stored import EVIL, SVG, loop_details, loop_report, study_document, write_loop
 
-from armid.cli.report import kind_in
-from armid.cli.results import LOOP, document_of
+from armid.cli.report import LOOP, document_of, kind_in
 from armid.errors import ArmidError
 from armid.loop.document import loop_document
 from armid.report.document import Document, Line, Listing, Section, Sentences, changed, table

@@ -11,7 +11,7 @@ import pytest
 from armid.cli.main import main
 from armid.contract.check import check_thing
 from armid.model import Model
-from armid.problem.replay import replays
+from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import IrregularSamplingWarning, read_campaign
 from armid.registry import load_registry

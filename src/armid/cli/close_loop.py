@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from armid.cli.options import examples, opened, out_option, problem_options, seed_option
-from armid.cli.results import LOOP, refuse_unwritable, show_and_write
+from armid.cli.report import LOOP, refuse_unwritable, show_and_write
 from armid.errors import ArmidError, nearest
 from armid.model import Effect
 

@@ -18,11 +18,12 @@ from armid.cli.options import (
     out_option,
     problem_options,
 )
-from armid.cli.results import IDENTIFIABILITY, refuse_unwritable, show_and_write
+from armid.cli.report import IDENTIFIABILITY, refuse_unwritable, show_and_write
 from armid.errors import ArmidError, nearest
 
 if TYPE_CHECKING:
     from armid.problem.space import Space
+
 
 Array = NDArray[np.float64]
 # The rounding of a speed is larger.
@@ -62,8 +63,7 @@ def identifiability_command(
     """
     from armid.estimation.design import SHRINKAGE, VOLUME, WORST
     from armid.estimation.examine import examine
-    from armid.estimation.identifiability_document import result_of
-    from armid.estimation.identifiability_figures import figures_of
+    from armid.estimation.identifiability_document import figures_of, result_of
 
     if rank not in (VOLUME, WORST, SHRINKAGE):
         raise ArmidError(f"--rank '{rank}': {nearest(rank, (VOLUME, WORST, SHRINKAGE))}")

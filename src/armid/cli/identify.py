@@ -20,7 +20,7 @@ from armid.cli.options import (
     seed_option,
     value_of,
 )
-from armid.cli.results import IDENTIFICATION, refuse_unwritable, show_and_write
+from armid.cli.report import IDENTIFICATION, refuse_unwritable, show_and_write
 
 
 @click.command("identify", epilog=examples(
@@ -63,8 +63,7 @@ def identify_command(
     """
     from armid.estimation.identify import INTERRUPTED
     from armid.estimation.identify import identify as run
-    from armid.estimation.identify_document import details_of, result_of
-    from armid.estimation.identify_figures import figures_of
+    from armid.estimation.identify_document import details_of, figures_of, result_of
     from armid.problem.fitness import SIMILARITIES
 
     given = opened(campaign, effects, plugins, window, bounds, fix)

@@ -7,7 +7,7 @@ import click
 
 from armid.cli.options import chosen, examples, plugin_option
 from armid.model import Effect, Parameter, Plant, refusal_of
-from armid.model.equations import returned_text
+from armid.model.graph import returned_text
 from armid.registry import KINDS, Registry, load_registry
 
 # Columns of a terminal that equations are broken to.

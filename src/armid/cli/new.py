@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.cli.options import chosen, examples
-from armid.cli.results import NewFiles
+from armid.cli.report import NewFiles
 from armid.errors import ArmidError
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name

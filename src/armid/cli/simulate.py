@@ -18,7 +18,7 @@ from armid.cli.options import (
     out_option,
     plugin_option,
 )
-from armid.cli.results import NewFiles
+from armid.cli.report import NewFiles
 from armid.engine import accuracy_against, calibrate, simulate
 from armid.errors import ArmidError, nearest
 from armid.model import Model

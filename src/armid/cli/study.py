@@ -44,11 +44,7 @@ def study_command(
     Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not. Ends
     with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
-    from armid.study.runner import (
-        ProgressBar,
-        absolute,
-        run,
-    )
+    from armid.study.runner import ProgressBar, absolute, run
     from armid.study.tasks import read_study
 
     with ProgressBar() as watch:

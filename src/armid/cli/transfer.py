@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from armid.cli.options import examples, out_option, plugin_option
-from armid.cli.results import NewFiles, refuse_unwritable
+from armid.cli.report import NewFiles, refuse_unwritable
 from armid.errors import ArmidError
 from armid.registry import load_registry
 

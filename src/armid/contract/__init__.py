@@ -1,9 +1,9 @@
 """What a user's own plant, effect, fitness, identifier or campaign has to keep.
 
 In reading order:
-check       the entrance to all contracts; those of a campaign and of a fitness
+check       the entrance to all contracts; those of a campaign, of a fitness and of an analysis
 equations   the contracts of plants and of effects
 identifier  the contract of an identifier, and its trial problem
-trials      Finding, and the candidates and manoeuvres on which equations are tried
-reference   an independent simulation with scipy, which judges the compiled one
+trials      Finding, candidates and manoeuvres on which equations are tried, and the independent simulation with scipy
+            that judges the compiled one
 """

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.contract.reference import simulate_plainly
 from armid.contract.trials import (
     Finding,
     at_null,
@@ -17,6 +16,7 @@ from armid.contract.trials import (
     from_null,
     nominal,
     over_box,
+    simulate_plainly,
     strengths_of,
     trial_manoeuvres,
 )

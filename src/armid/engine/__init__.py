@@ -1,6 +1,6 @@
 """How the machine moves: compiled simulation of populations.
 
-simulate: a population through a manoeuvre. calibrate: how finely time is cut. evaluate: quantities along a motion.
+simulate: a population through a manoeuvre, and quantities along a motion. calibrate: how finely time is cut.
 generate, templates/kernel.py.jinja: the module of a model, its equations and the loop that integrates them.
 transpile: the source of an equation, made self-contained. compile: the module, cached on disk.
 simd, simd_math: vectors of candidates in numba, and their elementary functions.
@@ -8,8 +8,7 @@ simd, simd_math: vectors of candidates in numba, and their elementary functions.
 
 from armid.engine.calibrate import FINE, STANDARD, Calibration, accuracy_against, calibrate, golden_steps, probes
 from armid.engine.compile import cache_folder, compile_model
-from armid.engine.evaluate import along
-from armid.engine.simulate import Prepared, Schedule, Simulation, prepare, simulate
+from armid.engine.simulate import Prepared, Schedule, Simulation, along, prepare, simulate
 
 __all__ = [
     "FINE", "STANDARD", "Calibration", "Prepared", "Schedule", "Simulation", "accuracy_against", "along",

@@ -12,7 +12,7 @@ import numpy as np
 
 from armid.engine.simd_math import LANE_FUNCTIONS
 from armid.errors import ArmidError
-from armid.model.equations import definition_of
+from armid.model.graph import definition_of
 
 # A name that no function can have; it becomes `np` when the names of the function are replaced.
 NUMPY = "numpy itself"

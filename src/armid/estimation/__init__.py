@@ -3,8 +3,9 @@
 identify        search the free parameters, judge the best candidate on train and holdout
 least_squares   the least-squares problem, its Jacobian, Levenberg-Marquardt, starts
 information     sensitivities, Fisher information, intervals
-collinearity    groups of parameters that move together
 profile         profile likelihood
 design          what one more record would buy
-examine         all of these for one campaign
+examine         all of these for one campaign; groups of parameters that move together
+
+What is shown of the results: identify_document, identifiability_document, with their figures.
 """

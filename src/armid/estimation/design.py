@@ -13,7 +13,7 @@ from armid.engine.simulate import Simulation
 from armid.estimation.information import Level, inverse
 from armid.estimation.least_squares import slopes_of, stencil
 from armid.model import Manoeuvre, ManoeuvreKey, Model, Plant
-from armid.problem.replay import Replay
+from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Record
 

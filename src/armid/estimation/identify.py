@@ -15,14 +15,14 @@ from pymoo.optimize import minimize
 
 from armid.errors import ArmidError
 from armid.estimation.information import Information, information_at
-from armid.estimation.least_squares import AT_BOUND as AT_BOUND  # noqa: PLC0414 - the study reads it here
-from armid.estimation.least_squares import held_by_bound
+from armid.estimation.least_squares import (
+    held_by_bound,
+)
 from armid.identifiers import Identifier, can_run_directly, run_directly
 from armid.model import Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
 from armid.problem.meter import Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem, fitness_of, weights_of
-from armid.problem.replay import Replay, replays
+from armid.problem.problem import IdentificationProblem, Replay, fitness_of, replays, weights_of
 from armid.problem.similarity import similarity
 from armid.problem.space import Space
 from armid.record import Campaign

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from armid.engine import simulate
 from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
-from armid.problem.replay import Replay
+from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record.noise import correlation_sum
 from armid.record.record import NOISE_FREE
@@ -105,7 +105,8 @@ def information_of(records: LeastSquaresProblem, z: Array, trust: Array | None =
     covariance = inverse(total)
     determined = np.where(np.isfinite(covariance), covariance, 0.0)
     step = np.clip(z + determined @ (jacobian.T @ residual), 0.0, 1.0) - z
-    started = np.array([jacobian.T @ (rows * change) for change in start_changes(records, z)]).reshape(-1, len(z))
+    started = np.array([jacobian.T @ (rows * change) for change in start_changes(records, z)])
+    started = started.reshape(len(started), len(z))
     covariance = covariance + determined @ (started.T @ started) @ determined
     deviation = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from armid.engine import probes
 from armid.errors import ArmidError
 from armid.model import Model
-from armid.problem.replay import Replay
+from armid.problem.problem import Replay
 from armid.problem.space import Space
 
 Array = NDArray[np.float64]

@@ -4,8 +4,7 @@ In reading order:
 identifier         what an identifier is, checks of its options, and how a user's own becomes one
 catalogue          identifiers by name, the composed ones too
 pso                the paper's swarm
-pymoo_algorithms   pymoo's own swarm, genetic algorithm and differential evolution
-cmaes              CMA-ES with restarts, and uniform random search
+evolutionary       pymoo's own swarm, genetic algorithm and differential evolution; CMA-ES; random search
 nlopt              the local searches of NLopt
 least_squares      the trust region of scipy on the residual vector, and derivatives by differences
 chain              identifiers one after another, and multistart

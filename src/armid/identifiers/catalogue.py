@@ -5,12 +5,11 @@ from typing import Any
 
 from armid.errors import ArmidError, nearest
 from armid.identifiers.chain import PREFIX, chain_of, multistart_of
-from armid.identifiers.cmaes import Cmaes, UniformSearch
+from armid.identifiers.evolutionary import PYMOO, Cmaes, UniformSearch
 from armid.identifiers.identifier import Identifier, checked_count, checked_population
 from armid.identifiers.least_squares import LeastSquares
 from armid.identifiers.nlopt import NLOPT
 from armid.identifiers.pso import PaperPSO
-from armid.identifiers.pymoo_algorithms import PYMOO
 
 
 def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:

@@ -21,7 +21,7 @@ from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.errors import ArmidError
 from armid.loop.whitening import WhitenedData, WhiteRecords
 from armid.model import Effect, Manoeuvre, Model, Parameter
-from armid.problem.replay import Replay
+from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
 from armid.record import Override, Record
 

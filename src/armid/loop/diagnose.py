@@ -15,7 +15,7 @@ from armid.loop.candidates import Library, calibrated_replays
 from armid.loop.fit import Fit, beyond
 from armid.loop.whitening import WhitenedData, WhiteRecords, whitened
 from armid.model import Model
-from armid.problem.replay import Replay
+from armid.problem.problem import Replay
 from armid.record import Record
 
 Array = NDArray[np.float64]

@@ -24,17 +24,9 @@ from armid.loop.result import (
     finite,
 )
 from armid.loop.score_test import projected, rest_of
-from armid.report.common import (
+from armid.report.document import (
     ERROR_NOTE,
     MOST_RECORDS,
-    curve_entry,
-    error_table,
-    made_section,
-    records_note,
-    rmse_text,
-    value_text,
-)
-from armid.report.document import (
     Column,
     Document,
     Figure,
@@ -46,8 +38,14 @@ from armid.report.document import (
     Table,
     Text,
     changed,
+    curve_entry,
+    error_table,
     listing,
+    made_section,
+    records_note,
+    rmse_text,
     table,
+    value_text,
 )
 from armid.units import SHOWN, shown
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
-from armid.report.common import points, record_axes, small_axes
+from armid.report.document import points, record_axes, small_axes
 from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, pyplot
 from armid.units import SHOWN, shown
 

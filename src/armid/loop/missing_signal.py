@@ -14,7 +14,7 @@ from armid.loop.fit import Fit, beyond
 from armid.loop.score_test import free_values
 from armid.loop.whitening import WhiteRecords
 from armid.model import Effect, Model, Parameter
-from armid.problem.replay import Replay
+from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Piece
 

@@ -1,7 +1,7 @@
 """What the machine is: equations, no numba, no files.
 
-parameter, effect, plant: what is declared. graph: equations bound by argument name. model: a plant with effects.
-equations: what `print(model)` shows. catalogue, effects, plants: what there is.
+parameter, effect, plant: what is declared. graph: equations bound by argument name, and as text.
+model: a plant with effects. catalogue, effects, plants: what there is.
 """
 
 from armid.model.catalogue import EFFECTS, PLANTS

@@ -6,8 +6,7 @@ from functools import cached_property
 
 from armid.errors import ArmidError, nearest
 from armid.model.effect import Effect, State
-from armid.model.equations import equations_text
-from armid.model.graph import Graph, build_graph
+from armid.model.graph import Graph, build_graph, equations_text
 from armid.model.parameter import Parameter, resolve
 from armid.model.plant import Plant
 

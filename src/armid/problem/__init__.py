@@ -2,9 +2,8 @@
 
 In reading order:
 space       which parameters are searched, between which bounds, and what the others are
-replay      records and the model side by side: signals and residual vectors
 similarity  the paper's similarity degree S of two series, S1 and S2
 fitness     a number per candidate to minimise, and how the records of a campaign join
 meter       the budget of a run, cut off exactly, and the one log of its evaluations
-problem     all of these as pymoo.core.problem.Problem
+problem     records and the model side by side, and all of these as pymoo.core.problem.Problem
 """

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError, nearest, shown
 from armid.model import EFFECTS, PLANTS, Effect, Model, Parameter, Plant
 from armid.model.parameter import resolve
-from armid.record.pieces import with_window
 from armid.record.reader import NAME, SharedEntries, campaign_path, gravity_of, read_record, record_path
 from armid.record.record import Record
+from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Override, RecordSheet, load_toml, unknown_name, validated
 from armid.record.table import DEGREE, write_table
 

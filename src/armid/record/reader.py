@@ -11,9 +11,19 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError, nearest, shown
 from armid.model import Manoeuvre, ManoeuvreKey, Plant
 from armid.record.noise import noise_of, smallest_step
-from armid.record.pieces import Track, is_constant, part, piece_length, track_of, with_window
 from armid.record.record import Record
-from armid.record.resample import Timing, moved_onto_grid, onto_grid, timing_of
+from armid.record.resample import (
+    Timing,
+    Track,
+    is_constant,
+    moved_onto_grid,
+    onto_grid,
+    part,
+    piece_length,
+    timing_of,
+    track_of,
+    with_window,
+)
 from armid.record.schema import KindError, RecordSheet, number
 from armid.record.table import (
     LARGEST,

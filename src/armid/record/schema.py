@@ -16,6 +16,7 @@ from armid.record.table import LARGEST
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+
 Kind = Callable[[object], Any]
 
 

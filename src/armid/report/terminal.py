@@ -8,6 +8,7 @@ from armid.report.document import Document, Sentences, Table, Text
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
+
 # Columns of text and of tables where the output is no terminal.
 TEXT_WIDTH, TABLE_WIDTH = 120, 150
 

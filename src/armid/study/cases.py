@@ -15,9 +15,8 @@ from armid.errors import ArmidError, shown
 from armid.model import Manoeuvre, Model, Plant
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Noise, Override, Record, read_campaign
-from armid.record.pieces import SLACK, is_constant, part, with_window
 from armid.record.reader import campaign_path, record_constants
-from armid.record.resample import FEWEST_SAMPLES
+from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, part, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.spec import WHOLE, CaseSpec, ManoeuvreSpec, RandomCasesSpec, StudyRegistry, StudySpec, lookup
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from armid.study.dask_pool import DaskPool
     from armid.study.results import StudyResults
 
+
 TIME_LIMIT_S = 600.0
 RESULTS = Path("results")
 # How long to listen for finished runs before Ctrl-C is looked for [s].

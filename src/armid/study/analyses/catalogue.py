@@ -6,18 +6,17 @@ from typing import Any
 from pandas import DataFrame, RangeIndex
 from pandas.api.types import is_bool_dtype, is_integer_dtype, is_numeric_dtype
 
-from armid.contract.analysis import parts_of
+from armid.contract.check import parts_of
 from armid.errors import ArmidError
 from armid.report.document import Column, Figure, Part, Section, Table, slug, unlike
 from armid.report.style import pyplot
-from armid.study.analyses.best_fitness import BEST_FITNESS
 from armid.study.analyses.convergence import CONVERGENCE
 from armid.study.analyses.cramer_rao import CRAMER_RAO
 from armid.study.analyses.errors import ERRORS
 from armid.study.analyses.fitness_quality import FITNESS_QUALITY
 from armid.study.analyses.overview import OVERVIEW, RUNS
 from armid.study.analyses.ranks import RANKS
-from armid.study.analyses.running_time import RUNNING_TIME
+from armid.study.analyses.running_time import BEST_FITNESS, RUNNING_TIME
 from armid.study.analyses.success import SUCCESS
 from armid.study.analyses.table1 import TABLE1
 from armid.study.analyses.table2 import TABLE2
@@ -27,7 +26,7 @@ ANALYSES = (
     OVERVIEW, TABLE1, TABLE2, CRAMER_RAO, FITNESS_QUALITY, SUCCESS, RUNNING_TIME, BEST_FITNESS, CONVERGENCE, ERRORS,
     RANKS, RUNS,
 )  # fmt: skip
-# name -> function of the runs, see `armid.contract.analysis`.
+# name -> function of the runs, see `armid.contract.check`.
 OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
 
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.report.document import Figure, Part, slug
-from armid.report.style import COLOURS, DASHES, PALE, panels
+from armid.report.style import COLOURS, DASHES, PALE, legend_below, panels
 from armid.study.analyses.analysis import Analysis, Evidence
-from armid.study.analyses.drawing import legend_below
 
 Array = NDArray[np.floating[Any]]
 QUARTILES = (0.25, 0.5, 0.75)

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import COLOURS, MARKERS, panels
+from armid.report.style import COLOURS, MARKERS, legend_below, panels
 from armid.study.analyses.analysis import N_RUNS, SETTING, Analysis, Evidence
-from armid.study.analyses.drawing import legend_below
 
 # Smaller values of 1 - S and of relative errors are drawn there.
 FLOOR = 1e-16

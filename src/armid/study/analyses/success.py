@@ -7,9 +7,8 @@ import numpy as np
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import COLOURS, MARKERS, panels
+from armid.report.style import COLOURS, MARKERS, legend_below, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, SETTING, VARIANT, Analysis, Evidence
-from armid.study.analyses.drawing import legend_below, row_names
 
 TOLERANCES = (1e-2, 1e-3, 1e-4)
 # Distance of two tolerances in a row of the figure.

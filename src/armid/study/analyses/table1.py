@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table, Text, slug, unlike
-from armid.report.style import COLOURS, panels
+from armid.report.style import COLOURS, legend_below, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence
-from armid.study.analyses.drawing import legend_below, row_names
 from armid.units import SHOWN
 
 MEAN_ROW = "mean of the rows"

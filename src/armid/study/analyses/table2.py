@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import COLOURS, MARKERS, panels
+from armid.report.style import COLOURS, MARKERS, legend_below, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, VARIANT, Analysis, Evidence
-from armid.study.analyses.drawing import legend_below, row_names
 from armid.units import SHOWN
 
 COLUMNS = (
