@@ -259,6 +259,12 @@ def test_agree_with_differences_of_another_step(several, arm_space):
         np.testing.assert_allclose(found, other, atol=(2e-3 if step < 1e-4 else 2e-2) * np.max(np.abs(other)))
 
 
+def test_where_nothing_is_free_there_is_no_interval(lowering, arm):
+    space = space_of(arm, fixed={"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4})
+    found = information_at(replays(lowering.train, arm, space), space, np.empty(0))
+    assert (found.names, found.deviation.shape, found.correlation.shape) == ((), (0,), (0, 0))
+
+
 def test_a_fixed_parameter_has_no_column(lowering_replays, arm_space):
     some = sensitivities(lowering_replays[0], arm_space.with_fixed("eta3", 0.55), TRUTH[[0, 1, 3]])
     whole = sensitivities(lowering_replays[0], arm_space, TRUTH)

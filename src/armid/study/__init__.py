@@ -10,7 +10,7 @@ Where a run goes, in reading order:
 - worker: the program of such a process
 - store: one SQLite file of the plan, of who is at which run, and of every finished run
 
-Beside them: outcome (the values that are handed on), loops (the kind of
-study that closes the loop), dask_pool (a cluster in place of own processes), results (the store as tables), export
-(the store in formats of others). The report: analyses (statistics, a file a topic), document (answer, facts and the sections of the analyses).
+Beside them: outcome (the values that are handed on), loops (the kind of study that closes the loop), dask_pool (a
+cluster in place of own processes), results (the store as tables), export (the store in formats of others). The report:
+analyses (statistics, a file a topic), document (answer, facts and the sections of the analyses).
 """
