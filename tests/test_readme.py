@@ -29,7 +29,7 @@ LINKED, UNWRITTEN = (*GUIDES, ".github/CONTRIBUTING.md"), ("src/armid/README.md"
 LEFT_OUT = ("armid bench", "armid import", "out/campaigns", "out/table1", "studies/table1", "close-loop")
 TEST_COMMAND = '.venv/bin/python -m pytest -q -n 2 -m "not slow and not browser"'
 # Megabytes of results/, and lines of a page.
-MOST_MB, MOST_LINES = 5.0, {"README.md": 160, ".github/CONTRIBUTING.md": 120, "studies/make_results.py": 150}
+MOST_MB, MOST_LINES = 5.0, {"README.md": 160, ".github/CONTRIBUTING.md": 120, "studies/make_results.py": 160}
 
 # Of a number in an output, whose last digits are the processor's.
 NUMBER = re.compile(r"-?\d[\d,]*(\.\d+)?(e[+-]?\d+)?")

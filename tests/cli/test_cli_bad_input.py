@@ -65,5 +65,5 @@ def test_memory_that_is_not_there_is_told(refused, monkeypatch):
     def greedy(*_, **__):
         raise MemoryError("Unable to allocate 3 PiB")
 
-    monkeypatch.setattr("armid.registry.load_registry", greedy)
+    monkeypatch.setattr("armid.cli.listing.load_registry", greedy)
     assert "not enough memory: Unable to allocate 3 PiB" in refused("list", "effects")

@@ -9,8 +9,9 @@ from small_study import RUNS_A_SEED, same_results
 
 from armid.study.cases import DEGREE, clean_records
 from armid.study.results import load_study
+from armid.study.run_cache import RunCache
 from armid.study.runner import run_study
-from armid.study.tasks import RunCache, read_study
+from armid.study.tasks import read_study
 
 STUDIES = Path(__file__).parents[2] / "studies"
 RANDOM = """\

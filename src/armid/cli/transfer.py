@@ -53,7 +53,7 @@ def dfki(folder: Path, out: Path, holdout: str | None, plugins: tuple[str, ...])
     print(f"wrote {import_dfki(folder, out, holdout)}")
 
 
-@click.group("export")
+@click.group("export", short_help="Write stored results for other programs.")
 def export_group() -> None:
     """Write stored results in the formats of other programs."""
 

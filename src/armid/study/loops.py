@@ -18,8 +18,8 @@ from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import unknown_name, validated
 from armid.study.cases import digest_of
 from armid.study.outcome import Performed, Planned, planned
+from armid.study.run_cache import RunCache
 from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE, LoopSpec, StudyRegistry, lookup
-from armid.study.tasks import RunCache
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ have name, kind, folder of their file, registry, case_names (what they are tried
 
 import json
 import time
-from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -27,22 +26,13 @@ from armid.estimation.information import information_at
 from armid.estimation.least_squares import held_by_bound
 from armid.model import Model
 from armid.problem.meter import Meter
-from armid.problem.problem import IdentificationProblem, Replay, replay_of
-from armid.problem.space import Space, space_of
-from armid.record import Record, read_campaign
+from armid.problem.problem import IdentificationProblem, Replay
+from armid.problem.space import Space
 from armid.record.schema import load_toml, unknown_name, validated
 from armid.registry import place_in_plugin
-from armid.study.cases import (
-    DEGREE,
-    Case,
-    campaign_folder,
-    cases_of,
-    clean_records,
-    digest_of,
-    in_window,
-    noisy_records,
-)
+from armid.study.cases import Case, cases_of, clean_records
 from armid.study.outcome import DONE, FAILED, ClaimedRun, Outcome, Performed, Planned, packed, planned
+from armid.study.run_cache import RunCache
 from armid.study.spec import (
     CLOSES_LOOP,
     IDENTIFIES,
@@ -57,97 +47,6 @@ from armid.study.spec import (
 
 if TYPE_CHECKING:
     from armid.study.loops import LoopStudy
-
-
-# How many cases, each at one level of noise and in one window, are kept ready in a process.
-MOST_KEPT = 512
-SHARED = ("plant", "effects", "bounds", "fixed", "accuracy", "window_s", "truth", "strokes", "interval_s", "campaign")
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedCase:
-    """Hold a case ready to run on: whole records without noise, and replays of them in a window.
-
-    equations: of the model. records: whole ones that noise is added to, empty for records that are read.
-    """
-
-    equations: str
-    space: Space
-    records: tuple[Record, ...]
-    replays: tuple[Replay, ...]
-
-
-class RunCache:
-    """Make what runs need, and keep it for the next run.
-
-    registry: what settings may name. folder: of the study's file, where campaigns are read from.
-    What is kept changes no result: it depends on the settings alone.
-    """
-
-    def __init__(self, registry: StudyRegistry, folder: Path) -> None:
-        self.registry, self.folder = registry, folder
-        self._kept: OrderedDict[str, Any] = OrderedDict()
-
-    def replays(self, settings: Mapping[str, Any]) -> tuple[PreparedCase, tuple[Replay, ...]]:
-        """Return the case of a run, and its records with the run's own noise, ready to be simulated."""
-        shared = {word: settings[word] for word in SHARED if word in settings}
-        level = settings["noise_deg_s"] or 0.0
-        case = self._once("case", shared | {"noise": level}, lambda: self._prepared(settings, level))
-        if level == 0.0:
-            return case, case.replays
-        noisy = [in_window(r, settings["window_s"]) for r in noisy_records(case.records, settings)]
-        return case, tuple(_measured_again(r, record) for r, record in zip(case.replays, noisy, strict=True))
-
-    def _prepared(self, settings: Mapping[str, Any], level: float) -> PreparedCase:
-        model, whole = self._source(settings)
-        bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
-        space = space_of(model, {}, bounds, settings["fixed"])
-        records = [in_window(record, settings["window_s"]) for record in whole]
-        accuracy = None if settings["accuracy"] == "auto" else settings["accuracy"]
-        if level:
-            # the accuracy that is enough depends on how loud the noise is, not on how it turns out
-            records = [replace(r, noise=replace(r.noise, rms=DEGREE * level)) for r in records]
-        replays = tuple(replay_of(record, model, space, accuracy) for record in records)
-        return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), replays)
-
-    def _source(self, settings: Mapping[str, Any]) -> tuple[Model, tuple[Record, ...]]:
-        source = settings.get("campaign")
-        if source is None:
-            plant = lookup(self.registry.plants, settings["plant"], "plant", "settings")
-        else:
-            campaign = self._once("campaign", source, lambda: self._campaign(source))
-            plant = campaign.plant
-        model = Model(plant)
-        for name in settings["effects"]:
-            model = model + lookup(self.registry.effects, name, "effect", "settings")
-        if source is not None:
-            return model, tuple(r for r in campaign.records if r.file in source["records"])
-        parts = {word: settings[word] for word in ("plant", "effects", "truth", "strokes", "interval_s")}
-        return model, self._once("clean", parts, lambda: clean_records(settings, model))
-
-    def _campaign(self, source: Mapping[str, Any]) -> Any:
-        path = campaign_folder(self.folder, source["campaign"], "settings")
-        if digest_of(path, ("campaign.toml", *source["records"])) != source["digest"]:
-            raise ArmidError(f"campaign {source['campaign']} has changed since the study was started: start it again")
-        return read_campaign(path, self.registry.plants, self.registry.effects)
-
-    def _once(self, what: str, of: Mapping[str, Any], make: Callable[[], Any]) -> Any:
-        """Return what was made of some settings before, or make it."""
-        key = what + json.dumps(of, sort_keys=True)
-        if key not in self._kept:
-            self._kept[key] = make()
-            if len(self._kept) > MOST_KEPT:
-                self._kept.popitem(last=False)
-        self._kept.move_to_end(key)
-        return self._kept[key]
-
-
-def _measured_again(replay: Replay, record: Record) -> Replay:
-    """Return a replay of the same manoeuvre with another measurement, on the schedule that it has."""
-    pieces = tuple(p.until_window_end() for p in record.pieces)
-    assert [p.window for p in replay.pieces] == [p.window for p in pieces]
-    return replace(replay, record=record, pieces=pieces)
-
 
 Task: TypeAlias = "Study | LoopStudy"
 SUFFIX = ".toml"

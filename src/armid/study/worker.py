@@ -8,8 +8,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from armid.errors import ArmidError
+from armid.study.run_cache import RunCache
 from armid.study.spec import study_registry
-from armid.study.tasks import RunCache, perform, task_type
+from armid.study.tasks import perform, task_type
 
 READY, REFUSED, FINISHED = "ready", "refused", "finished"
 # How often a worker looks whether the process that it works for still lives [s].
