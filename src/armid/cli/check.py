@@ -47,7 +47,7 @@ def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[Finding
     return kind, name, check_thing(kind, name, found, registry.plants)
 
 
-@click.command("bench", epilog=examples("armid bench --quick"))
+@click.command("bench", short_help="Measure speed, error and memory.", epilog=examples("armid bench --quick"))
 @click.option("--quick", is_flag=True, help="Fewer repetitions: rougher figures in a few seconds.")
 @plugin_option
 def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
