@@ -16,7 +16,7 @@ from pymoo.algorithms.soo.nonconvex.pattern import PatternSearch
 from armid.contract.check import check_fitness
 from armid.contract.equations import check_effect, check_effects, check_plant
 from armid.contract.identifier import check_identifier
-from armid.contract.trials import Finding
+from armid.contract.trials import ContractPoint
 from armid.identifiers import as_identifier
 from armid.model import EFFECTS, PLANTS, Effect, Guard, Parameter, State
 from armid.problem.fitness import Fitness
@@ -30,7 +30,7 @@ def drag(omega, level):
     return -level * omega
 
 
-def failed(findings: list[Finding]) -> dict[str, str]:
+def failed(findings: list[ContractPoint]) -> dict[str, str]:
     """Name -> sentence of the points that do not hold, without the plant's name."""
     assert all(f.sentence and "\n" not in f.sentence for f in findings)
     return {f.name.split(" on driven")[0].split(", driven")[0]: f.sentence for f in findings if not f.passed}

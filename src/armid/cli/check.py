@@ -12,7 +12,7 @@ from armid.errors import ArmidError
 from armid.registry import Registry, load_plugin, load_registry
 
 if TYPE_CHECKING:
-    from armid.contract.trials import Finding
+    from armid.contract.trials import ContractPoint
 
 
 @click.command("check", epilog=examples("armid check mine.py:my_drag", "armid check studies/campaigns/paper_arm"))
@@ -35,7 +35,7 @@ def check_command(thing: str, plugins: tuple[str, ...]) -> None:
         sys.exit(1)
 
 
-def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[Finding]"]:
+def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[ContractPoint]"]:
     # simulations and pymoo, which other commands do not need
     from armid.contract.check import check_campaign, check_thing
     from armid.record import read_campaign

@@ -6,18 +6,19 @@ import shlex
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from armid.cli.options import examples, plugin_option
 from armid.errors import ArmidError
-from armid.estimation import identifiability_document, identify_document
-from armid.loop import document as loop_document
 from armid.registry import load_registry
-from armid.report.document import Document
+
+if TYPE_CHECKING:
+    from armid.report.document import Document
 
 DETAILS = "details.json"
 
@@ -27,25 +28,32 @@ class Kind:
     """A kind of result of a command on a campaign.
 
     file : of the result, JSON. page, markdown : names of its page and of its Markdown, "" for none.
-    figures : names of the SVG files that are on the page. document : of (result, details, SVG by name, command).
+    module, function : of what makes its document of (result, details, SVG by name, command); imported when asked for,
+    as every other command starts faster without it. The module's FIGURES names the SVG files that are on the page.
     """
 
     command: str
     file: str
     page: str
-    figures: tuple[str, ...]
-    document: Callable[..., Document]
+    module: str
+    function: str
     markdown: str = ""
 
+    @property
+    def figures(self) -> tuple[str, ...]:
+        return tuple(import_module(self.module).FIGURES)
 
-IDENTIFICATION = Kind("armid identify", "result.json", "report.html", tuple(identify_document.FIGURES),
-                      identify_document.identify_document)  # fmt: skip
-IDENTIFIABILITY = Kind(
-    "armid identifiability", "identifiability.json", "identifiability.html", tuple(identifiability_document.FIGURES),
-    identifiability_document.identifiability_document,
-)  # fmt: skip
-LOOP = Kind("armid close-loop", "report.json", "report.html", tuple(loop_document.FIGURES),
-            loop_document.loop_document, "report.md")  # fmt: skip
+    @property
+    def document(self) -> "Callable[..., Document]":
+        made: Callable[..., Document] = getattr(import_module(self.module), self.function)
+        return made
+
+
+IDENTIFICATION = Kind("armid identify", "result.json", "report.html",
+                      "armid.estimation.identify_document", "identify_document")  # fmt: skip
+IDENTIFIABILITY = Kind("armid identifiability", "identifiability.json", "identifiability.html",
+                       "armid.estimation.identifiability_document", "identifiability_document")  # fmt: skip
+LOOP = Kind("armid close-loop", "report.json", "report.html", "armid.loop.document", "loop_document", "report.md")
 
 
 def show_and_write(kind: Kind, result: Mapping[str, Any], details: Mapping[str, Any], out: Path | None,
@@ -85,7 +93,7 @@ def write_page(files: "NewFiles", kind: Kind, folder: Path, stored: Path | None 
     return len(text.encode())
 
 
-def document_of(folder: Path, kind: Kind, name: str) -> Document:
+def document_of(folder: Path, kind: Kind, name: str) -> "Document":
     """Return the document of what a folder holds.
 
     folder: where the files are. name: of the folder, in the command that makes the page again.

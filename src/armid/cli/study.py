@@ -25,7 +25,7 @@ MOST_NAMED = 300
 @click.option("--dask", metavar="tcp://HOST:PORT", help="Scheduler of a Dask cluster, in place of own processes.")
 @out_option("Folder of the results. [default: results/NAME]")
 @click.option(
-    "--time-limit", default=600.0, show_default=True, metavar="S",
+    "--time-limit", type=float, metavar="S", show_default="600",
     help="A run that takes longer is stopped and counts as failed, s.",
 )  # fmt: skip
 @click.option(
@@ -35,7 +35,7 @@ MOST_NAMED = 300
 @click.option("--retry", is_flag=True, help="Perform failed runs anew.")
 @plugin_option
 def study_command(
-    study: Path, jobs: int | None, dask: str | None, out: Path | None, time_limit: float, only: str, retry: bool,
+    study: Path, jobs: int | None, dask: str | None, out: Path | None, time_limit: float | None, only: str, retry: bool,
     plugins: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Run what is missing of STUDY, a TOML file of cases, identifiers, fitnesses and seeds, or of campaigns to close.
@@ -44,12 +44,13 @@ def study_command(
     Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not. Ends
     with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
-    from armid.study.runner import ProgressBar, absolute, run
+    from armid.study.runner import TIME_LIMIT_S, ProgressBar, absolute, run
     from armid.study.tasks import read_study
 
     with ProgressBar() as watch:
         known = read_study(study, absolute(plugins))
-        ending = run(known, study, jobs, dask, out, time_limit, only, retry, watch.update)
+        limit = TIME_LIMIT_S if time_limit is None else time_limit
+        ending = run(known, study, jobs, dask, out, limit, only, retry, watch.update)
     for line in words(ending):
         print(line)
     if ending.interrupted:

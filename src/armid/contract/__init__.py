@@ -1,9 +1,9 @@
-"""What a user's own plant, effect, fitness, identifier or campaign has to keep.
+"""What a user's own plant, effect, fitness, identifier, analysis or campaign has to keep.
 
 In reading order:
 check       the entrance to all contracts; those of a campaign, of a fitness and of an analysis
 equations   the contracts of plants and of effects
 identifier  the contract of an identifier, and its trial problem
-trials      Finding, candidates and manoeuvres on which equations are tried, and the independent simulation with scipy
+trials      ContractPoint, candidates and manoeuvres on which equations are tried, and the independent simulation with scipy
             that judges the compiled one
 """

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from armid.contract.equations import check_effect, check_plant
 from armid.contract.identifier import check_identifier
-from armid.contract.trials import Finding
+from armid.contract.trials import ContractPoint
 from armid.errors import ArmidError
 from armid.identifiers import as_identifier
 from armid.model import PLANTS, Effect, Plant
@@ -27,7 +27,7 @@ SEEDS = range(1, 6)
 TRUTHS = {"p0": {"row 1": 3.2e6, "row 2": 3.1e6}, "k": {"row 1": 1.0, "row 2": 0.95}}
 
 
-def check_analysis(name: str, function: Callable[..., Any]) -> list[Finding]:
+def check_analysis(name: str, function: Callable[..., Any]) -> list[ContractPoint]:
     """Try an analysis on made-up runs of two identifiers, one of which has failed.
 
     Raises ArmidError for what is no function.
@@ -40,13 +40,13 @@ def check_analysis(name: str, function: Callable[..., Any]) -> list[Finding]:
         again = parts_of(name, function(synthetic_runs()))
     except Exception as error:
         text = str(error) if isinstance(error, ArmidError) else f"{type(error).__name__}: {error}"
-        return [Finding("tables and figures", False, text)]
+        return [ContractPoint("tables and figures", False, text)]
     unchanged, same = runs.equals(synthetic_runs()), content(parts) == content(again)
     return [
-        Finding("tables and figures", True, f"{len(parts)}: {', '.join(parts)}"),
-        Finding("leaves its argument alone", unchanged,
+        ContractPoint("tables and figures", True, f"{len(parts)}: {', '.join(parts)}"),
+        ContractPoint("leaves its argument alone", unchanged,
                 "the runs are as they were" if unchanged else "the runs that it was given have changed"),
-        Finding("deterministic", same, "a second call is compared with the first"),
+        ContractPoint("deterministic", same, "a second call is compared with the first"),
     ]  # fmt: skip
 
 
@@ -149,7 +149,7 @@ Array = NDArray[np.float64]
 INTERVAL, NOISE = 1e-3, 0.01
 
 
-def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> list[Finding]:
+def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> list[ContractPoint]:
     """Run the contract of a plant, an effect, a fitness, an identifier or an analysis.
 
     kind: "plants", "effects", "fitness", "identifiers" or "analyses". plants: those on which an effect is tried.
@@ -166,36 +166,36 @@ def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = 
     return check_identifier(as_identifier(name, thing))
 
 
-def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> list[Finding]:
+def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> list[ContractPoint]:
     """Try a campaign that was read: its model composes, and follows every record to its end.
 
     Free parameters are in the middle of their range. effects: name -> those that it may declare.
     """
     n_train, n_holdout = len(campaign.train), len(campaign.holdout)
     text = f"{n_train} to train on, {n_holdout} held out"
-    found = [Finding("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")]
+    found = [ContractPoint("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")]
     for record in campaign.records:
         noise, n = record.noise, record.measured.size
         text = f"{n} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
-        found.append(Finding(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})"))
+        found.append(ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})"))
     try:
         model = campaign.model(effects)
         space = space_of(model, campaign.parameters)
         free = ", ".join(space.free_names) or "nothing"
-        moves = [Finding("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")]
+        moves = [ContractPoint("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")]
         middle = 0.5 * (space.low + space.high)[space.free]
         for replay in replays(campaign.records, model, space):
             signal = replay.signal(space.complete(middle[np.newaxis]))[0]
             whole = bool(np.isfinite(signal).all())
             size = f"up to {np.max(np.abs(signal)):.3g}" if whole else "diverges"
             text = f"simulated {size}, measured up to {np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
-            moves.append(Finding(f"moves in {replay.record.file}", whole, text))
+            moves.append(ContractPoint(f"moves in {replay.record.file}", whole, text))
     except ArmidError as error:
-        moves = [Finding("model", False, str(error))]
+        moves = [ContractPoint("model", False, str(error))]
     return found + moves
 
 
-def check_fitness(fitness: Fitness) -> list[Finding]:
+def check_fitness(fitness: Fitness) -> list[ContractPoint]:
     """Try a fitness on a bump, the same bump disturbed more and more, and a candidate that failed."""
     measured, simulated = trial_series()
     try:
@@ -203,20 +203,26 @@ def check_fitness(fitness: Fitness) -> list[Finding]:
         alone = value(fitness, measured, simulated[2:3])
         failed = value(fitness, measured, np.vstack([simulated, np.full_like(measured, np.nan)]))
     except ArmidError as error:
-        return [Finding("one value per candidate", False, str(error))]
+        return [ContractPoint("one value per candidate", False, str(error))]
     given = trial_series()
     fitness(*given, INTERVAL, NOISE)
     untouched = all(np.array_equal(a, b) for a, b in zip(given, trial_series(), strict=True))
     text = "the arrays are as they were" if untouched else "the arrays that it was given have changed"
     apart = np.array_equal(failed[:-1], values) and np.array_equal(alone, values[2:3])
     return [
-        Finding("one value per candidate", values.shape == (4,), f"shape {values.shape} for 4 candidates"),
-        Finding("finite", bool(np.isfinite(values).all()), f"values {np.array2string(values, precision=3)}"),
-        Finding("least at a perfect match", int(np.argmin(values)) == 0, f"{values[0]:.3g} at the measured series"),
-        Finding("a failed candidate is worst", bool(failed[-1] > values.max()), f"{failed[-1]:.3g} for a NaN row"),
-        Finding("others untouched", bool(apart), "alone, and beside a failed one, a candidate is compared with itself"),
-        Finding("leaves its arguments alone", untouched, text),
-        Finding("deterministic", bool(np.array_equal(values, again)), "a second call is compared with the first"),
+        ContractPoint("one value per candidate", values.shape == (4,), f"shape {values.shape} for 4 candidates"),
+        ContractPoint("finite", bool(np.isfinite(values).all()), f"values {np.array2string(values, precision=3)}"),
+        ContractPoint(
+            "least at a perfect match", int(np.argmin(values)) == 0, f"{values[0]:.3g} at the measured series"
+        ),
+        ContractPoint(
+            "a failed candidate is worst", bool(failed[-1] > values.max()), f"{failed[-1]:.3g} for a NaN row"
+        ),
+        ContractPoint(
+            "others untouched", bool(apart), "alone, and beside a failed one, a candidate is compared with itself"
+        ),
+        ContractPoint("leaves its arguments alone", untouched, text),
+        ContractPoint("deterministic", bool(np.array_equal(values, again)), "a second call is compared with the first"),
     ]
 
 

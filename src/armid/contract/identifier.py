@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.optimize import minimize
 
-from armid.contract.trials import Finding
+from armid.contract.trials import ContractPoint
 from armid.identifiers import Identifier
 from armid.problem.meter import Log, Meter, Metered, MeterTermination
 
@@ -61,7 +61,7 @@ RAISES_AT = 50
 CUT_AT = 217
 
 
-def check_identifier(identifier: Identifier) -> list[Finding]:
+def check_identifier(identifier: Identifier) -> list[ContractPoint]:
     """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed."""
     (meter, problem), (again, _) = (run(identifier, 1, noise=noise) for noise in (1, 2))
     log, alike = meter.log(), same(meter, run(identifier, 2)[0])
@@ -69,12 +69,14 @@ def check_identifier(identifier: Identifier) -> list[Finding]:
     seeded = f"declared {says}, and another seed asks for {'the same' if alike else 'other'} candidates"
     best = f"the best of the log is {np.min(log.F):.3g}, the best that is kept {meter.best_f:.3g}"
     return [
-        Finding("exact budget", 0 < meter.used <= BUDGET, f"{meter.used} of {BUDGET} simulations used"),
-        Finding("inside the box", problem.outside == 0, f"{problem.outside} candidates outside the bounds"),
-        Finding("best never lost", meter.best_f == float(np.min(log.F)), best),
-        Finding("improves", meter.best_f < float(np.median(log.F[:20])), "better than the median of its first 20"),
-        Finding("reproducible", same(meter, again), "the same seed asks for the same candidates, bit for bit"),
-        Finding("seed", alike != identifier.is_stochastic, seeded),
+        ContractPoint("exact budget", 0 < meter.used <= BUDGET, f"{meter.used} of {BUDGET} simulations used"),
+        ContractPoint("inside the box", problem.outside == 0, f"{problem.outside} candidates outside the bounds"),
+        ContractPoint("best never lost", meter.best_f == float(np.min(log.F)), best),
+        ContractPoint(
+            "improves", meter.best_f < float(np.median(log.F[:20])), "better than the median of its first 20"
+        ),
+        ContractPoint("reproducible", same(meter, again), "the same seed asks for the same candidates, bit for bit"),
+        ContractPoint("seed", alike != identifier.is_stochastic, seeded),
         failing(identifier, meter, "survives failures", bare=False),
         failing(identifier, meter, "survives NaN", bare=True),
         raising(identifier),
@@ -82,7 +84,7 @@ def check_identifier(identifier: Identifier) -> list[Finding]:
     ]
 
 
-def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -> Finding:
+def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -> ContractPoint:
     """Tell whether it searches on and improves where a fifth of the box fails; bare: with NaN instead of a penalty.
 
     undisturbed: the run without failures; one that ends before a third of it has been stopped by a failure.
@@ -93,14 +95,14 @@ def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -
     improves = first.size > 0 and meter.best_f < float(np.median(first))
     value = "NaN" if bare else "a penalty"
     text = f"{meter.n_failed} of {meter.used} failed and gave {value}, best {meter.best_f:.3g}"
-    return Finding(name, improves and problem.outside == 0 and 3 * meter.used >= undisturbed.used, text)
+    return ContractPoint(name, improves and problem.outside == 0 and 3 * meter.used >= undisturbed.used, text)
 
 
 class BrokenError(Exception):
     """Stand for whatever a user's model may raise."""
 
 
-def raising(identifier: Identifier) -> Finding:
+def raising(identifier: Identifier) -> ContractPoint:
     """Tell whether an error of the problem comes out as it is and leaves no thread behind."""
     before = set(threading.enumerate())
     seen = 0
@@ -119,10 +121,10 @@ def raising(identifier: Identifier) -> Finding:
     ended_before = came == "nothing" and seen <= RAISES_AT
     left = [t.name for t in threading.enumerate() if t not in before]
     text = f"a problem that raises BrokenError: {came} came out, {len(left)} threads are left"
-    return Finding("errors come out", (came == BrokenError.__name__ or ended_before) and not left, text)
+    return ContractPoint("errors come out", (came == BrokenError.__name__ or ended_before) and not left, text)
 
 
-def resumed(identifier: Identifier, meter: Meter) -> Finding:
+def resumed(identifier: Identifier, meter: Meter) -> ContractPoint:
     """Tell whether a run that was cut off and resumed from its log ends as the undisturbed one, bit for bit."""
     known = min(CUT_AT, meter.used // 2)
     log = meter.log()
@@ -131,7 +133,7 @@ def resumed(identifier: Identifier, meter: Meter) -> Finding:
     saved = again.used - problem.simulated
     text = f"{saved} of {known} candidates answered from the log, {problem.simulated} simulated, the same in the end"
     enough = saved == again.recalled and (saved == known or identifier.needs_residuals)
-    return Finding("resumable", same(meter, again) and enough, text)
+    return ContractPoint("resumable", same(meter, again) and enough, text)
 
 
 def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: int = 1) -> tuple[Meter, Trial]:

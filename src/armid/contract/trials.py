@@ -21,7 +21,7 @@ GRAVITY = 0.4
 
 
 @dataclass(frozen=True)
-class Finding:
+class ContractPoint:
     """Hold one point of a contract: its name, whether it holds, and what was seen."""
 
     name: str
@@ -29,7 +29,7 @@ class Finding:
     sentence: str
 
 
-def check_parameters(parameters: Iterable[Parameter]) -> list[Finding]:
+def check_parameters(parameters: Iterable[Parameter]) -> list[ContractPoint]:
     """Tell whether bounds are finite, other values lie between them, and units are named."""
     given = list(parameters)
     outside = [
@@ -46,9 +46,9 @@ def check_parameters(parameters: Iterable[Parameter]) -> list[Finding]:
     ]  # fmt: skip
 
 
-def finding(name: str, wrong: list[str], says: str, otherwise: str) -> Finding:
+def finding(name: str, wrong: list[str], says: str, otherwise: str) -> ContractPoint:
     """Return a finding that fails where names are wrong, and tells them."""
-    return Finding(name, not wrong, says.format(", ".join(wrong)) if wrong else otherwise)
+    return ContractPoint(name, not wrong, says.format(", ".join(wrong)) if wrong else otherwise)
 
 
 def nominal(model: Model) -> Array:

@@ -12,8 +12,12 @@ equivalence      effects that the records cannot tell apart
 diagnose         whether what remains is more than noise, and where
 
 Beside it: missing_signal and empirical (where no effect will do), advice (the record to make next), result
-(report.json). The train records with their noise are `data`, a model at its estimate is a `Fit`, an effect of it an
-`EffectKey`, what it leaves on records `Residuals`.
+(report.json), document and figures (what is shown).
+
+`WhitenedData`  the train records with their noise
+`EffectKey`     an effect in one of its forms, its shape fixed or free
+`Fit`           a model at its estimate
+`Residuals`     what a fit leaves on records, measured minus simulated
 """
 
 from armid.loop.close_loop import close_loop

@@ -4,11 +4,11 @@ Where a run goes, in reading order:
 
 - spec: what the TOML file may hold, and the registered things that it names
 - cases: truths, manoeuvres and campaigns that a study is tried on
-- tasks: a study of either kind plans its runs and performs one
+- tasks: builds the list of runs of a study of either kind, and executes a single run
 - runner: run what is missing of a study
 - pool: worker processes on this machine, each run with a time limit
 - worker: the program of such a process
-- store: one SQLite file of the plan, of who is at which run, and of every finished run
+- store: one SQLite file: the planned runs, which process works on which, and all finished runs
 
 Beside them: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind of
 study that closes the loop), dask_pool (a cluster in place of own processes), results (the store as tables), export
