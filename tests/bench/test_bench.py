@@ -123,6 +123,7 @@ def assert_measured(row: Row) -> None:
     assert (row.ratio is None) == (row.wanted is None) == (row.met is None)
 
 
+@pytest.mark.slow
 def test_engine_scipy_and_plain_loop_are_measured_with_their_errors() -> None:
     engine, scipy, plain = rows = engine_rows(rounds=1, n_candidates=16, n_scipy=2)
     for row in rows:
@@ -135,6 +136,7 @@ def test_engine_scipy_and_plain_loop_are_measured_with_their_errors() -> None:
     assert [r.wanted.number for r in (scipy, plain)] == [2000, 12]
 
 
+@pytest.mark.slow
 def test_effects_are_measured_on_candidates_that_reach_their_switch() -> None:
     row = effects_row(rounds=1, n_candidates=16)
     assert_measured(row)

@@ -73,6 +73,7 @@ def test_one_file_for_each_record_and_the_values_that_were_taken(run, paper_arm,
     assert current[0] == 0.0
 
 
+@pytest.mark.slow
 def test_effects_and_their_parameters(run, paper_arm_folder, tmp_path):
     bare, null, rubbing = (tmp_path / name for name in ("bare", "null", "rubbing"))
     run("simulate", paper_arm_folder, "--out", bare)

@@ -48,6 +48,7 @@ def test_every_effect_keeps_its_contract(plant):
                       "deterministic", "compiled"}  # fmt: skip
 
 
+@pytest.mark.slow
 def test_one_effect_keeps_its_contract_by_itself():
     """As `armid check` tries it: compiled alone, in each of its forms."""
     found = check_effect(EFFECTS["worm_speed"], {"driven_axis": AXIS}, strict=True)

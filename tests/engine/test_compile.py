@@ -50,6 +50,7 @@ def listing(folder: Path) -> dict[str, tuple[int, int]]:
     return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*") if p.suffix in (".nbc", ".nbi")}
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "cache"
     both = [start(folder), start(folder)]

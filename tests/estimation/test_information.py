@@ -84,6 +84,7 @@ def test_what_is_not_seen_is_not_determined(paper_arm, arm, arm_space):
     assert all("k" not in pair[:2] for pair in collinear(information))
 
 
+@pytest.mark.slow
 def test_two_names_for_one_thing_are_both_not_determined(lowering, arm):
     def push(level):
         return level

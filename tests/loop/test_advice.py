@@ -161,6 +161,7 @@ def rivals(models, stroke):
     return [fitted(name, model, [record]) for name, model in models.items()]
 
 
+@pytest.mark.slow
 def test_advice_on_the_arm(rivals):
     advice = advise(rivals, speed_limit=200.0 * DEGREE)
     assert len(advice) >= 4

@@ -76,6 +76,7 @@ def killed_again_and_again(start, file, out, moments, rng):
     return cut
 
 
+@pytest.mark.slow
 def test_a_runner_killed_at_random_moments(start, write_study, tmp_path, undisturbed):
     cut = killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 2, random.Random(1))
     assert cut == 2

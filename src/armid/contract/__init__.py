@@ -4,6 +4,6 @@ In reading order:
 check       the entrance to all contracts; those of a campaign, of a fitness and of an analysis
 equations   the contracts of plants and of effects
 identifier  the contract of an identifier, and its trial problem
-trials      ContractPoint, candidates and manoeuvres on which equations are tried, and the independent simulation with scipy
-            that judges the compiled one
+trials      ContractPoint, candidates and manoeuvres on which equations are tried, and the independent simulation with
+            scipy that judges the compiled one
 """

@@ -58,7 +58,8 @@ def plant_declared(model: Model) -> list[ContractPoint]:
     return [
         ContractPoint("binds", True, f"{len(model.parameters)} parameters, {len(model.states)} states; ports: {ports}"),
         *check_parameters(plant.parameters),
-        ContractPoint("unit", plant.output_unit in UNITS, f"records {plant.output_unit}, {' or '.join(UNITS)} is expected"),
+        ContractPoint("unit", plant.output_unit in UNITS,
+                      f"records {plant.output_unit}, {' or '.join(UNITS)} is expected"),
         ContractPoint("printed", plant.output in str(model), "print(model) shows its equations"),
         finding("guards", idle, "nothing depends on guard {}, or it never moves",
                 f"all of {len(plant.guards)} guards are used"),

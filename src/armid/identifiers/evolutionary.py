@@ -108,10 +108,12 @@ class Cmaes(DeclaredSearch):
         cube, n_candidates = task.cube, float(self.n_candidates)
         start = cube.drawn(task.random) if task.start is None else cube.point(task.start)
         while True:
-            # quiet, writing no file, drawing from the task's generator and not from the global one
+            # quiet, writing no file, drawing from the task's generator and not from the global one; in one dimension
+            # cma fails where a standard deviation reaches its limit, so that there is none
             settings = {
                 "bounds": [0.0, 1.0], "popsize": max(4, round(n_candidates)), "randn": normal, "seed": np.nan,
                 "verbose": -10, "verb_log": 0, "verb_disp": 0, "signals_filename": "",
+                "maxstd": np.inf if cube.n == 1 else None,
             }  # fmt: skip
             strategy = CMAEvolutionStrategy(start, self.initial_step, settings)
             while not strategy.stop():
