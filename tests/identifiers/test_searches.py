@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
+from pymoo.problems.functional import FunctionalProblem
 from pymoo.util.display.single import SingleObjectiveOutput
 from searches import COMPOSED, Bowl, asked_of, identifier, ran
 
@@ -59,6 +60,12 @@ def test_finds_what_linear_algebra_finds(name: str) -> None:
     assert ((expected > 0.05) & (expected < 0.95)).all()
     found = problem.unit(ran(name, problem, 600).X)
     np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_cmaes_in_one_dimension_when_its_step_grows_to_the_range(seed: int) -> None:
+    problem = FunctionalProblem(1, lambda x: (x[0] - 1.0) ** 2, xl=0.0, xu=1.0)
+    assert ran("cmaes", problem, 200, seed=seed, initial_step=0.9).X[0] > 0.999
 
 
 @pytest.mark.parametrize("name", LOCAL_OR_BETTER)

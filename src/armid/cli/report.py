@@ -104,7 +104,10 @@ def document_of(folder: Path, kind: Kind, name: str) -> "Document":
     has_details = (folder / DETAILS).is_file() and kind is not IDENTIFIABILITY
     details = read_json(folder / DETAILS, kind.command) if has_details else {}
     files = {figure: folder / f"{figure}.svg" for figure in kind.figures}
-    svgs = {figure: path.read_text(encoding="utf-8") for figure, path in files.items() if path.is_file()}
+    try:
+        svgs = {figure: path.read_text(encoding="utf-8") for figure, path in files.items() if path.is_file()}
+    except UnicodeDecodeError as error:
+        raise ArmidError(f"{folder} holds a figure that is no text: the SVG of `{kind.command}` is expected") from error
     try:
         return kind.document(result, details, svgs, f"armid report {name}")
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:

@@ -209,8 +209,9 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
     doubts += details.get("warnings", ())
-    trusted = "No parameter is held by a bound, and the search has come to the minimum."
-    return first, second, " ".join(doubts) or trusted
+    trusted = "No parameter is held by a bound, and the search has come to the minimum." if free else ""
+    third = " ".join(doubts) or trusted
+    return (first, second, third) if third else (first, second)
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
