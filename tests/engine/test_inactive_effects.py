@@ -55,8 +55,8 @@ def test_neighbours_that_use_other_effects_change_nothing(
 def test_the_motion_is_that_of_the_model_without_what_is_inactive(
     arm: Model, wide: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
 ) -> None:
-    pair = arm + EFFECTS["shell_rocking"] + EFFECTS["controller_delay"]
-    for small, name in ((arm, ""), (pair, "shell_rocking"), (pair, "controller_delay")):
+    for name in ("", "shell_rocking", "controller_delay"):
+        small = arm + EFFECTS[name] if name else arm
         candidate = using(wide, drawn(arm, 1, 8)[0], name)
         values = dict(zip(wide.parameters, candidate))
         expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], schedule).output
