@@ -62,7 +62,8 @@ def loop(name: str, *figures: str, campaign: str = "", more: tuple[str, ...] = (
 
 EMPS = "armid identify out/campaigns/emps --effects coulomb,viscous,torque_offset"
 STAND = "python studies/test_stand.py"
-ADVICE, ADVISED = "studies/campaigns/blind_advice", "studies/campaigns/blind_advised"
+BLIND, FAMILIES = "studies/campaigns/blind", "studies/campaigns/families"
+ADVICE, ADVISED = f"{BLIND}_advice", f"{BLIND}_advised"
 RECIPES = {
     "advised": scored("advised", "advice", before=(
         (ADVICE, f"{STAND} advice {ADVICE} --seed 7"),
@@ -72,20 +73,22 @@ RECIPES = {
     )),
     "benchmark": study("benchmark", "ecdf", "critical_difference_0_3_deg_s"),
     "best_chain": study("best_chain"),
-    "blind": scored("blind", "confusion", "held_out", before=(
-        ("studies/campaigns/blind", f"{STAND} blind studies/campaigns/blind --seed 71"),
-    )),
+    "blind": scored("blind", "confusion", "held_out", before=((BLIND, f"{STAND} blind {BLIND} --seed 71"),)),
     "cramer_rao": study("cramer_rao", "cramer_rao"),
     "dfki_pendulum": loop("dfki_pendulum", "residuals", campaign="out/campaigns/dfki"),
     "emps": loop("emps", "residuals", campaign="out/campaigns/emps", more=(
-        "python studies/emps/inverse_model.py out/campaigns/emps out/emps/inverse_model.md",
+        "python studies/measured/emps/inverse_model.py out/campaigns/emps out/emps/inverse_model.md",
     )),
     "emps_identified": Recipe((f"{EMPS} --fitness rmse --out out/emps_identified",)),
+    "families": scored("families", before=((FAMILIES, f"python studies/stand/families.py {FAMILIES} --seed 83 "
+                                            "fault=200 constant=100 constants=100 two=100 three=100 control=200"),)),
     "fitness": study("fitness", "fitness"),
     "four_strokes": loop("four_strokes", "parameters"),
+    "measured": Recipe(("python studies/measured/run.py --data out/data --out out/measured",)),
     "one_stroke": loop("one_stroke", "parameters"),
     "paper_arm": Recipe(("armid identify studies/campaigns/paper_arm --out out/paper_arm",), ("fit",)),
     "rocking_shell": loop("rocking_shell", "residuals", "ranking"),
+    "suite": Recipe(("armid study studies/suite/suite.toml --out out/suite", "armid report out/suite"), ("attained",)),
     "table1": study("table1", "table1", "valley_noise_free"),
     "table1_short": study("table1_short"),
     "table2": study("table2", "table2"),

@@ -1,16 +1,14 @@
-"""Make campaigns of SYNTHETIC records of the shell transfer arm, and judge what was said of blind ones.
+"""Make campaigns of SYNTHETIC records of the shell transfer arm.
 
     python studies/test_stand.py OUT_FOLDER [--p0 3.05e6 --k 1.0 --eta3 0.55 --n 1.4] [--effect coulomb=40 ...]
     python studies/test_stand.py blind OUT_FOLDER --seed 1 [--only control,coulomb]
-    python studies/test_stand.py score OUT_FOLDER RESULTS_FOLDER
     python studies/test_stand.py advice OUT_FOLDER --seed 1
     python studies/test_stand.py advised OUT_FOLDER --seed 1 --base ADVICE_FOLDER --reports RESULTS_FOLDER
 
 The stand plays the machine: it simulates the declared arm, with any undeclared effects that are asked for, and measures
 it with a noisy gyro. It shares no code with `src/`, so a campaign is an independent check of what identifies it.
-`blind` makes many campaigns that do not tell their truth; it lies in OUT_FOLDER.key.json, and `score` alone reads it:
-RESULTS_FOLDER holds a folder for each campaign with the report.json of `armid close-loop`. It tells
-the judgements alone; `studies/blind/score.py` makes tables, figures and a page of them.
+`blind` makes many campaigns that do not tell their truth: OUT_FOLDER.key.json does, which `studies/blind/score.py`
+alone reads. RESULTS_FOLDER holds a folder for each campaign with the report.json of `armid close-loop`.
 `advice` makes campaigns of few strokes that leave two effects in doubt, `advised` adds the record that was advised,
 and in its place a random one.
 No machine was measured; the constants of the arm are engineering estimates. `--help` lists every option.
@@ -21,12 +19,11 @@ campaign in a folder that is called like a command, write ./blind.
 
 import sys
 
-from stand.advice.command import make_base, make_more
-from stand.blind.command import main as make_blind
+from stand.advice import make_base, make_more
+from stand.blind.campaign import main as make_blind
 from stand.command import main as make_campaign
-from stand.score.command import main as score
 
-COMMANDS = {"blind": make_blind, "score": score, "advice": make_base, "advised": make_more}
+COMMANDS = {"blind": make_blind, "advice": make_base, "advised": make_more}
 
 if __name__ == "__main__":
     words = sys.argv[1:]

@@ -37,13 +37,22 @@ def root() -> Path:
     return ROOT
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_word_of_compiling() -> Iterator[None]:
+    """What compiling takes hangs on the cache and the machine: commands in this process do not announce it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("armid.engine.compile.SLOW_S", 1e6)
+        yield
+
+
 @pytest.fixture(scope="session")
 def every_command() -> dict[tuple[str, ...], Any]:
     """The words that call a command -> the command, of every command of armid."""
     from armid.cli.main import app
 
     def below(group: Any, words: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-        for name, command in group.commands.items():
+        for name in group.list_commands(None):
+            command = group.get_command(None, name)
             if hasattr(command, "commands"):
                 yield from below(command, (*words, name))
             else:

@@ -70,7 +70,8 @@ def read(folder, name):
 def errors(report, when):
     """Return RMSE and similarity on train and held-out records."""
     told = report["error"][when] if when else report["error"]
-    return {role: each and {"rmse": each["rmse"], "s": each["s"]} for role, each in told.items()}
+    roles = {role: told[role] for role in ("train", "holdout")}
+    return {role: each and {"rmse": each["rmse"], "s": each["s"]} for role, each in roles.items()}
 
 
 def loop_digest(report):

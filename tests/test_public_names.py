@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import pkgutil
+import re
 
 import click
 
@@ -45,3 +46,15 @@ def test_files_exported_names_and_commands_have_a_docstring():
     for name in armid.HOME:
         things |= dict(methods(exported[name]))
     assert [name for name, thing in things.items() if not (thing.__doc__ or "").strip()] == []
+
+
+def test_exported_functions_tell_every_parameter_and_what_they_return():
+    for name in armid.HOME:
+        function = getattr(armid, name)
+        if inspect.isfunction(function):
+            doc = inspect.getdoc(function)
+            assert "\nReturns\n-------\n" in doc, name
+            section = doc.partition("\nParameters\n----------\n")[2].partition("\n\n")[0]
+            told = {word.strip(" *") for line in re.findall(r"^[^\s:].*", section, re.MULTILINE)
+                    for word in line.partition(" :")[0].split(",")}  # fmt: skip
+            assert told == set(inspect.signature(function).parameters), name

@@ -15,6 +15,9 @@ ROOT = Path(__file__).parents[1] / "src" / "armid"
 # Where code is made out of text, and whose text that is: the composed model's own, the user's --plugin.
 MAKES_CODE = {"engine/compile.py", "registry.py"}
 TEXT_RUNS, FILE_RUNS = {"eval", "exec", "compile", "__import__"}, {"exec_module", "spec_from_file_location"}
+# Read with pickle: what the compiler wrote into a folder that nobody else may write, after its digest is checked; and
+# what a worker, which runs the user's own code, sends through its pipe.
+READS_PICKLES = {"engine/cache.py", "study/pool.py"}
 UNPICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve", "yaml"}
 EVIL = "from pathlib import Path\nPath('touched').touch()\nthing = 1\n"
 CAMPAIGN = """\
@@ -69,7 +72,7 @@ def test_nothing_unpickles_and_nothing_runs_text():
         nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
         modules = {a.name.split(".")[0] for n in nodes if isinstance(n, ast.Import) for a in n.names}
         modules |= {str(n.module).split(".")[0] for n in nodes if isinstance(n, ast.ImportFrom)}
-        assert not modules & UNPICKLES, path
+        assert not modules & UNPICKLES or path.relative_to(ROOT).as_posix() in READS_PICKLES, path
         calls = {ast.unparse(n.func) for n in nodes if isinstance(n, ast.Call)}
         made = {c for c in calls if c in TEXT_RUNS or c.rpartition(".")[2] in FILE_RUNS}
         assert not made or path.relative_to(ROOT).as_posix() in MAKES_CODE, (path, made)
@@ -142,7 +145,11 @@ def test_a_store_with_a_pickle_in_it_runs_nothing(tmp_path, capsys):
         store.write_bytes(written)
         table, column = place.split(".")
         with closing(sqlite3.connect(store)) as connection:
-            changed = connection.execute(f"UPDATE {table} SET {column} = ?", (pickle.dumps(Touch()),)).rowcount
+            # as text where the column takes no bytes
+            harm = pickle.dumps(Touch(), protocol=0)
+            changed = connection.execute(
+                f"UPDATE {table} SET {column} = ?", (harm.decode() if place != "traces.trace" else harm,)
+            ).rowcount
             connection.commit()
         assert changed > 0, place
         # such a store was never written by armid: it may be refused anyhow, as long as nothing of it is run

@@ -4,19 +4,36 @@ import reprlib
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+# Letters of a sentence at most, and those of its end, where it says what is expected.
+LONGEST, END = 300, 120
+
 
 class ArmidError(ValueError):
     """Say in one sentence what was found, where, and what was expected; commands print it and exit with code 2.
 
-    Line ends and control characters, which come from names in files and options, are shown as escapes.
+    A sentence longer than 300 letters keeps its beginning and its end.
     """
 
     def __init__(self, sentence: str) -> None:
-        super().__init__("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in sentence))
+        super().__init__(on_a_line(sentence))
+
+
+class MachineError(ArmidError):
+    """Say that the machine is at fault and not what it was given: disk, memory, a cache that cannot be kept."""
+
+
+def on_a_line(sentence: str) -> str:
+    """Return a sentence of at most 300 letters; line ends and control characters, which names hold, are escapes."""
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in sentence)
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - END - 5]} ... {line[-END:]}"
+
+
+# Letters of a list of valid words that is told whole.
+LONGEST_LIST = 120
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return a hint with the nearest valid word, or the list of valid words when none is near.
+    """Return a hint with the nearest valid word, or the valid words when none is near, of many the nearest three.
 
     >>> nearest("coulom", ["coulomb", "viscous"])
     "did you mean 'coulomb'?"
@@ -27,6 +44,8 @@ def nearest(word: str, known: Iterable[str]) -> str:
     close = get_close_matches(word, words, n=1, cutoff=0.6)
     if close:
         return f"did you mean '{close[0]}'?"
+    if len(", ".join(words)) > LONGEST_LIST:
+        return f"known: {', '.join(get_close_matches(word, words, n=3, cutoff=0.0))} and {len(words) - 3} more"
     return f"known: {', '.join(words)}" if words else "there is none"
 
 
@@ -35,7 +54,7 @@ BRIEF.maxstring = BRIEF.maxother = BRIEF.maxlong = 60
 BRIEF.maxlist = 12
 
 
-def shown(value: object) -> str:
+def quoted(value: object) -> str:
     """Return a value as a short text on one line."""
     if isinstance(value, bool):
         return str(value).lower()

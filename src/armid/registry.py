@@ -93,7 +93,19 @@ class Registry:
 def load_registry(plugins: Iterable[str] = ()) -> Registry:
     """Return the catalogues, the entry points of installed packages, and what `FILE.py:attribute` names.
 
-    Raises ArmidError for a plug-in that cannot be found, fails, belongs to another kind or is none of ours.
+    Parameters
+    ----------
+    plugins : FILE.py:attribute
+        Things of the user, whose code is run.
+
+    Returns
+    -------
+    Registry
+
+    Raises
+    ------
+    ArmidError
+        For a plug-in that cannot be found, fails, belongs to another kind or is none of ours.
     """
     registry = Registry()
     installed = entry_points()
@@ -102,7 +114,7 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
             where = f"entry point '{point.name}' ({point.value}) of armid.{kind}"
             try:
                 thing = point.load()
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 raise ArmidError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
             found = kind_of(thing, where)
             if found != kind:

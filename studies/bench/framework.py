@@ -49,9 +49,9 @@ class Watched:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._thing, name)
 
-    def signal(self, candidates: NDArray[np.float64]) -> Any:
+    def runs(self, candidates: NDArray[np.float64]) -> Any:
         """Simulate, as a replay does."""
-        return self._watch.timed(self._thing.signal, candidates)
+        return self._watch.timed(self._thing.runs, candidates)
 
     def __call__(self, *arguments: Any) -> Any:
         return self._watch.timed(self._thing, *arguments)

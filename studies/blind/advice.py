@@ -8,7 +8,7 @@ from pandas import DataFrame
 from scipy.stats import binomtest
 
 from blind.tables import Table, wilson
-from stand.refusal import RefusalError
+from stand import RefusalError
 from stand.score.judge import Claim, read_claim
 from stand.score.targets import Target
 

@@ -22,19 +22,10 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from pandas import DataFrame
 
-from blind import advice, tables
-from blind.figures import (
-    advice_figure,
-    alarms_figure,
-    answers_figure,
-    bias_figure,
-    counts_figure,
-    held_out_figure,
-    save,
-    sizes_and_times_figure,
-)
-from stand.refusal import RefusalError
-from stand.score.command import judge_all, read_json
+from blind import advice, families, tables
+from blind.figures import advice_figure, counts_figure, held_out_figure, save
+from stand import RefusalError
+from stand.score.judge import judge_all, read_json
 from stand.score.targets import Target, targets_of
 
 WORDS = (
@@ -54,24 +45,9 @@ CONFUSION = (
     "the others, on which the best answer may be silence. Named first of a group: the truth is named, with others that "
     "cannot be told from it. Held by a group: another is named, and the truth among those that cannot be told from it."
 )
-NAMED = (
-    "Single effects and controls, a row each, by what was named first: an effect, a term without a name at a port, or "
-    "nothing. The frame marks the true name; beside it stand groups' first names too."
-)
-ANSWERS = "Campaigns of each class by their judgement; the number of campaigns stands behind the name."
-ALARMS = "Share of the campaigns without any effect on which something was found, with its 95 % Wilson interval."
 HELD_OUT = (
     "RMSE on the records held out over the noise that is really in them, before and after the loop, one pair of marks "
     "a campaign; the dashed line is what is aimed at."
-)
-BIAS = (
-    "Size of the relative errors of the parameters before and after the loop, campaigns of one or two listed effects: "
-    "the box spans the quartiles, the thick line is the median, the whiskers reach from the 5th to the 95th "
-    "percentile. Errors below 0.001 % are drawn there."
-)
-GROUPS = (
-    "Campaigns of listed effects by the size of the group that was named; and, where times are known, the share of the "
-    "campaigns that were closed within so many seconds; the dashed line is at 30 s."
 )
 ADVICE = (
     "Share of the campaigns in which the true effect of the pair stands alone after one record more, with its 95 % "
@@ -126,9 +102,9 @@ def read_results(folder: Path) -> tuple[dict[str, Any], Times]:
 
 def score(key: Mapping[str, Any], reports: Mapping[str, Any], times: Times, out: Path, name: str) -> str:
     """Write page, tables and figures of a suite, and return what is printed."""
-    is_advice = any("choice" in entry for entry in key.values())
+    kinds = {"choice": advice_parts, "fault": families.parts}
     classes = ", ".join(f"{n} {c.replace('_', ' ')}" for c, n in Counter(e["class"] for e in key.values()).items())
-    make = advice_parts if is_advice else suite_parts
+    make = next((make for word, make in kinds.items() if any(word in e for e in key.values())), suite_parts)
     targets, sections = make(key, reports, times, out)
     aims = [t for t in targets if t.met is not None]
     missed = [t.question for t in aims if not t.met]
@@ -175,23 +151,17 @@ def suite_parts(
         save(figure, out / f"{name}.png")
         return f"### {title}\n\n![{title}]({name}.png)\n\n{words}"
 
-    answers, alarms, groups = tables.answers_by_class(every), tables.false_alarms(rows), tables.group_sizes(rows)
-    sections["Answers"] = [answers, drawn("answers", "Answers by class", ANSWERS, answers_figure(answers.frame))]
+    sections["Answers"] = [tables.answers_by_class(every)]
     single = tables.of_class(rows, "single")
     if len(single):
         held, effects = single["matters"].astype(bool), sorted(set(single["truth"]))
         halves = {"moves the held-out error by more than 20 %": single[held], "moves it less": single[~held]}
         counts = {t: tables.answer_counts(p).reindex(effects, fill_value=0) for t, p in halves.items() if len(p)}
-        first = counts_figure({"": tables.first_names(rows)}, "named first", framed=True)
         sections["Answers"] += [
             tables.answers_by_effect(rows),
             drawn("confusion", "True effect and answer", CONFUSION, counts_figure(counts)),
-            drawn("named_first", "True effect and first name", NAMED, first),
         ]
-    sections["False alarms"] = [alarms]
-    some = alarms.frame[alarms.frame["n"] > 0]
-    if len(some):
-        sections["False alarms"].append(drawn("false_alarms", "False alarms", ALARMS, alarms_figure(some, 0.02)))
+    sections["False alarms"] = [tables.false_alarms(rows)]
     for label, title, words in (("two", "Two effects at once", TWO), ("unlisted", "Unlisted effects", UNLISTED),
                                 ("one_stroke", "One stroke only", ONE_STROKE)):  # fmt: skip
         if len(tables.of_class(rows, label)):
@@ -201,11 +171,7 @@ def suite_parts(
     if known:
         figure = held_out_figure(known, 1.10)
         sections["Errors and parameters"].append(drawn("held_out", "Held-out error over its noise", HELD_OUT, figure))
-    if rows["class"].isin(["single", "two"]).any():
-        drawing = drawn("bias", "Bias of the parameters", BIAS, bias_figure(rows, 0.01))
-        sections["Errors and parameters"].append(drawing)
-    figure = sizes_and_times_figure(groups.frame, rows)
-    sections["Groups and times"] = [groups, drawn("groups_and_times", "Sizes of groups, and times", GROUPS, figure)]
+    sections["Groups and times"] = [tables.group_sizes(rows)]
     if times:
         sections["Groups and times"].append(tables.times(rows))
     (out / "campaigns.csv").write_text(every.to_csv(index=False, lineterminator="\n"))

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from pandas import DataFrame, Series
 from scipy.stats import binomtest
 
@@ -289,13 +288,3 @@ def answer_counts(rows: DataFrame) -> DataFrame:
     """Return true effect x answer: numbers of campaigns, every answer a column."""
     counts = rows.groupby(["truth", "answer"]).size().unstack(fill_value=0)
     return counts.reindex(columns=list(ANSWERS), fill_value=0)
-
-
-def first_names(rows: DataFrame) -> DataFrame:
-    """Return true effect x what was named first, for single effects and controls: numbers of campaigns."""
-    some = rows[rows["class"].isin(["single", "control"])]
-    counts = pd.crosstab(some["truth"], some["first"])
-    truths, first = sorted(set(some["truth"]) - {NOTHING}), set(some["first"])
-    others = sorted(first - set(truths) - {NOTHING}, key=lambda name: (":" in name, name))
-    columns = [*(t for t in truths if t in first), *others, *({NOTHING} & first)]
-    return counts.reindex(index=[*truths, *({NOTHING} & set(some["truth"]))], columns=columns, fill_value=0)

@@ -1,17 +1,124 @@
-"""What a campaign holds and how it is written down."""
+"""A campaign: what decides it, what it holds, its figure, and how it is put in its place."""
 
-from dataclasses import dataclass
+import math
+import os
+import shlex
+import shutil
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from stand.gyro import measure, record_times
-from stand.manoeuvre import Manoeuvre
-from stand.motion import Motion
-from stand.settings import Settings, short
-from stand.trajectory import simulate
+from stand import RefusalError
+from stand.arm import KNOWN, NAME, Arm, Manoeuvre, write_manoeuvre
+from stand.effects import Effects
+from stand.gyro import REST_SAMPLES, Gyro, measure, record_times
+from stand.motion import SAMPLES_PER_SECOND, Motion, simulate
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Hold one campaign's settings: the truth, what is told to the arm, how it is measured, where it is written.
+
+    `repeats` records are made of the first manoeuvre and one of each other. `window_s` [s] is what a record asks to be
+    compared in; None leaves the whole record.
+    """
+
+    folder: Path
+    name: str
+    arm: Arm = field(default_factory=Arm)
+    effects: Effects = field(default_factory=Effects)
+    gyro: Gyro = field(default_factory=Gyro)
+    manoeuvres: tuple[Manoeuvre, ...] = (KNOWN["lower"], KNOWN["raise"], KNOWN["short"], KNOWN["empty"])
+    holdout: tuple[str, ...] = ("empty",)
+    repeats: int = 3
+    duration_s: float = 1.2
+    rest_s: float = REST_SAMPLES / SAMPLES_PER_SECOND
+    window_s: tuple[float, float] | None = None
+    seed: int = 1
+    figure: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse settings that make no campaign."""
+        names = [each.name for each in self.manoeuvres]
+        if not NAME.fullmatch(self.name):
+            raise RefusalError(f"the campaign name {self.name!r} must be letters, digits, '_', '-' or '.' (see --name)")
+        if not names or len(set(names)) < len(names):
+            raise RefusalError("the campaign needs at least one manoeuvre and each of them once")
+        if set(names) & {f"{names[0]}_{count}" for count in range(2, self.repeats + 1)}:
+            raise RefusalError(f"a manoeuvre has the name that a repeat of {names[0]} needs for its file")
+        strangers = [name for name in self.holdout if name not in names]
+        if strangers:
+            raise RefusalError(f"the holdout {strangers[0]!r} is none of the campaign's manoeuvres: {', '.join(names)}")
+        if len(set(self.holdout)) == len(names):
+            raise RefusalError("every manoeuvre is held out, so there is nothing to train on")
+        self._check_numbers()
+        self._check_figure()
+
+    def _check_numbers(self) -> None:
+        if self.repeats < 1:
+            raise RefusalError(f"the number of repeats must be 1 or more, not {self.repeats}")
+        if self.seed < 0:
+            raise RefusalError(f"the seed must be 0 or more, not {self.seed}")
+        if not (math.isfinite(self.duration_s) and 0.01 <= self.duration_s <= 10.0):
+            raise RefusalError(f"the duration must lie between 0.01 and 10 s, not {self.duration_s}")
+        if not (math.isfinite(self.rest_s) and 0.1 <= self.rest_s <= 10.0):
+            raise RefusalError(f"the rest must last between 0.1 and 10 s, not {self.rest_s}")
+        if self.window_s and not -0.1 <= self.window_s[0] < self.window_s[1] <= self.duration_s:
+            raise RefusalError(
+                f"the window must rise and lie between -0.1 and {self.duration_s} s, not {self.window_s}"
+            )
+
+    def _check_figure(self) -> None:
+        if self.figure is None:
+            return
+        if Path(self.figure).name != self.figure or Path(self.figure).suffix not in (".png", ".svg", ".pdf"):
+            raise RefusalError(f"the figure {self.figure!r} must be a mere file name that ends in .png, .svg or .pdf")
+        if self.repeats < 2:
+            raise RefusalError("the figure compares repeats, so --repeats must be 2 or more")
+
+    @property
+    def rest_samples(self) -> int:
+        """Give the samples of rest before t = 0."""
+        return round(self.rest_s * SAMPLES_PER_SECOND)
+
+    def command(self) -> str:
+        """Give the full command that makes this campaign again, defaults written out and no absolute path."""
+        folder = Path(self.folder.name) if self.folder.is_absolute() else self.folder
+        told = [each.name if KNOWN.get(each.name) == each else write_manoeuvre(each) for each in self.manoeuvres]
+        words = ["python", "studies/test_stand.py", folder.as_posix(), "--name", self.name]
+        for option in ("p0", "k", "eta3", "n"):
+            words += [f"--{option}", short(getattr(self.arm, option))]
+        words += ["--manoeuvres", ",".join(told), "--holdout", ",".join(self.holdout), "--repeats", str(self.repeats)]
+        for each in fields(self.gyro):
+            option = each.name.replace("range", "gyro_range").replace("_", "-")
+            words += [f"--{option}", short(getattr(self.gyro, each.name))]
+        words += ["--duration", short(self.duration_s), "--seed", str(self.seed)]
+        words += ["--rest", short(self.rest_s)] if self.rest_samples != REST_SAMPLES else []
+        if self.window_s:
+            words += ["--window-s", *(short(edge) for edge in self.window_s)]
+        on = self.effects.switched_on()
+        words += ["--effect", *(f"{name}={short(size)}" for name, size in on.items())] if on else []
+        words += ["--figure", self.figure] if self.figure else []
+        return shlex.join(words)
+
+
+def short(value: float) -> str:
+    """Write a number with as many digits as it has and no more."""
+    return repr(float(value)).removesuffix(".0")
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FloatArray = npt.NDArray[np.float64]
+
+# The simulated arm has the declared constants to the last digit.
+EXACT = ("", "[tolerances]", "default = 0.0")
 
 
 @dataclass(frozen=True)
@@ -80,7 +187,7 @@ def campaign_text(settings: Settings, records: list[Record]) -> str:
     lines.append(f"gyro_range_deg_s = {short(settings.gyro.range_deg_s)}")
     for record in records:
         lines += ["", "[[records]]", *record_lines(record, settings.window_s)]
-    return "\n".join([*lines, ""])
+    return "\n".join([*lines, *EXACT, ""])
 
 
 def record_lines(record: Record, window_s: tuple[float, float] | None = None) -> list[str]:
@@ -123,3 +230,110 @@ def _told(record: Record) -> str:
     told = record.manoeuvre
     load = "with the shell" if told.shell else "without the shell"
     return f"{short(told.start_deg)} to {short(told.target_deg)} deg, {load}, {short(told.supply_volt)} V"
+
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
+"""Okabe and Ito's palette, told apart by colour-blind eyes."""
+
+
+def repeats_figure(records: list[Record], suffix: str) -> bytes:
+    """Draw the repeats of the first record: above as measured, below what each departs from the mean of all.
+
+    Gives the bytes of the file; `suffix` is .png, .svg or .pdf. Speeds in deg/s against time in s.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415 - slow to load and needed for nothing else
+
+    repeats = [each for each in records if records[0].file in (each.file, each.repeat_of)]
+    count = len(repeats)
+    figure = Figure(figsize=(7.0, 4.4 + 0.9 * count), dpi=100, layout="constrained")
+    axes = figure.subplots(1 + count, 1, sharex=True, height_ratios=(4.4, *[0.9] * count))
+    _draw_speeds(axes[0], repeats)
+    _draw_departures(axes[1:], repeats)
+    axes[0].set_title(f"SYNTHETIC records: {count} repeats of the manoeuvre '{repeats[0].manoeuvre.name}'")
+    axes[-1].set_xlabel("Time since the brake opened [s]")
+    buffer = BytesIO()
+    figure.savefig(buffer, format=suffix.removeprefix("."))
+    return buffer.getvalue()
+
+
+def _draw_speeds(axes: "Axes", repeats: list[Record]) -> None:
+    """Draw each repeat over the one before in a thinner line, so that all are seen where they agree."""
+    for index, record in enumerate(repeats):
+        width = 0.8 + 3.2 * (1.0 - (index + 1) / len(repeats))
+        axes.plot(record.time_s, record.speed_deg_s, color=_colour(index), linewidth=width, label=record.file)
+    axes.set_ylabel("Angular velocity\nof the arm [deg/s]")
+    axes.legend(frameon=False)
+    _clean(axes)
+
+
+def _draw_departures(rows: Iterable["Axes"], repeats: list[Record]) -> None:
+    """Draw what each repeat departs from the mean of all, one row each on one scale."""
+    mean = np.mean([record.speed_deg_s for record in repeats], axis=0)
+    largest = max(float(np.abs(record.speed_deg_s - mean).max()) for record in repeats)
+    for index, (axes, record) in enumerate(zip(rows, repeats, strict=True)):
+        departure = record.speed_deg_s - mean
+        axes.plot(record.time_s, departure, color=_colour(index), linewidth=0.6)
+        axes.set_ylim(-1.1 * largest - 1e-3, 1.1 * largest + 1e-3)
+        axes.set_ylabel("[deg/s]")
+        words = f"{record.file} minus the mean of all repeats: rms {np.sqrt(np.mean(departure**2)):.2f} deg/s"
+        axes.set_title(words, loc="left", fontsize="small")
+        _clean(axes)
+
+
+def _colour(index: int) -> str:
+    return COLOURS[index % len(COLOURS)]
+
+
+def _clean(axes: "Axes") -> None:
+    """Leave a light grid, the zero of time, and no box."""
+    axes.grid(color="0.9", linewidth=0.8)
+    axes.axvline(0.0, color="0.5", linewidth=0.8, linestyle=":")
+    axes.margins(x=0.01)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def check_place(folder: Path, force: bool) -> None:
+    """Refuse a place that holds something else; with `force` an earlier campaign may be replaced."""
+    try:
+        if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+            return
+    except OSError as error:
+        raise RefusalError(f"{folder} cannot be read: {error.strerror or error}") from error
+    if not folder.is_dir():
+        raise RefusalError(f"{folder} is a file, so no campaign folder can stand there")
+    if not force:
+        raise RefusalError(f"{folder} is not empty; give --force to replace the campaign in it")
+    if not (folder / "campaign.toml").is_file():
+        raise RefusalError(f"{folder} holds no campaign.toml, so --force will not replace what is in it")
+
+
+def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write the files into a folder beside, then move it into place; an earlier folder goes only when that is done.
+
+    Raises RefusalError when the disk or the rights do not allow it, and leaves then what was there before.
+    """
+    place = folder.resolve()
+    fresh, old = (place.with_name(f".{place.name}.{word}-{os.getpid()}") for word in ("new", "old"))
+    try:
+        fresh.mkdir(parents=True)
+        for name, content in files.items():
+            (fresh / name).write_bytes(content)
+        _exchange(place, fresh, old)
+    except OSError as error:
+        raise RefusalError(f"{folder} cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def _exchange(place: Path, fresh: Path, old: Path) -> None:
+    """Move the fresh folder to its place and drop the one that stood there, which comes back if that fails."""
+    if place.exists():
+        place.rename(old)
+    try:
+        fresh.rename(place)
+    except OSError:
+        if old.exists():
+            old.rename(place)
+        raise
+    shutil.rmtree(old, ignore_errors=True)

@@ -9,15 +9,20 @@ from typing import NoReturn
 
 import numpy as np
 
-from stand.arm import Arm
-from stand.campaign import campaign_text, make_records, readme_text, record_text
+from stand import RefusalError
+from stand.arm import KNOWN, Arm, Manoeuvre, read_manoeuvre
+from stand.campaign import (
+    Settings,
+    campaign_text,
+    check_place,
+    make_records,
+    readme_text,
+    record_text,
+    repeats_figure,
+    write_folder,
+)
 from stand.effects import describe_effects, read_effects
-from stand.figure import repeats_figure
-from stand.folder import check_place, write_folder
 from stand.gyro import Gyro
-from stand.manoeuvre import KNOWN, Manoeuvre, read_manoeuvre
-from stand.refusal import RefusalError
-from stand.settings import Settings
 
 
 class Parser(argparse.ArgumentParser):

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from stand.refusal import RefusalError
-from stand.trajectory import SAMPLES_PER_SECOND, Trajectory
+from stand import RefusalError
+from stand.motion import SAMPLES_PER_SECOND, Trajectory
 
 FloatArray = npt.NDArray[np.float64]
 REST_SAMPLES = 100
@@ -54,11 +54,7 @@ def record_times(trajectory: Trajectory, rest_samples: int = REST_SAMPLES) -> Fl
 
 
 def measure(
-    trajectory: Trajectory,
-    gyro: Gyro,
-    bias_deg_s: float,
-    rng: np.random.Generator,
-    rest_samples: int = REST_SAMPLES,
+    trajectory: Trajectory, gyro: Gyro, bias_deg_s: float, rng: np.random.Generator, rest_samples: int = REST_SAMPLES
 ) -> FloatArray:
     """Give one record of a trajectory [deg/s], rest included: speed plus noise, rounded to steps, kept in range."""
     rest = np.full(rest_samples, bias_deg_s)

@@ -1,9 +1,26 @@
-"""The table that answers a study's question."""
+"""Tables of a study: the overview, success rates, errors by identifier and case, fitnesses, closed loops."""
 
+import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
+import pytest
+from made_results import MadeResults
 
 from armid.study.analyses.analysis import Evidence
+from armid.study.analyses.errors import (
+    MOST_POINTS,
+    brief,
+    end_points,
+    error_map,
+    error_map_figure,
+    thinned,
+    valley_figure,
+)
+from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
+from armid.study.analyses.loops import loop_runs
 from armid.study.analyses.overview import main_table, reasons, runs_table
+from armid.study.analyses.success import success, success_figure, success_rates, wilson
+from armid.study.document import report_of, summary_of
 
 
 def test_the_overview_begins_with_the_paper(made):
@@ -32,3 +49,150 @@ def test_runs_are_counted_with_their_failures_and_reasons(made):
     assert counts["failed"].to_dict() == {"pso": 0, "cmaes": 1, "de+bobyqa": 1}
     found = reasons(evidence.runs).frame.groupby("reason")["n"].sum().to_dict()
     assert found == {"budget used": 13, "failed: it broke": 2}
+
+
+def outcomes_with(errors):
+    return pd.DataFrame({"setting": "noise-free", "variant": "pso", "largest_error": errors})
+
+
+def closed_form(k, n, z=1.959963984540054):
+    """Wilson's interval as its paper gives it."""
+    p, middle = k / n, (k / n + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    return middle - half, middle + half
+
+
+def test_wilson():
+    for k, n in ((0, 25), (1, 25), (8, 10), (25, 25)):
+        assert wilson(k, n) == pytest.approx(closed_form(k, n), abs=1e-12)
+
+
+def test_at_the_tolerance_is_within_a_failed_run_is_no_success_and_an_unknown_truth_no_evidence():
+    rates = success_rates(outcomes_with([1e-2, 0.0099, 0.02, np.inf, np.nan]), [1e-2, 1e-3])
+    assert rates["successes"].tolist() == [2, 0]
+    assert rates["n"].tolist() == [4, 4]
+    assert rates["rate"].tolist() == [0.5, 0.0]
+
+
+def test_success_rates_show_their_interval_in_percent():
+    table = success(success_rates(outcomes_with([1e-5] * 8 + [1.0] * 2)))
+    low, high = closed_form(8, 10)
+    assert table.frame.loc[0, "within_1_percent_text"] == f"80.0 ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def test_the_figure_of_success_has_the_best_on_top():
+    frame = pd.concat([outcomes_with([1.0, 1e-5]), outcomes_with([1e-6, 1e-6]).assign(variant="de")])
+    figure = success_figure(success_rates(frame))
+    assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == ["de", "pso"]
+    plt.close(figure)
+
+
+@pytest.fixture(scope="module")
+def evidence(made):
+    return Evidence(made(seeds=2))
+
+
+def test_the_error_map_has_medians_in_the_orders_given(evidence):
+    runs = evidence.of("noise-free")
+    errors = error_map(runs, ["de+bobyqa", "pso", "unknown"], ["row 2", "row 1"])
+    assert list(errors.index) == ["de+bobyqa", "pso"]
+    assert list(errors.columns) == ["row 2", "row 1"]
+    own = runs[(runs["variant"] == "pso") & (runs["case"] == "row 1")]
+    assert errors.loc["pso", "row 1"] == np.median(own["largest_error"])
+    figure = error_map_figure({"noise-free": errors})
+    assert brief(100.0 * errors.loc["pso", "row 1"]) in {t.get_text() for t in figure.axes[0].texts}
+    plt.close(figure)
+
+
+def test_numbers_of_the_error_map():
+    assert [brief(p) for p in (np.inf, 1.234, 3.2e-7, 0.0)] == ["failed", "1.2", "3e-07", "0"]
+
+
+def test_deviations_in_percent_of_the_valley_and_of_other_machines_first_three_parameters(evidence):
+    ends = end_points(evidence.estimates)
+    assert list(ends.columns) == ["variant", "setting", "p0", "eta3", "n"]
+    rows = evidence.parameters
+    first = rows[(rows["run"] == ends.index[0]) & (rows["parameter"] == "n")].iloc[0]
+    assert ends.iloc[0]["n"] == pytest.approx(100.0 * (first["value"] / first["truth"] - 1.0))
+    renamed = evidence.estimates.replace({"parameter": {"p0": "mass", "eta3": "coulomb.level"}})
+    assert list(end_points(renamed).columns[2:]) == ["mass", "k", "coulomb.level"]
+
+
+def test_figure_draws_every_run_once_a_pair_and_of_very_many_every_nth(evidence):
+    ends = end_points(evidence.estimates)
+    figure = valley_figure(ends, ["pso", "cmaes"])
+    pair = next(axis for axis in figure.axes if axis.get_ylabel().startswith("eta3"))
+    assert sum(len(line.get_xdata()) for line in pair.lines) == len(ends)
+    plt.close(figure)
+    many = ends.loc[np.repeat(ends.index, 100)].reset_index()
+    assert thinned(many).groupby("variant").size().max() <= MOST_POINTS
+
+
+def frame():
+    return pd.DataFrame({
+        "setting": "noise-free", "identifier": "pso", "status": "done", "fitness": ["similarity"] * 4 + ["rmse"] * 4,
+        "train_s": [0.9, 0.99, 0.999, np.nan, 0.9, 0.99, 0.999, 0.9999],
+        "largest_error": [3e-1, 2e-2, 1e-3, np.inf, 1e-3, 2e-3, 3e-3, 4e-3],
+    })  # fmt: skip
+
+
+def test_the_ranks_of_fitnesses_by_hand():
+    table = fitness_quality(frame()).frame.set_index("fitness")
+    # similarity: the better S the smaller the error; rmse: the other way round; a failed run is infinite
+    assert table["correlation"].round(12).to_dict() == {"similarity": 1.0, "rmse": -1.0}
+    assert table.loc["similarity", "median_error"] == (2e-2 + 3e-1) / 2
+    assert table.loc["similarity", "worst_error"] == np.inf
+    assert np.isclose(table.loc["similarity", "median_misfit"], 0.01)
+
+
+def test_the_figure_of_fitnesses_has_a_mark_a_run():
+    figure = fitness_quality_figure(frame())
+    assert [len(line.get_xdata()) for line in figure.axes[0].lines] == [4, 4]
+    plt.close(figure)
+
+
+def report(effects, after, holdout=0.03):
+    error = {"before": {"holdout": {"rmse": holdout}}, "after": {"holdout": None if after is None else {"rmse": after}}}
+    return {"plant": "shell_transfer_arm", "effects": effects, "noise_rms": 0.01, "error": error}
+
+
+@pytest.fixture(scope="module")
+def closed():
+    """Results of three campaigns, one of which failed."""
+    loops = pd.DataFrame({
+        "case": ["c0", "c1"], "verdict": ["explained", "no_discrepancy"], "cpu_seconds": [3.0, 0.5],
+        "seconds": [4.0, 0.6], "report": [report(["tilt", "backlash"], 0.0101), report([], None)],
+    })  # fmt: skip
+    study = {
+        "name": "loops", "question": "What is missing?", "kind": "close_loop", "report": "blind", "text": "x = 1",
+        "campaigns": "campaigns/c", "made_by": "make them", "key": "key.json", "candidates": ["tilt"], "rivals": {},
+        "versions": {"armid": "0"}, "n_planned": 3, "n_done": 2, "n_failed": 1,
+    }  # fmt: skip
+    results = MadeResults(pd.DataFrame({"model": ["m", "m", None]}), pd.DataFrame(), study)
+    results.loops = loops
+    return results
+
+
+def test_each_campaign_has_a_row_with_its_errors_over_the_noise(closed):
+    rows = loop_runs(closed.loops)
+    assert rows["effects"].tolist() == ["tilt + backlash", "nothing"]
+    assert rows["before"].tolist() == pytest.approx([3.0, 3.0])
+    assert rows["after"].tolist() == pytest.approx([1.01, np.nan], nan_ok=True)
+
+
+def test_the_report_counts_verdicts_and_says_what_scores_them(closed, tmp_path):
+    document = report_of(closed, tmp_path / "key.json", {"slow": lambda runs: runs[runs["cpu_seconds"] > 1]})
+    assert document.answer == ("Of 2 campaigns: 1 explained, 1 no discrepancy.",
+                               "Complete: 3 of 3 campaigns, 1 of them failed.")  # fmt: skip
+    assert [t.name for t in document.tables] == ["verdicts", "campaigns", "own_slow"]
+    assert len(document.tables[2].frame) == 1
+    said = " ".join(document.facts)
+    assert "python studies/blind/score.py" in said
+    assert "no machine was measured" in said
+    assert summary_of(closed).main[0].frame["n"].tolist() == [1, 1]
+
+
+def test_campaigns_that_all_failed_are_no_finding(closed):
+    failed = MadeResults(closed.runs, closed.parameters, closed.study | {"n_done": 0, "n_failed": 3})
+    failed.loops = closed.loops[:0]
+    assert report_of(failed).answer[0] == "No campaign was closed."

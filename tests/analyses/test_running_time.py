@@ -1,4 +1,4 @@
-"""Expected running times, and ECDFs over runs and targets."""
+"""Expected running times, ECDFs over runs and targets, data profiles, convergence bands, lines with names."""
 
 from types import SimpleNamespace
 
@@ -8,9 +8,14 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import minimize
 
-from armid.study.analyses.analysis import TARGETS
+from armid.report.style import panel_height, spread
+from armid.study.analyses.analysis import TARGETS, Evidence
+from armid.study.analyses.convergence import band, convergence_figure
 from armid.study.analyses.running_time import (
+    data_profile,
+    data_profile_figure,
     ecdf_figure,
     expected_running_time,
     running_time,
@@ -75,3 +80,61 @@ def test_lines_end_where_no_run_hits_and_are_named_in_the_order_of_their_ends():
     names = sorted(figure.axes[0].texts, key=lambda t: t.get_position()[1])
     assert [t.get_text() for t in names] == ["near", "far"]
     plt.close(figure)
+
+
+def test_data_profile_by_hand():
+    hits, n = np.array([10.0, 50.0, np.inf]), np.array([4, 4, 9])
+    assert data_profile(hits, n, np.array([1.0, 2.0, 9.9, 10.0, 1e9])) == pytest.approx([0, 1 / 3, 1 / 3, 2 / 3, 2 / 3])
+
+
+def test_one_panel_a_setting_and_share(made):
+    figure = data_profile_figure(Evidence(made(seeds=1)))
+    titles = [axis.get_title() for axis in figure.axes]
+    assert titles == [f"{s}, {t} left" for s in ("noise-free", "0.3 deg/s") for t in ("0.1", "0.001", "1e-05")]
+    plt.close(figure)
+
+
+def test_quartiles_of_a_band_are_values_that_runs_had():
+    runs = np.array([[np.inf, 4.0], [np.inf, 3.0], [8.0, 2.0], [9.0, 1.0]], np.float32)
+    assert band(runs).tolist() == [[8.0, 1.0], [9.0, 2.0], [np.inf, 3.0]]
+
+
+def test_one_panel_a_variant_with_a_band_a_setting_and_runs_of_another_fitness_left_out():
+    of = {v: np.array([2 * i, 2 * i + 1]) for i, v in enumerate(("pso", "de", "ga", "other"))}
+    evidence = SimpleNamespace(groups={"noise-free": of, "0.3 deg/s": of},
+                               runs=pd.DataFrame({"budget": [100] * 2 + [10] * 6}),
+                               histories=SimpleNamespace(grid=np.array([1, 10, 100])))  # fmt: skip
+    values = np.array([[np.inf, 1.0, 1e-12], [2.0, 0.5, 1e-3]] * 4)
+    figure = convergence_figure(evidence, np.arange(8) < 6, values, "error", floor=1e-6)
+    assert [axis.get_title() for axis in figure.axes] == ["pso", "de", "ga"]
+    assert [len(axis.collections) for axis in figure.axes] == [2, 2, 2]
+    assert np.nanmin(figure.axes[0].lines[1].get_ydata()) == 1e-6
+    # a curve ends where the budget does
+    assert [np.isnan(axis.lines[1].get_ydata()).tolist() for axis in figure.axes[:2]] == [
+        [False] * 3,
+        [False, False, True],
+    ]
+    plt.close(figure)
+
+
+HEIGHTS = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=18).map(sorted)
+
+
+@given(HEIGHTS)
+def test_names_do_not_overlap_and_stay_beside_the_axes(heights):
+    apart = 0.05
+    places = spread(heights, apart)
+    assert (np.diff(places) >= apart - 1e-9).all()
+    assert min(places) >= -1e-9
+    assert max(places) <= 1.0 + 1e-9
+
+
+def test_names_move_as_little_as_it_takes():
+    heights, apart = [0.30, 0.31, 0.33, 0.7], 0.1
+    limits = [{"type": "ineq", "fun": lambda x, i=i: x[i + 1] - x[i] - apart} for i in range(3)]
+    best = minimize(lambda x: np.sum((x - heights) ** 2), heights, constraints=limits).x
+    assert np.allclose(spread(heights, apart), best, atol=1e-4)
+
+
+def test_twenty_names_have_room():
+    assert (panel_height(20) - 1.0) / 20 >= 0.2

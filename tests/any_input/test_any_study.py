@@ -6,8 +6,7 @@ from pathlib import Path
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from mutated import mutated, toml_of
-from reading_whatever import ARM_CSV, ARM_TOML, edited, edits, many, outcome
+from reading_whatever import ARM_CSV, ARM_TOML, edited, edits, many, mutated, outcome, toml_of
 
 from armid.study.tasks import Study, read_study
 

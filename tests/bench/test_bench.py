@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from inspect import signature
 from itertools import count
 from pathlib import Path
 
@@ -14,26 +15,10 @@ from armid.record import read_campaign
 from bench import __main__ as bench
 from bench import processes
 from bench.baselines import plain_loop, solve_with_scipy
-from bench.engine import (
-    ALLOWED,
-    effects_row,
-    engine_rows,
-    fitness_rows,
-    loosest_tolerance,
-    scipy_outputs,
-    threads_row,
-)
+from bench.engine import ALLOWED, effects_row, engine_rows, fitness_rows, loosest_tolerance, scipy_outputs, threads_row
 from bench.framework import framework_rows, identification, pymoo_framework, sample_replays
 from bench.measure import Bound, Row, Stopwatch, bench_table, fastest, number
-from bench.processes import (
-    beyond_output,
-    grown,
-    measured_apart,
-    memory_rows,
-    peak_memory,
-    scale_rows,
-    startup_row,
-)
+from bench.processes import beyond_output, grown, measured_apart, memory_rows, peak_memory, scale_rows, startup_row
 from bench.samples import NOISE, arm_task, child_environment, write_sample
 
 ROWS = [
@@ -75,8 +60,7 @@ def test_the_table_says_in_words_what_falls_short_and_what_else_to_know() -> Non
 
 
 @pytest.mark.parametrize(
-    ("value", "text"),
-    [(123456.7, "123,457"), (38.42, "38.4"), (0.61749, "0.617"), (0.0, "0.00"), (0.00002, "2.0e-05")],
+    ("value", "text"), [(123456.7, "123,457"), (38.42, "38.4"), (0.61749, "0.617"), (0.0, "0.00"), (0.00002, "2.0e-05")]
 )
 def test_numbers_have_three_digits(value: float, text: str) -> None:
     assert number(value) == text
@@ -112,8 +96,11 @@ def test_a_run_measures_every_part_in_turn(monkeypatch: pytest.MonkeyPatch) -> N
     assert bench.run_bench() == ROWS[:3]
 
 
-def test_quick_has_the_same_parts() -> None:
-    assert list(bench.bench_parts(quick=True)) == list(bench.bench_parts())
+def test_quick_has_the_same_parts_with_options_that_they_take() -> None:
+    quick = bench.bench_parts(quick=True)
+    assert list(quick) == list(bench.bench_parts())
+    for part in quick.values():
+        assert part.keywords.keys() <= signature(part.func).parameters.keys()
 
 
 def assert_measured(row: Row) -> None:
@@ -239,7 +226,9 @@ print(peak_memory() - before > 0.5 * taken.nbytes)
     assert ran.stdout.strip() == "True"
 
 
-def test_start_up_calls_the_command_with_a_campaign() -> None:
+def test_start_up_calls_the_command_with_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # a folder of its own: other tests compile into the shared one meanwhile
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     row = startup_row(rounds=1, command=STAND_IN, n_samples=60)
     assert 0 < row.ratio < np.inf
     assert "compiled nothing" in row.note

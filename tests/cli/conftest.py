@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from armid.cli.main import main
+from armid.errors import LONGEST
 
 PLUGINS = '''\
 """Things of a user."""
@@ -111,6 +112,7 @@ def refused(run: Callable[..., Ran]) -> Callable[..., str]:
         assert (ran.code, ran.out) == (2, "")
         assert ran.err.startswith("armid: ")
         assert ran.err.count("\n") == 1
+        assert len(ran.err) <= len("armid: ") + LONGEST + 1
         return ran.err
 
     return sentence

@@ -1,9 +1,14 @@
 """Folders that cannot be written and disks that are full: one sentence, and what was there stays as it was."""
 
+import os
+import re
 import shutil
 import subprocess
+import sys
 
 import pytest
+
+from armid.report.result import beside
 
 LOOP = ("--candidates", "viscous", "--threads", "1")
 
@@ -68,13 +73,17 @@ def test_a_page_for_a_read_only_folder(run, refused, axis, disk):
 
 
 @pytest.mark.parametrize("command", ["identify", "simulate", "new", pytest.param("close-loop", marks=pytest.mark.slow)])
-def test_a_full_disk_leaves_nothing_half_written(run, axis, disk, command):
+def test_a_full_disk_leaves_nothing_half_written(run, axis, disk, command, monkeypatch):
     folder = disk("40k")
     (folder / "kept").write_bytes(b"k" * (40_960 if command == "new" else 24_000))
     ran = run(command, *commands(axis, folder)[command])
     assert ran.code == 2, ran
     assert ran.err.count("\n") == 1
-    assert "No space left on device" in ran.err
+    # a search is not begun; what needs none names the file for which no room was left
+    assert "MB are left on its disk" in ran.err or re.search(r"\w+\.\w+ cannot be used: No space left", ran.err)
+    monkeypatch.setattr("armid.report.result.LEAST_ROOM", 0)
+    ran = run(command, *commands(axis, folder)[command])
+    assert re.search(r"\w+\.\w+ cannot be used: No space left on device", ran.err), ran
     assert [p.name for p in folder.iterdir()] == ["kept"]
 
 
@@ -82,3 +91,24 @@ def test_a_campaign_for_a_full_disk(refused, disk):
     folder = disk("12k")
     assert "No space left on device" in refused("new", "campaign", "mine", "--out", folder)
     assert list(folder.iterdir()) == []
+
+
+def test_files_of_two_runs_are_no_result(run, refused, small_folder, tmp_path):
+    """As a run leaves them that is killed between two moves; what it had not moved goes with the next."""
+    words = ("identify", small_folder, "--window", "0:0.7", "--budget", "80", "--identifier", "random")
+    for seed in (1, 2):
+        assert run(*words, "--seed", seed, "--out", tmp_path / str(seed)).code == 0
+    assert run("report", tmp_path / "1").code == 0
+    for name, other in (("result.json", "details.json"), ("details.json", "manifest.json")):
+        shutil.copy(tmp_path / "2" / name, tmp_path / "1" / name)
+        assert "1 holds the files of two runs" in refused("report", tmp_path / "1")
+        shutil.copy(tmp_path / "2" / other, tmp_path / "1" / other)
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    left = [tmp_path / "1" / f"{beside()}{pid}-x" for pid in (ended.pid, os.getpid())]
+    for folder in left:
+        folder.mkdir()
+        (folder / "fit.png").write_text("")
+    assert run(*words, "--out", tmp_path / "1").code == 0
+    assert [folder.exists() for folder in left] == [False, True]
+    assert run("report", tmp_path / "1").code == 0

@@ -26,14 +26,24 @@ def read_until(terminal, word, seconds=60.0):
     return shown
 
 
-def test_ctrl_c_loses_nothing(small_folder, tmp_path):
+@pytest.mark.parametrize(
+    ("number", "handler"),
+    [(signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.default_int_handler),
+     (signal.SIGTERM, signal.SIG_IGN)],
+)  # fmt: skip
+def test_ctrl_c_and_a_request_to_end_lose_nothing(small_folder, tmp_path, number, handler):
     terminal, theirs = pty.openpty()
     command = [sys.executable, "-m", "armid", "identify", str(small_folder), "--budget", "100000000",
                "--window", "0:0.7", "--out", str(tmp_path / "out")]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
+    before = signal.signal(signal.SIGINT, handler)  # a child goes on ignoring what is ignored
+    try:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, text=True)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    with process:
         os.close(theirs)
         shown = read_until(terminal, b"best 0.0")
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         text, _ = process.communicate(timeout=60)
     os.close(terminal)
     assert b"/100000000 simulations" in shown
@@ -42,7 +52,9 @@ def test_ctrl_c_loses_nothing(small_folder, tmp_path):
     assert result["stopped"] == "interrupted"
     assert 0 < result["used"] < 100_000_000
     assert result["error"]["train"]["s"] > 0.9
-    assert {"convergence.png", "fit.png", "result.json", "report.html"} <= set(os.listdir(tmp_path / "out"))
+    there = set(os.listdir(tmp_path / "out"))
+    assert {"convergence.png", "fit.png", "result.json", "report.html"} <= there
+    assert not any(name.startswith(".") for name in there)
     assert f"{result['used']} of 100000000 simulations used, interrupted; seed 1." in text
 
 

@@ -115,7 +115,6 @@ def test_an_axis_without_a_value_for_its_mass(refused, write_axis, tmp_path):
 
 @pytest.mark.parametrize("folder_is_there", [True, False])
 def test_nothing_half_written_stays(run, paper_arm_folder, tmp_path, monkeypatch, folder_is_there):
-    from armid.cli import simulate
     from armid.record import write_table
 
     def failing(path, columns):
@@ -127,7 +126,7 @@ def test_nothing_half_written_stays(run, paper_arm_folder, tmp_path, monkeypatch
     if folder_is_there:
         out.mkdir()
         (out / "lower.csv").write_text("of yesterday\n")
-    monkeypatch.setattr(simulate, "write_table", failing)
+    monkeypatch.setattr("armid.estimation.simulated.write_table", failing)
     ran = run("simulate", paper_arm_folder, "--out", out)
     assert ran.code == 2
     assert "raise.csv cannot be used: No space left on device" in ran.err

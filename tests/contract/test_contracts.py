@@ -1,6 +1,11 @@
-"""Every registered plant, effect, fitness and identifier keeps its contract."""
+"""Every registered plant, effect, fitness and identifier keeps its contract; a seed holds across processes."""
 
+import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +18,7 @@ from armid.problem.fitness import FITNESS
 
 ARM = PLANTS["shell_transfer_arm"]
 AXIS = replace(PLANTS["driven_axis"].for_unit("m/s"), variants=())
+LONG = ("shell_transfer_arm_elastic", "flexible_link")
 COMPOSED = (
     "pso+bobyqa", "de+nelder_mead", "pso+least_squares", "cmaes+least_squares", "multistart:bobyqa",
     "multistart:least_squares", "random+multistart:slsqp", "pymoo_pso+cobyla+sbplx",
@@ -25,22 +31,33 @@ def failures(findings):
 
 
 @pytest.mark.parametrize(("kind", "name", "thing"), [
-    pytest.param(kind, name, thing, id=f"{kind}-{name}")
+    pytest.param(kind, name, thing, id=f"{kind}-{name}", marks=[pytest.mark.slow] if name in LONG else [])
     for kind, things in (("plants", PLANTS), ("fitness", FITNESS), ("identifiers", IDENTIFIERS))
-    for name, thing in things.items()
+    for name, thing in things.items() if not getattr(thing, "package", "")
 ])  # fmt: skip
 def test_registered_things_keep_their_contract(kind, name, thing):
-    found = check_thing(kind, name, thing)
+    found = list(check_thing(kind, name, thing))
     assert failures(found) == []
     if name == "driven_axis":
         assert {f.name.split(", ")[1] for f in found} == {"driven_axis in m/s", "driven_axis in rad/s"}
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, i in IDENTIFIERS.items() if i.package])
+def test_identifiers_of_other_libraries_keep_their_contract(name, monkeypatch):
+    pytest.importorskip(IDENTIFIERS[name].package)
+    monkeypatch.setattr("armid.contract.identifier.BUDGET", 140)
+    monkeypatch.setattr("armid.contract.identifier.CUT_AT", 70)
+    assert failures(check_identifier(IDENTIFIERS[name])) == []
+
+
 # All effects in one compiled model of a plant, all but one at their nulls.
 @pytest.mark.slow
-@pytest.mark.parametrize("plant", [ARM, AXIS], ids=["arm", "axis"])
+@pytest.mark.parametrize("plant", [ARM, AXIS, PLANTS["flexible_link"]], ids=["arm", "axis", "link"])
 def test_every_effect_keeps_its_contract(plant):
-    effects = list(applicable(EFFECTS, plant).values())
+    """On the link those that no other plant takes."""
+    others = applicable(EFFECTS, ARM) if plant.name == "flexible_link" else {}
+    effects = [e for name, e in applicable(EFFECTS, plant).items() if name not in others]
     found = check_effects(effects, {plant.name: plant}, strict=True)
     assert {e.name: failures(points) for e, points in zip(effects, found, strict=True) if failures(points)} == {}
     points = {f.name.split(" on ")[0].split(" in ")[0] for f in found[0]}
@@ -51,7 +68,7 @@ def test_every_effect_keeps_its_contract(plant):
 @pytest.mark.slow
 def test_one_effect_keeps_its_contract_by_itself():
     """As `armid check` tries it: compiled alone, in each of its forms."""
-    found = check_effect(EFFECTS["worm_speed"], {"driven_axis": AXIS}, strict=True)
+    found = list(check_effect(EFFECTS["worm_speed"], {"driven_axis": AXIS}, strict=True))
     assert failures(found) == []
     assert {f.name.rpartition(" in the form ")[2] for f in found} == {f.form for f in EFFECTS["worm_speed"].every_form}
 
@@ -59,3 +76,37 @@ def test_one_effect_keeps_its_contract_by_itself():
 @pytest.mark.parametrize("name", COMPOSED)
 def test_composed_identifiers_keep_their_contract(name):
     assert failures(check_identifier(identifier_of(name, IDENTIFIERS))) == []
+
+
+OWN = [n for n, i in IDENTIFIERS.items() if not i.package]
+NAMES = (*OWN, "pso+bobyqa", "de+nelder_mead+sbplx", "cmaes+least_squares", "multistart:lbfgs")
+SCRIPT = """
+import hashlib, json, sys
+from armid.contract.identifier import BUDGET, Trial, run
+from armid.identifiers import IDENTIFIERS, identifier_of
+from armid.problem.meter import Meter
+found = {}
+for name in sys.argv[1:]:
+    log = run(identifier_of(name, IDENTIFIERS), 7, Trial(Meter(BUDGET), holes=True))[0].log()
+    found[name] = hashlib.sha256(log.X.tobytes() + log.F.tobytes()).hexdigest()
+print(json.dumps(found))
+"""
+
+
+def logs(hash_seed: str) -> dict[str, str]:
+    """Fingerprint of each identifier's log, from a process of its own."""
+    paths = [str(Path(__file__).parents[2] / "src"), os.environ.get("PYTHONPATH", "")]
+    told = os.environ | {"PYTHONHASHSEED": hash_seed, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
+    told_to = [sys.executable, "-c", SCRIPT, *NAMES]
+    done = subprocess.run(told_to, env=told, stdout=subprocess.PIPE, text=True, check=True)
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.mark.slow
+def test_two_processes_ask_for_the_same() -> None:
+    first, second = logs("1"), logs("2")
+    assert set(first) == set(NAMES)
+    # bipop_cmaes is cmaes until its first restart, which this budget does not reach.
+    assert first.pop("bipop_cmaes") == first["cmaes"]
+    assert len(set(first.values())) == len(first)
+    assert second == first | {"bipop_cmaes": first["cmaes"]}

@@ -24,7 +24,7 @@ def test_agrees_with_reference_trajectories(number: int) -> None:
         "shell": float(row["shell"]), "U": float(row["supply_V"]),
     }  # fmt: skip
     candidate = np.array([float(row["p0_MPa"]) * 1e6, float(row["k"]), float(row["eta3"]), float(row["n"])])
-    found = simulate_plainly(Model(PLANTS["shell_transfer_arm"]), Manoeuvre(0.004, 201, constants), candidate)
+    found = simulate_plainly(Model(PLANTS["shell_transfer_arm"]), Manoeuvre(0.004, 201, constants), candidate)[0]
     assert np.abs(found - expected).max() <= 2e-8
 
 
@@ -34,7 +34,7 @@ def drive(shape: str) -> Manoeuvre:
 
 
 def test_agrees_with_a_ramp_against_viscous_friction() -> None:
-    found = simulate_plainly(Model(PLANTS["driven_axis"]) + EFFECTS["viscous"], drive("ramp"), np.array([3.0, 6.0]))
+    found = simulate_plainly(Model(PLANTS["driven_axis"]) + EFFECTS["viscous"], drive("ramp"), np.array([3.0, 6.0]))[0]
     lag = 0.5
     expected = 5.0 / 6.0 * (TIMES - lag * (1.0 - np.exp(-TIMES / lag))) + 0.9 * np.exp(-TIMES / lag)
     np.testing.assert_allclose(found, expected, atol=1e-10)
@@ -46,7 +46,7 @@ def test_takes_the_drive_as_it_is_held(hold: str) -> None:
     values = manoeuvre.inputs["u"]
     steps = values[:-1] if hold == "zero" else 0.5 * (values[1:] + values[:-1])
     expected = 0.9 + np.concatenate([[0.0], np.cumsum(steps)]) * 0.01 / 3.0
-    np.testing.assert_allclose(simulate_plainly(Model(PLANTS["driven_axis"]), manoeuvre, np.array([3.0])), expected,
+    np.testing.assert_allclose(simulate_plainly(Model(PLANTS["driven_axis"]), manoeuvre, np.array([3.0]))[0], expected,
                                atol=1e-10)  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def pace(v):
 def test_switches_once_and_between_samples() -> None:
     late = Effect("late", (Parameter("level", "effort", 0, 9, null=0.0),), {"torque": brake},
                   guards=(Guard("on", still, latch=True),))  # fmt: skip
-    found = simulate_plainly(Model(PLANTS["driven_axis"]) + late, drive("none"), np.array([3.0, 6.0]))
+    found = simulate_plainly(Model(PLANTS["driven_axis"]) + late, drive("none"), np.array([3.0, 6.0]))[0]
     np.testing.assert_allclose(found, 0.9 - 2.0 * np.maximum(TIMES - 0.503, 0.0), atol=1e-9)
 
 
@@ -91,5 +91,5 @@ def test_lands_on_kinks_and_carries_added_states() -> None:
     """Above 0.7 the speed falls exponentially to it and never arrives."""
     bent = Effect("bent", (Parameter("level", "effort", 0, 9, null=0.0),), {"torque": corner},
                   (State("way", "m", pace, nothing),), (Guard("edge", at_corner),))  # fmt: skip
-    found = simulate_plainly(Model(PLANTS["driven_axis"]) + bent, drive("none"), np.array([3.0, 6.0]))
+    found = simulate_plainly(Model(PLANTS["driven_axis"]) + bent, drive("none"), np.array([3.0, 6.0]))[0]
     np.testing.assert_allclose(found, 0.7 + 0.2 * np.exp(-2.0 * TIMES), atol=1e-9)

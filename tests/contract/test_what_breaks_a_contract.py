@@ -1,7 +1,7 @@
 """Each point of a contract is missed by something: here is what misses it."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from threading import Thread
@@ -17,6 +17,7 @@ from armid.contract.check import check_fitness
 from armid.contract.equations import check_effect, check_effects, check_plant
 from armid.contract.identifier import check_identifier
 from armid.contract.trials import ContractPoint
+from armid.errors import ArmidError
 from armid.identifiers import as_identifier
 from armid.model import EFFECTS, PLANTS, Effect, Guard, Parameter, State
 from armid.problem.fitness import Fitness
@@ -30,8 +31,9 @@ def drag(omega, level):
     return -level * omega
 
 
-def failed(findings: list[ContractPoint]) -> dict[str, str]:
+def failed(points: Iterable[ContractPoint]) -> dict[str, str]:
     """Name -> sentence of the points that do not hold, without the plant's name."""
+    findings = list(points)
     assert all(f.sentence and "\n" not in f.sentence for f in findings)
     return {f.name.split(" on driven")[0].split(", driven")[0]: f.sentence for f in findings if not f.passed}
 
@@ -148,11 +150,15 @@ def test_a_plant_misses_points() -> None:
         axis,
         guards=(Guard("never", never), Guard("later", later, latch=True)),
         parameters=(replace(axis.parameters[0], unit="", nominal=9.0),),
-        output_unit="deg/s",
     )
     points = failed(check_plant(broken))
-    assert set(points) == {"guards", "units", "values", "unit"}
+    assert set(points) == {"guards", "units", "values"}
     assert points["guards"] == "nothing depends on guard never, later, or it never moves"
+
+
+def test_an_output_in_a_unit_that_is_not_si_is_refused() -> None:
+    with pytest.raises(ArmidError, match="has the unit 'deg/s': did you mean 'rad/s'"):
+        replace(AXIS["driven_axis"], output_unit="deg/s")
 
 
 def test_a_plant_that_does_not_bind_is_told_so() -> None:
@@ -291,5 +297,5 @@ def test_an_identifier_that_forgets_its_seed_is_found() -> None:
 def test_the_global_generators_are_left_alone() -> None:
     random.seed(5)
     state = random.getstate()
-    check_identifier(as_identifier("own", DE))
+    list(check_identifier(as_identifier("own", DE)))
     assert random.getstate() == state

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from armid.engine import cache_folder, compile_model, simulate
+from armid.engine.cache import unusable
 from armid.engine.compile import load_module, module_name
 from armid.engine.generate import kernel_parts
-from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
 
 SCRIPT = """
@@ -46,8 +46,8 @@ def result(process: subprocess.Popen[str]) -> dict[str, float]:
 
 
 def listing(folder: Path) -> dict[str, tuple[int, int]]:
-    """Every file of compiled code with its size and time of change; Python's own bytecode is another matter."""
-    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*") if p.suffix in (".nbc", ".nbi")}
+    """Every file of the cache with its size and time of change."""
+    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*")}
 
 
 @pytest.mark.slow
@@ -60,7 +60,7 @@ def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     assert any(f["misses"] == 1 for f in first)
     assert (again["hits"], again["misses"]) == (1, 0)
     assert listing(folder) == kept
-    assert len(list(folder.glob("*.py"))) == 1
+    assert len(list(folder.glob("*.py.bin"))) == 1
     assert not list(folder.glob("*.part"))
     assert {f["last"] for f in first} == {again["last"]}
 
@@ -94,24 +94,66 @@ def test_a_known_model_is_looked_up(arm: Model) -> None:
     assert compile_model(arm)[0] is compile_model(Model(PLANTS["shell_transfer_arm"]))[0]
 
 
-def test_a_cache_folder_that_cannot_be_written_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    blocked = tmp_path / "a file"
-    blocked.write_text("")
-    monkeypatch.setenv("ARMID_CACHE", str(blocked / "cache"))
-    with pytest.raises(ArmidError, match=r"the cache folder .*cache cannot be written \(.+\): set ARMID_CACHE"):
-        load_module(kernel_parts(Model(PLANTS["driven_axis"]), 2))
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a file").write_text("")
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path / "a file" / "cache"))
+    parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
+    monkeypatch.delitem(sys.modules, module_name(parts), raising=False)
+    with pytest.warns(UserWarning, match=r"compiled code is not kept: .*cache cannot be used \(Not a directory\)"):
+        assert load_module(parts).simulate
+
+
+def damaged(content: bytes) -> list[bytes]:
+    flipped = bytearray(content)
+    flipped[len(content) // 2] ^= 4
+    return [b"", content[: len(content) // 2], bytes(len(content)), bytes(flipped), b"raise SystemExit"]
 
 
 def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
-    name, text = module_name(parts), parts.text()
-    file = tmp_path / f"{name}.py"
-    for damaged in ("", text[:-40], text.replace("0.5", "0.6", 1), "raise SystemExit\n"):
+    name = module_name(parts)
+    monkeypatch.delitem(sys.modules, name, raising=False)
+    load_module(parts)
+    file = tmp_path / f"{name}.py.bin"
+    whole = file.read_bytes()
+    for content in damaged(whole):
         monkeypatch.delitem(sys.modules, name, raising=False)
-        file.write_text(damaged, encoding="utf-8")
+        file.write_bytes(content)
         load_module(parts)
-        assert file.read_text(encoding="utf-8") == text
+        assert file.read_bytes() == whole
+
+
+@pytest.mark.slow
+def test_damaged_code_is_compiled_again(tmp_path: Path) -> None:
+    """No other number, no traceback, whatever became of the files; and they are mended."""
+    first = result(start(tmp_path))
+    for i, kind in enumerate(("emptied", "cut", "zeroed", "flipped")):
+        for file in listing(tmp_path):
+            Path(file).write_bytes(damaged(Path(file).read_bytes())[i])
+        again, then = result(start(tmp_path)), result(start(tmp_path))
+        assert (again["misses"], again["last"]) == (1, first["last"]), kind
+        assert (then["hits"], then["last"]) == (1, first["last"]), kind
+
+
+def test_a_cache_that_others_may_write_is_closed_or_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    ours, mixed = tmp_path / "ours", tmp_path / "mixed"
+    for folder, file in ((ours, "armid_code_x.bin"), (mixed, "letters.txt")):
+        folder.mkdir()
+        folder.chmod(0o777)
+        (folder / file).write_text("")
+    assert unusable(ours) == ""
+    assert ours.stat().st_mode & 0o777 == 0o700
+    assert "it holds more than compiled code" in unusable(mixed)
+    assert mixed.stat().st_mode & 0o777 == 0o777
+    assert unusable(tmp_path / "new") == ""
+    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
+    uid = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: uid + 1)
+    (tmp_path / "theirs").mkdir()
+    assert unusable(tmp_path / "theirs") == "it is somebody else's"
 
 
 def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -178,7 +178,7 @@ def test_what_the_plant_says_of_an_input_wins():
 @pytest.mark.parametrize("hold", ["linear", "zero"])
 def test_the_plain_reference_holds_alike(hold):
     manoeuvre = Manoeuvre(INTERVAL, 60, inputs={k: v[:60] for k, v in INPUTS.items()}, hold=hold)
-    plain = simulate_plainly(Model(CART), manoeuvre, np.array([1.3]))
+    plain = simulate_plainly(Model(CART), manoeuvre, np.array([1.3]))[0]
     np.testing.assert_allclose(simulate(Model(CART), manoeuvre, [[1.3]]).output[0], plain, atol=1e-9)
 
 

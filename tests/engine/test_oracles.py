@@ -15,12 +15,11 @@ STUDIES = str(Path(__file__).parents[2] / "studies")
 if STUDIES not in sys.path:
     sys.path.insert(0, STUDIES)
 
-from stand.arm import Arm  # noqa: E402 - found on the path above
+from stand import RefusalError  # noqa: E402 - found on the path above
+from stand.arm import KNOWN, Arm  # noqa: E402
 from stand.effects import Effects  # noqa: E402
-from stand.manoeuvre import KNOWN  # noqa: E402
 from stand.motion import Motion  # noqa: E402
-from stand.refusal import RefusalError  # noqa: E402
-from stand.trajectory import simulate as simulate_on_stand  # noqa: E402
+from stand.motion import simulate as simulate_on_stand  # noqa: E402
 
 ScheduleFor = Callable[[str, str], Schedule]
 ERROR = {"standard": 1e-5, "fine": 2e-7}

@@ -1,6 +1,7 @@
 """Manoeuvres that could be made next: what the reader accepts, what the machine can do, what a record would buy."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from armid.estimation.design import (
     Motions,
     Offer,
     as_recorded,
-    expected_level,
+    expected_levels,
     gain,
     is_place,
     key_travel,
@@ -182,7 +183,7 @@ def bought(paper_arm, arm, arm_space):
     motions = Motions(told, TRUTH, paper_arm.gyro_range)
 
     def ranked(by, level=Level(NOISE, 1.0)):
-        return offers(motions, grid, arm_space, TRUTH, information.fisher, level, by)
+        return offers(motions, grid, arm_space, TRUTH, information.fisher, [level], by)
 
     return told, information, ranked
 
@@ -232,7 +233,9 @@ def test_what_was_not_determined_counts_with_its_box():
 
 
 def test_the_level_to_expect():
-    level = expected_level([Level(1.0, 1.0), Level(7.0, 0.5, from_residual=True)])
+    told = [SimpleNamespace(place=place) for place in (0, 1, 0)]
+    level, other = expected_levels(told, [Level(1.0, 1.0), Level(0.1, 1.0), Level(7.0, 0.5, from_residual=True)])
+    assert (other.rms, other.from_residual) == (0.1, False)
     assert (level.rms, level.effective_fraction, level.from_residual) == (5.0, 0.75, True)
 
 

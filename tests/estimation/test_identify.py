@@ -181,7 +181,8 @@ def test_records_joined(several):
     assert joined.rmse == pytest.approx(np.sqrt(np.mean(misses**2)), rel=1e-12)
     assert joined.chi2_per_sample == pytest.approx(np.mean((misses / noise) ** 2), rel=1e-12)
     assert joined.nrmse == pytest.approx(np.sqrt(n @ [e.nrmse**2 for e in each] / n.sum()), rel=1e-12)
-    degrees = np.array([similarity(x, y[np.newaxis], 1e-3) for x, y in pairs])[:, :, 0]
+    levels = [r.record.noise.rms for r in several]
+    degrees = np.array([similarity(x, y[None], 1e-3, noise=rms) for (x, y), rms in zip(pairs, levels)])[:, :, 0]
     np.testing.assert_allclose([joined.s, joined.s1, joined.s2], seconds @ degrees / seconds.sum(), rtol=1e-12)
 
 

@@ -42,10 +42,8 @@ def of_row(tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch):
     known = set(sys.modules)
 
     def campaign(truth: tuple[float, ...]) -> Campaign:
-        from stand.arm import Arm
-        from stand.manoeuvre import KNOWN
-        from stand.motion import Motion
-        from stand.trajectory import simulate
+        from stand.arm import KNOWN, Arm
+        from stand.motion import Motion, simulate
 
         moved = simulate(Motion(Arm(*truth), KNOWN["lower"]), 0.7)
         (tmp_path / "campaign.toml").write_text(TOML)

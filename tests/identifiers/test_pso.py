@@ -340,7 +340,7 @@ def test_as_identifier() -> None:
 
 @pytest.mark.parametrize(("obj", "sentence"), [
     (PaperPSO(), "is a PaperPSO built already, expected a subclass"),
-    (3, "is 3, expected a subclass of pymoo's Algorithm or a function of the budget"),
+    (3, "is 3, expected a subclass of pymoo's Algorithm, a function of the budget"),
     (dict, "expected a subclass"), (lambda budget, more: PaperPSO(), "expected a subclass"),
     (lambda budget: budget, "identifier 'mine' returned a int, expected an Algorithm"),
 ])  # fmt: skip

@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from armid.errors import ArmidError
+from armid.estimation.constants import moved_record
 from armid.loop import close_loop, report_of
+from armid.loop.document import conclusion
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
+from armid.record.campaign import tolerances_of
 
 pytestmark = pytest.mark.slow
 # Few candidates, so that one model is compiled; coulomb and seal_friction leave the very same trace.
@@ -19,7 +22,11 @@ COMMON = (
     "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
     "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",
 )  # fmt: skip
-KEYS = ["campaign", "plant", "unit", "noise_rms", "verdict", "effects", "error", "parameters", "steps", "advice"]
+KEYS = ["campaign", "plant", "unit", "noise_rms", "outputs", "verdict", "also", "effects", "error", "error_all_records",
+        "suspects", "parameters", "steps", "withdrawn", "advice", "next_steps", "log"]  # fmt: skip
+ENTRY = ["value", "unit", "low", "high", "trusted", "interval_holds", "given_low", "given_high",
+         "trusted_given_constants"]  # fmt: skip
+STEP = ["effect", "port", "alternatives", "empirical", "claimed", "constants", "error", "parameters"]
 ERRORS = ["rmse", "nrmse", "chi2_per_sample", "s", "s1", "s2"]
 TRUTH = {"p0": 3.2e6, "k": 0.9, "eta3": 0.6, "n": 1.2}
 
@@ -31,11 +38,16 @@ def closed(stand):
 
     def run(*effects):
         if effects not in known:
-            campaign = read_campaign(stand(*COMMON, *(("--effect", *effects) if effects else ())))
+            campaign = exact(read_campaign(stand(*COMMON, *(("--effect", *effects) if effects else ()))))
             known[effects] = close_loop(Model(campaign.plant), campaign, CANDIDATES)
         return known[effects]
 
     return run
+
+
+def exact(campaign):
+    """Return the campaign with constants that are known exactly, as those of the stand are."""
+    return replace(campaign, tolerances={})
 
 
 def test_control_is_left_alone(closed):
@@ -85,6 +97,53 @@ def test_holdout_records_decide_nothing(closed):
     assert again.verdict != "explained"
 
 
+def test_what_held_out_records_deny_is_withdrawn_as_a_whole(closed):
+    """Trained on an arm whose supply sags, judged on one whose supply does not."""
+    sagging, sound = closed("supply_sag=0.010"), closed()
+    campaign = replace(sagging.campaign, records=(*sagging.campaign.train, *sound.campaign.holdout))
+    found = close_loop(Model(campaign.plant), campaign, CANDIDATES)
+    assert (found.verdict, found.also, found.effects) == ("does_not_carry_over", ("unexplained",), ())
+    assert found.parameters == {e.name: e.value for e in found.before.estimates}
+    report = report_of(found)
+    assert report["withdrawn"]["effects"] == ["supply_sag"]
+    assert [step["claimed"] for step in report["withdrawn"]["steps"]] == [False]
+    errors = report["withdrawn"]["error"]
+    assert errors["after"]["holdout"]["rmse"] > 1.02 * errors["before"]["holdout"]["rmse"]
+    assert "it is withdrawn" in conclusion(found)
+
+
+def test_a_declared_model_that_does_not_carry_over_is_no_clean_bill(closed):
+    sagging, sound = closed("supply_sag=0.010"), closed()
+    campaign = replace(sound.campaign, records=(*sound.campaign.train, *sagging.campaign.holdout))
+    found = close_loop(Model(campaign.plant), campaign, CANDIDATES)
+    assert (found.verdict, found.effects) == ("does_not_carry_over", ())
+    assert "lower_low_voltage.csv is missed by" in conclusion(found)
+
+
+def test_constants_that_are_off_are_found_and_no_effect_is_named(stand):
+    """The resistance is declared 4 % too high: within two tolerances of 2 %."""
+    campaign = read_campaign(stand(*COMMON))
+    records = tuple(moved_record(r, campaign.plant, {"R": 0.04}) for r in campaign.records)
+    usual = tolerances_of({}, campaign.plant, "")
+    found = close_loop(Model(campaign.plant), replace(campaign, records=records, tolerances=usual), CANDIDATES)
+    assert found.effects == ("constant:R",)
+    assert found.after.fit.constants["R"] == pytest.approx(1.0 / 1.04 - 1.0, abs=0.002)
+    assert found.after.holdout_error.chi2_per_sample < 1.1
+    step = report_of(found)["steps"][0]
+    assert (step["constants"], step["alternatives"], step["claimed"]) == (["constant:R"], [], True)
+    for e in found.after.estimates[:4]:
+        assert e.low < e.given_low < e.given_high < e.high
+        assert e.low < TRUTH[e.name] < e.high
+        assert e.trusted_given_constants or not e.trusted
+
+
+def test_rounds_and_next_steps_are_told(closed):
+    report = report_of(closed("supply_sag=0.010"))
+    assert report["log"][0]["leading"][0]["effects"] == ["supply_sag"]
+    assert report["log"][0]["refused"] == ""
+    assert report["log"][-1]["refused"] != ""
+
+
 def garbage(record, rng):
     """Return a record of noise."""
     measured = rng.standard_normal(record.measured.shape)
@@ -97,12 +156,13 @@ def test_report_has_exactly_the_promised_keys(closed, effects):
     report = json.loads(json.dumps(report_of(closed(*effects)), allow_nan=False))
     assert list(report) == KEYS
     for errors in (*report["error"].values(), *(s["error"] for s in report["steps"])):
-        assert list(errors) == ["train", "holdout"]
-        assert all(list(e) == ERRORS for e in errors.values())
+        assert list(errors) == ["train", "holdout", "records"]
+        each = [errors["train"], errors["holdout"], *errors["records"].values()]
+        assert all(list(e)[: len(ERRORS)] == ERRORS for e in each)
     for entries in (*report["parameters"].values(), *(s["parameters"] for s in report["steps"])):
-        assert all(list(e) == ["value", "unit", "low", "high", "trusted"] for e in entries.values())
+        assert all(list(e) == ENTRY for e in entries.values())
     for step in report["steps"]:
-        assert list(step) == ["effect", "port", "alternatives", "empirical", "error", "parameters"]
+        assert list(step) == STEP
     for advice in report["advice"]:
         assert list(advice) == ["manoeuvre", "separates", "power"]
 

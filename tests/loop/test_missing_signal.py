@@ -68,7 +68,7 @@ def test_the_missing_force_is_recovered_without_a_form(axis, whole):
     assert found.share > 0.99
     for segment, signal in zip(whole, found.signals, strict=True):
         times = segment.piece.manoeuvre.times()
-        position = np.cumsum(segment.replay.record.measured) * 0.005
+        position = np.cumsum(segment.replays[0].record.measured) * 0.005
         truth = spring(np.interp(segment.knots, times, position))
         assert np.sqrt(np.mean((signal - truth)[3:-3] ** 2)) < 0.15 * np.ptp(truth)
 

@@ -5,7 +5,8 @@ import threading
 import numpy as np
 import pytest
 
-from armid.loop.candidates import EffectKey, library_of, side_by_side
+from armid.estimation.least_squares import side_by_side
+from armid.loop.candidates import EffectKey, library_of
 from armid.loop.search import Search, best_along, with_free_shapes
 from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Model

@@ -1,10 +1,13 @@
-"""The filter that makes noise white, against what autoregressions are known to do."""
+"""The filter that makes noise white, against what autoregressions are known to do; when a residual is no noise."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
+from armid.loop.diagnose import motion_phases, time_in_words
 from armid.loop.whitening import coloured_level, white_level, yule_walker
 
 TERMS = np.array([1.5, -0.7])
@@ -55,3 +58,16 @@ def test_coloured_noise_counts_fewer_samples():
     # 1 + 2 sum 0.9^k = 19 and 1 + 2 sum 0.81^k = 9.53 for this autoregression.
     assert level.n_samples / level.n_slow == pytest.approx(19.0, rel=0.15)
     assert level.n_samples / level.n_power == pytest.approx(1 + 2 * 0.81 / 0.19, rel=0.15)
+
+
+def test_when_a_residual_is_no_noise_is_told_by_what_the_motion_does():
+    speeds = [np.concatenate([np.zeros(10), np.linspace(0, 2, 40), np.full(30, 2.0), np.linspace(2, 0.1, 20)])] * 2
+    phases = motion_phases(speeds)
+    assert np.all(sum(phases.values()) == 1)
+    assert [int(samples.sum()) // 2 for samples in phases.values()] == pytest.approx([11, 30, 40, 20], abs=2)
+    residual = np.where(phases["while it slows down"] & (np.arange(200) >= 100), 5.0, 0.0)
+    seen = SimpleNamespace(
+        residual=residual, phases=phases, data=SimpleNamespace(known=True),
+        stages={"before 'closed'": np.arange(200) < 100, "after 'closed'": np.arange(200) >= 100},
+    )  # fmt: skip
+    assert time_in_words(seen) == "When it is: 100% of it while it slows down, after 'closed', in 10% of the samples."

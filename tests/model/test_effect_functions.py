@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from armid.model import EFFECTS
-from armid.model.effects import balance, bodies, control, drive, friction, motor, sensor
+from armid.model.effects import bodies, control, drive, friction, sensor
+from armid.model.plants import flexible_link
 
 RNG = np.random.default_rng(4)
 OMEGA = np.array([-2.5, -1.0, -0.3, 0.3, 1.0, 2.5])
@@ -31,7 +32,7 @@ def test_nothing_is_added_at_null(effect):
 
 def test_without_loss_of_heat_the_pressure_is_the_plant_s():
     known = {"deviation": 0.0, "loss_rate": 0.0}
-    assert np.all(balance.deviation_rate(**drawn(balance.deviation_rate, **known)) == 0.0)
+    assert np.all(drive.deviation_rate(**drawn(drive.deviation_rate, **known)) == 0.0)
 
 
 @pytest.mark.parametrize("name", FRICTIONS)
@@ -46,21 +47,21 @@ def test_friction_takes_energy_out_in_both_directions(name):
 
 def test_line_loss_takes_energy_out():
     """Lowering compresses the gas: a higher pressure at the piston brakes."""
-    assert np.all(balance.line_pressure(OMEGA, 3e4) * OMEGA > 0.0)
+    assert np.all(drive.line_pressure(OMEGA, 3e4) * OMEGA > 0.0)
 
 
 def test_flux_follows_its_published_forms():
     current, K, saturating = np.array([-150.0, -20.0, 0.0, 0.4, 60.0, 160.0]), 4.5e-5, 120.0
     size = np.abs(current)
-    rational = K * size + motor.rational_flux(current, K, 1 / saturating)
+    rational = K * size + drive.rational_flux(current, K, 1 / saturating)
     np.testing.assert_allclose(rational, K * size / (1 + size / saturating), rtol=1e-13)
-    arctangent = K * size + motor.arctangent_flux(current, K, 1 / saturating**2)
+    arctangent = K * size + drive.arctangent_flux(current, K, 1 / saturating**2)
     np.testing.assert_allclose(arctangent, K * saturating * np.arctan(size / saturating), rtol=1e-13)
 
 
 def test_series_of_the_arctangent_meets_its_closed_form():
     x = np.array([0.05, 0.0999999, 0.1000001, 0.2])
-    np.testing.assert_allclose(motor.missing_share(x**2), 1 - np.arctan(x) / x, rtol=1e-11)
+    np.testing.assert_allclose(drive.missing_share(x**2), 1 - np.arctan(x) / x, rtol=1e-11)
 
 
 @pytest.mark.parametrize("effort", [-800.0, 800.0])
@@ -102,9 +103,9 @@ def test_gas_with_heat_loss_obeys_the_whole_equation():
     n, squeeze, rate, pressure, p0, compression = 1.4, 0.8, 0.25, 4.0e6, 3.0e6, 1.25
     deviation = -1.1e5
     total = pressure + deviation
-    found = n * pressure * squeeze + balance.deviation_rate(n, deviation, squeeze, rate, pressure, p0, compression)
+    found = n * pressure * squeeze + drive.deviation_rate(n, deviation, squeeze, rate, pressure, p0, compression)
     assert found == pytest.approx(n * total * squeeze - rate * (total - p0 * compression))
-    assert balance.deviation_rate(n, p0 * compression - pressure, 0.0, rate, pressure, p0, compression) == 0.0
+    assert drive.deviation_rate(n, p0 * compression - pressure, 0.0, rate, pressure, p0, compression) == 0.0
 
 
 @pytest.mark.parametrize("frequency", [1.0, 10.0, 20.0])
@@ -170,3 +171,66 @@ def test_presliding_friction_builds_up_over_its_way():
         rate = friction.share_rate(speed, share, way, 1e-9)
         assert rate == pytest.approx((1 - share) * speed / way)
         assert friction.share_rate(-speed, -share, way, 1e-9) == pytest.approx(-rate)
+
+
+def settled(rate, **values):
+    """State at which a rate is 0, found by its two signs."""
+    low, high = -5.0, 5.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if rate(share=middle, **values) > 0.0 else (low, middle)
+    return middle
+
+
+@pytest.mark.parametrize("omega", [-0.7, 0.02, 0.3])
+def test_hysteresis_settles_at_its_friction(omega):
+    """LuGre at Coulomb and Stribeck friction, Dahl and Bouc-Wen at the level, each where it starts from in motion."""
+    bristles = {"way": 0.01, "excess": 0.6, "fade": 0.1, "width": 1e-9, "omega": omega}
+    found = settled(friction.bristle_rate, **bristles)
+    assert found == pytest.approx(np.sign(omega) * (1 + 0.6 * np.exp(-((omega / 0.1) ** 2))))
+    assert found == pytest.approx(friction.full_bristles(omega, 0.6, 0.1, 1e-9))
+    assert friction.bristle_torque(level=3.0, damping=0.01, share=found, **bristles) == pytest.approx(-3.0 * found)
+    for rate, more in ((friction.share_rate, {}), (friction.hysteresis_rate, {"unloading": 0.6, "exponent": 2.0})):
+        assert settled(rate, omega=omega, way=0.01, width=1e-9, **more) == pytest.approx(np.sign(omega))
+
+
+def test_forms_of_hysteresis_meet_where_they_are_the_same():
+    """LuGre without excess is Dahl's, Bouc-Wen with exponent 1 that unloads as it loads too."""
+    share, omega = RNG.uniform(-0.9, 0.9, 50), RNG.uniform(-1.0, 1.0, 50)
+    expected = friction.share_rate(omega, share, 0.01, 1e-9)
+    np.testing.assert_allclose(friction.bristle_rate(omega, 0.01, 0.0, 0.1, share, 1e-9), expected, rtol=1e-9)
+    np.testing.assert_allclose(friction.hysteresis_rate(omega, share, 0.01, 1.0, 1.0, 1e-9), expected, rtol=1e-4)
+
+
+def test_bouc_and_wen_unload_on_a_straight_line():
+    found = friction.hysteresis_rate(-1.0, np.array([0.1, 0.5, 0.9]), 0.01, 0.5, 2.0, 1e-9)
+    np.testing.assert_allclose(found, -100.0, rtol=1e-9)
+
+
+def test_a_dead_zone_and_a_droop_lose_what_their_definitions_say():
+    effort = np.array([-2.0, -0.5, 0.0, 0.3, 0.5, 4.0])
+    answered = effort + drive.dead_zone_loss(effort, 0.5)
+    np.testing.assert_allclose(answered, [-1.5, 0.0, 0.0, 0.0, 0.0, 3.5])
+    edges = drive.to_upper_edge(effort, 0.5) * drive.to_lower_edge(effort, 0.5)
+    assert np.array_equal(np.sign(edges), [1, 0, -1, -1, 0, 1])
+    np.testing.assert_allclose(effort + drive.droop_loss(effort, 0.25), effort / (1 + (effort / 2.0) ** 2))
+
+
+def test_cogging_repeats_by_its_teeth():
+    angle = RNG.uniform(-3.0, 3.0, 20)
+    one = friction.cogging_torque(angle, 2.0, -1.0, 24.0, 0.3)
+    np.testing.assert_allclose(friction.cogging_torque(angle + 2 * np.pi / 24.0, 2.0, -1.0, 24.0, 0.3), one, atol=1e-9)
+    apart = friction.ripple_torque(angle, 2.0, -1.0, 24.0) + 0.3 * friction.ripple_torque(angle, 2.0, -1.0, 48.0)
+    np.testing.assert_allclose(one, apart, atol=1e-12)
+
+
+def test_a_coupling_transmits_nothing_within_its_play():
+    def torque(twist, speed=0.0, play=0.1, compliance=0.0):
+        return flexible_link.coupling_torque(twist, speed, 50.0, 2.0, compliance, play, 0.0)
+
+    assert [torque(t) for t in (-0.05, 0.0, 0.1, 0.3, -0.3)] == pytest.approx([0.0, 0.0, 0.0, 10.0, -10.0])
+    assert torque(0.05, 3.0) == 0.0  # nor does its damper
+    assert torque(0.3, 3.0) - torque(0.3) == pytest.approx(6.0, rel=3e-3)
+    assert torque(0.3, 3.0, 0.0) == pytest.approx(15.0 + 6.0)
+    # two springs in series: 50 N m/rad and 1/0.02
+    assert torque(0.3, play=0.0, compliance=0.02) == pytest.approx(25.0 * 0.3)

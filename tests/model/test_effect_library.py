@@ -13,8 +13,9 @@ ARM = PLANTS["shell_transfer_arm"]
 ARM_ONLY = {
     "seal_friction", "shell_rocking", "tilt", "added_inertia", "flux_saturation", "brush_drop", "winding_heating",
     "supply_sag", "supply_error", "gas_heat_loss", "line_loss", "tachometer_lag", "tachometer_offset",
-    "tachometer_ripple", "controller_delay", "position_gain",
+    "tachometer_ripple", "position_gain",
 }  # fmt: skip
+TWO_INERTIAS = {"backlash", "elastic_drive", "coupling_damping"}
 EVERY_FORM = [pytest.param(form, id=f"{form.name}-{form.form}".rstrip("-"))
               for effect in EFFECTS.values() for form in effect.every_form]  # fmt: skip
 DEGREE = np.pi / 180.0
@@ -37,8 +38,8 @@ MAGNITUDES = {
 
 
 def test_ranges_cover_what_a_real_arm_has_with_room():
-    forms = [form for effect in EFFECTS.values() for form in effect.every_form]
-    resolved = {name: p for form in forms for name, p in (Model(ARM) + form).parameters.items()}
+    forms = [form for effect in applicable(EFFECTS, ARM).values() for form in effect.every_form]
+    resolved = {name: p for form in reversed(forms) for name, p in (Model(ARM) + form).parameters.items()}
     for name, (weak, strong) in MAGNITUDES.items():
         p = resolved[name]
         null = p.low if p.null is None else p.null
@@ -50,14 +51,17 @@ def test_ranges_cover_what_a_real_arm_has_with_room():
 def test_every_effect_of_the_specification_is_there():
     assert all(name == effect.name for name, effect in EFFECTS.items())
     named = {name.split(".")[0] for name in MAGNITUDES}
-    also = {"torque_offset", "asymmetric_viscous", "output_lag", "load_friction"}
+    also = {"torque_offset", "asymmetric_viscous", "output_lag", "load_friction", "cogging", "torque_constant_droop",
+            "dead_zone", "presliding"} | TWO_INERTIAS  # fmt: skip
     assert named | also <= set(EFFECTS)
 
 
 @pytest.mark.parametrize("axis", [linear_axis, rotary_axis], ids=["linear", "rotary"])
 def test_what_is_not_of_the_arm_alone_fits_an_axis(axis):
-    assert set(applicable(EFFECTS, axis)) == set(EFFECTS) - ARM_ONLY
-    assert set(applicable(EFFECTS, ARM)) == set(EFFECTS)
+    assert set(applicable(EFFECTS, axis)) == set(EFFECTS) - ARM_ONLY - TWO_INERTIAS
+    assert set(applicable(EFFECTS, ARM)) == set(EFFECTS) - TWO_INERTIAS
+    assert set(applicable(EFFECTS, PLANTS["shell_transfer_arm_elastic"])) == set(EFFECTS)
+    assert set(applicable(EFFECTS, PLANTS["flexible_link"])) == set(EFFECTS) - ARM_ONLY - {"gravity_gain"}
 
 
 def test_a_plant_refuses_with_the_name_that_it_lacks():
@@ -78,7 +82,8 @@ def test_each_is_documented_and_can_be_simulated_at_its_defaults(effect):
     assert any(p.null == 0.0 and p.fixed is None for p in effect.parameters)
     # Only widths of smoothed kinks and departures from the usual form are fixed.
     rest = {p.name: p.fixed for p in effect.parameters if p.fixed is not None and p.name not in ("width", "least")}
-    assert rest.items() <= {"exponent": 2.0, "hardening": 0.0, "cooling": 0.0, "period": 0.0}.items()
+    assert rest.items() <= {"exponent": 2.0}.items() | dict.fromkeys(
+        ("hardening", "cooling", "period", "damping", "second"), 0.0).items()  # fmt: skip
 
 
 def test_an_effect_comes_in_the_form_that_fits():
@@ -95,6 +100,9 @@ def level(level):
 
 
 def test_forms_stand_under_one_name():
+    forms = {name: [e.form for e in EFFECTS[name].every_form] for name in EFFECTS if EFFECTS[name].forms}
+    assert forms.items() >= {"presliding": ["dahl", "lugre", "bouc_wen"], "drive_lag": ["current_loop", "actuator"],
+                             "controller_delay": ["feedback", "command"]}.items()  # fmt: skip
     flux = EFFECTS["flux_saturation"]
     assert [e.form for e in flux.every_form] == ["rational", "arctangent"]
     assert flux.in_form("arctangent").name == "flux_saturation"

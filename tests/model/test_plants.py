@@ -5,8 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
-from armid.model import PLANTS, Model
+from armid.loop.candidates import EffectKey, constant_effects
+from armid.model import PLANTS, Manoeuvre, Model
+from armid.model.plants import flexible_link as link
 from armid.model.plants import shell_transfer_arm as arm
 
 PLANT = PLANTS["shell_transfer_arm"]
@@ -97,3 +100,42 @@ def test_an_axis_comes_in_metres_or_radians() -> None:
     assert (list(turning.parameters), turning.parameters["inertia"].unit) == (["inertia"], "kg m2")
     with pytest.raises(ArmidError, match=r"plant 'shell_transfer_arm' records rad/s, not m/s"):
         PLANT.for_unit("m/s")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("told", [{}, {"theta_C": math.radians(22.0), "theta_D": math.radians(-48.0)}, {"shell": 0.0}])
+def test_a_stiff_coupling_without_play_moves_as_the_rigid_arm(told: dict[str, float]) -> None:
+    candidate = np.array([[3.05e6, 1.0, 0.55, 1.4]])
+    rigid = simulate(Model(PLANT), Manoeuvre(1e-3, 901, told), candidate, Schedule(24)).output
+    stiff = told | {"stiffness": 1e10, "link_damping": 3e5, "half_play": 0.0}
+    elastic = Model(PLANTS["shell_transfer_arm_elastic"])
+    assert np.abs(simulate(elastic, Manoeuvre(1e-3, 901, stiff), candidate, Schedule(24)).output - rigid).max() < 1e-5
+    # 1e6 N m/rad swing at 1/(2 pi) sqrt(K (1/J1 + 1/J2)), some 30 Hz
+    swing = simulate(elastic, Manoeuvre(1e-3, 901, told | {"half_play": 0.0}), candidate, Schedule(4)).output - rigid
+    assert 1e-3 < np.abs(swing).max() < 0.3
+
+
+def test_a_hub_and_a_tip_exchange_momentum_and_swing_at_their_frequency() -> None:
+    hub, tip, stiffness = 0.06, 0.17, 40.0
+    twist = 0.02
+    torque = link.coupling_torque(twist, 0.0, stiffness, 0.0, 0.0, 0.0, 0.0)
+    acceleration = link.hub_acceleration(0.0, 0.0, 0.0, 0.0, torque, 0.0, hub)
+    of_twist = link.twist_speed_rate(torque, tip, acceleration)
+    assert hub * acceleration + tip * (acceleration + of_twist) == pytest.approx(0.0)
+    assert of_twist == pytest.approx(-stiffness * (1 / hub + 1 / tip) * twist)
+
+
+def test_what_is_known_roughly_is_corrected_wherever_it_stands() -> None:
+    """A parameter and a constant, by an effect at the port of each: as if another value had been declared."""
+    axis = PLANTS["driven_axis"].for_unit("rad/s").known_roughly(("inertia", "gravity_moment"))
+    model = Model(axis, tuple(constant_effects({"inertia": 0.5, "gravity_moment": 0.5}).values()))
+    assert EffectKey("error_of_inertia").public == "constant:inertia"
+    assert "gravity_effort = -gravity_moment.corrected * sin(q)" in str(model)
+    times = np.arange(101) * 5e-3
+    told = {"gravity_moment": 0.4, "start_position": 0.3}
+    motion = Manoeuvre(5e-3, 101, told, {"u": 0.2 * np.sin(9 * times)})
+    found = simulate(model, motion, [[0.1, 0.0, 0.0], [0.1, 0.25, -0.5]], Schedule(8)).output
+    plain = Model(PLANTS["driven_axis"].for_unit("rad/s"))
+    other = Manoeuvre(5e-3, 101, told | {"gravity_moment": 0.2}, motion.inputs)
+    expected = [simulate(plain, m, [[j]], Schedule(8)).output[0] for m, j in ((motion, 0.1), (other, 0.125))]
+    np.testing.assert_allclose(found, expected, atol=1e-12)

@@ -35,9 +35,9 @@ class Counted:
     def __init__(self, replay):
         self.replay, self.simulated = replay, 0
 
-    def signal(self, candidates):
+    def runs(self, candidates):
         self.simulated += len(candidates)
-        return self.replay.signal(candidates)
+        return self.replay.runs(candidates)
 
     def __getattr__(self, name):
         return getattr(self.replay, name)
@@ -151,14 +151,14 @@ def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
     X = np.random.default_rng(3).uniform(problem.xl, problem.xu, (37, 4))
     whole = problem.value(X)
     seen = []
-    signal = Replay.signal
+    signal = Replay.runs
 
     def watched(replay, candidates):
         seen.append(len(candidates))
         return signal(replay, candidates)
 
     monkeypatch.setattr("armid.problem.problem.MOST_VALUES", 1000)
-    monkeypatch.setattr(Replay, "signal", watched)
+    monkeypatch.setattr(Replay, "runs", watched)
     np.testing.assert_array_equal(problem.value(X), whole)
     assert seen == [16, 16, 5]
 

@@ -31,7 +31,7 @@ def test_pieces_stand_end_to_end(write_axis, axis_model, tmp_path):
     assert len(replay.pieces) == 4
     assert len({id(c) for c in replay.calibrations}) == 4
     candidates = np.array([[2.0, 5.0], [3.0, 1.0]])
-    parts = [output for _, output in replay.outputs(candidates)]
+    parts = [run.output for run in replay.runs(candidates)]
     np.testing.assert_array_equal(replay.signal(candidates), np.hstack(parts))
     # a straight line through 20 ms is not quite the curved speed at a start
     np.testing.assert_allclose(replay.signal(candidates)[0], replay.measured, atol=3e-4)

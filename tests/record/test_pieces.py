@@ -5,7 +5,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.record import read_campaign
-from armid.record.resample import Track, smoothed, state_at
+from armid.record.start import Track, smoothed, state_at
 
 TIMES = np.arange(1500) / 500
 MOTION = 3.0 * np.sin(8.0 * TIMES) + 0.5 * np.sin(25.0 * TIMES)

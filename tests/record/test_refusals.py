@@ -244,3 +244,23 @@ def test_only_csv_files_are_read(write):
     folder = write(GOOD.replace("lower.csv", "lower.csv.gz"), lower=csv())
     (folder / "lower.csv.gz").write_text(csv())
     assert_says(refusal(folder), ["'lower.csv.gz'", ".csv"])
+
+
+def test_what_is_too_large_or_counts_nowhere(write, tmp_path):
+    """Each in one sentence that names the place and is short."""
+    long, file = "x" * 11_000_000, tmp_path / "campaign" / "lower.csv"
+    with pytest.raises(ArmidError, match=r"campaign\.toml has 11 MB, at most 10 MB of TOML are expected"):
+        read_campaign(write(f"{GOOD}note = '{long}'\n"))
+    with pytest.raises(ArmidError, match=r"lower\.csv, line 1: the header has more than 65536 characters"):
+        read_campaign(write(GOOD, lower="time_s," + "x" * 70_000 + "\n0,1\n"))
+    own = "[constants]\nU = 27.0\n[[records]]"
+    with pytest.warns(UserWarning, match=r"constant 'U' counts nowhere, since every record sets its own"):
+        read_campaign(write(GOOD.replace("[[records]]", own), lower=csv()))
+    with pytest.raises(ArmidError) as refused:
+        read_campaign(write(GOOD + '[parameters."qqq.zzz"]\nlow = 0.0\n', lower=csv()))
+    assert re.search(r"known: \S+, \S+, \S+ and \d+ more", str(refused.value))
+    assert len(str(refused.value)) < 300
+    file.unlink()
+    file.symlink_to("nowhere.csv")
+    with pytest.raises(ArmidError, match=r"file 'lower\.csv' does not exist: a folder or a dead link"):
+        read_campaign(tmp_path / "campaign")

@@ -62,15 +62,36 @@ def contrast(first, second):
     return (high + 0.05) / (low + 0.05)
 
 
+@pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [1200, 400])
-def test_figures_are_there_on_white(pages, opened, width):
-    page = opened(pages["plain loop"], width, dark=True)
+def test_figures_are_there_each_inside_its_card_and_follow_the_scheme(pages, opened, width, dark):
+    page = opened(pages["plain loop"], width, dark)
     figures = page.find_elements(By.CSS_SELECTOR, ".card svg")
     assert len(figures) == 6
     for figure in figures:
+        card = figure.find_element(By.XPATH, "..").rect
         assert figure.size["width"] > 250
         assert figure.size["height"] > 90
-    assert seen(page, "getComputedStyle(document.querySelector('.card')).backgroundColor") == "rgb(255, 255, 255)"
+        assert card["x"] >= 0 <= figure.rect["x"] - card["x"]
+        assert card["x"] + card["width"] <= width
+        assert figure.rect["x"] + figure.rect["width"] <= card["x"] + card["width"]
+    style = "getComputedStyle(document.querySelector('.card%s')).%s"
+    assert seen(page, style % ("", "backgroundColor")) == ("rgb(20, 20, 20)" if dark else "rgb(255, 255, 255)")
+    assert seen(page, style % (" svg", "filter")).startswith("invert" if dark else "none")
+
+
+@pytest.mark.parametrize("width", [1200, 400])
+def test_the_evidence_stands_near_the_answer(pages, opened, width):
+    page = opened(pages["plain loop"], width)
+    numbers = re.findall(r"RMSE\D*([\d.]+)|([\d.]+) deg/s RMSE", page.find_element(By.CSS_SELECTOR, ".answer").text)
+    cells = {c.text: c.rect for c in page.find_elements(By.CSS_SELECTOR, "td") if c.is_displayed()}
+    for number in (n for pair in numbers for n in pair if n):
+        assert cells[number]["x"] + cells[number]["width"] <= width, number
+    tops = [part.rect["y"] for part in page.find_elements(By.CSS_SELECTOR, "figure.drawing")]
+    tables = page.find_elements(By.CSS_SELECTOR, "figure.table table")
+    assert [table.is_displayed() for table in tables] == [True] + [False] * (len(tables) - 1)
+    folded = [part.rect["y"] for part in page.find_elements(By.CSS_SELECTOR, "section details")]
+    assert tables[0].rect["y"] < min(tops) < min(folded)
 
 
 def test_a_click_sorts_numbers_by_value_and_what_is_empty_comes_last(pages, opened):

@@ -3,18 +3,27 @@
 import json
 import re
 from html.parser import HTMLParser
+from io import StringIO
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+from pandas import DataFrame, read_csv
 from stored import EVIL, SVG, loop_details, loop_report, study_document, write_loop
 
+from armid.cli.main import main
 from armid.cli.report import LOOP, document_of, kind_in
 from armid.errors import ArmidError
 from armid.loop.document import loop_document
 from armid.report.document import Document, Line, Listing, Section, Sentences, changed, table
-from armid.report.files import latex
-from armid.report.html import html
+from armid.report.files import csv, latex
+from armid.report.html import html, inline
 from armid.report.markdown import markdown
+from armid.report.style import legend_below, panels, row_names, svg_text, thinned
 from armid.report.terminal import show
+from armid.study.analyses.errors import error_map_figure, valley_figure
 
 
 class Elements(HTMLParser):
@@ -98,6 +107,50 @@ def test_names_of_files_cannot_break_any_renderer(tmp_path, capsys):
         assert "\x1b" not in shown
 
 
+NAMES = (
+    "[x](javascript:alert(1))", "swarm [/x]", "swarm [bold]", "![i](http://x/y.png)", "<b>b</b>", "<http://x.y>", "a|b",
+    "*stars*", "**b**", "_under_", "~~out~~", "a\\*b*", "$\\frac$", "$x$", "$5 and $6", "&amp;", "\\[x\\](y)", "[x][y]",
+    "[x]: javascript:1", "%s {0}", "# head", "* * *", "swarm\\", "nelder_mead+pso_2",
+)  # fmt: skip
+MARKUP = {"html_inline", "html_block", "link_open", "image", "em_open", "strong_open", "s_open", "code_inline"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_is_shown_as_it_is_by_every_renderer(name, capsys, monkeypatch):
+    """Markdown, page, CSV and LaTeX are read back by parsers that are not ours; figures by the letters in them."""
+    document = study_document(name)
+    tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(document))
+    inner = [child for token in tokens for child in token.children or ()]
+    # the answer alone is strong
+    assert [t.type for t in (*tokens, *inner) if t.type in MARKUP] == ["strong_open"]
+    cells = [token.content for token in tokens if token.type == "td_open"]
+    shown = ["".join(c.content for c in token.children) for token in tokens if token.type == "inline"]
+    assert (len(cells), {f"{name} {w}" for w in "bcad"} <= set(shown)) == (12, True)
+    assert f"Errors of {name}" in shown
+    assert name in "".join(Elements(html(document)).texts)
+    monkeypatch.setenv("COLUMNS", "200")
+    assert f"{name} b" in printed(document, capsys)
+    own = document.tables[0]
+    assert list(read_csv(StringIO(csv(own)))["who"]) == [f"{name} {w}" for w in "bcad"]
+    text = latex(own)
+    assert re.sub(r"\\\\|\\[{}&%$#_]", "", text).count("&") == 2 * 5
+    figure, (axis,) = panels(1, 1, 3.0, 3.0)
+    axis.plot([1.0, 2.0], [1.0, 20.0], label=f"a {name}")
+    axis.set(title=name, xlabel=name, xscale="log")
+    row_names(axis, 0, [name, name])
+    legend_below(figure, 1)
+    drawn = "".join(Elements(svg_text(figure)).texts)
+    assert (drawn.count(name), "mathdefault" in drawn) == (5, False)
+
+
+@pytest.mark.parametrize("name", ["$\\frac$", "$x$", "*a*"])
+def test_names_in_figures_that_another_library_lays_out(name):
+    errors = DataFrame([[0.1, 0.2], [0.3, np.inf]], index=[name, "b"], columns=[name, "d"])
+    ends = DataFrame({"variant": [name, "b"] * 4, "setting": "s", "p": np.arange(8.0), "q": np.arange(8.0) ** 2})
+    for figure in (error_map_figure({name: errors}), valley_figure(ends, [name, "b"])):
+        assert name in "".join(Elements(svg_text(figure)).texts)
+
+
 def test_a_table_and_a_listing_stay_what_they_are():
     columns, rows = ["who|[a](b)"], [["a\n|b"], ["[x]: javascript:1"], ["\\](c)"]]
     listing = Listing("L", (Line("a"), Line("```", "+")))
@@ -171,6 +224,105 @@ def test_damaged_details_are_one_sentence(tmp_path):
             document_of(folder, LOOP, "x")
 
 
+def test_damaged_curves_are_one_sentence(tmp_path):
+    """They are read when their figure is drawn."""
+    folder = write_loop(tmp_path / "loop", figures=False)
+    details = loop_details(n_records=1)
+    details["candidates"]["residual"]["y"][0] = "much"
+    details["records"][0]["curves"]["before"]["y"][0] = "much"
+    (folder / "details.json").write_text(json.dumps(details))
+    with pytest.raises(SystemExit, match="2"):
+        main(["report", str(folder)])
+    assert sorted(p.name for p in folder.iterdir()) == ["details.json", "report.json"]
+
+
 def test_sentences_are_bullets_and_a_title_is_not_said_twice():
     document = Document("t", "Study", "", ("Yes.",), (Section("S", (Sentences(("a", "b"), "S"),)),), facts=("f",))
     assert markdown(document) == "# t\n\n**Yes.**\n\n- f\n\n## S\n\n- a\n- b\n"
+
+
+def around(inner: str) -> str:
+    return f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">{inner}</svg>'
+
+
+def test_ids_are_prefixed_where_they_are_referred_to_and_dropped_elsewhere():
+    made = str(inline(SVG, "f1-", "A figure"))
+    assert 'id="f1-c1"' in made
+    assert 'clip-path="url(#f1-c1)"' in made
+    assert 'href="#f1-m1"' in made
+    assert "unused" not in made
+    assert 'aria-label="A figure"' in made
+    assert "today" not in made
+
+
+def test_coordinates_are_rounded_and_sizes_are_pixels():
+    made = str(inline(SVG, "", ""))
+    assert 'd="M 0.12 10 L 450 200"' in made
+    assert 'x="10.99"' in made
+    assert 'width="600"' in made
+    assert 'viewBox="0 0 450 225"' in made
+
+
+def test_layers_get_a_class_that_a_slider_finds():
+    made = str(inline(around('<g id="before"><path d="M 0 0"/></g><g id="other"/>'), "r1-", ""))
+    assert 'class="layer-before"' in made
+    assert "other" not in made
+
+
+HOSTILE = (
+    "<script>alert(1)</script>", '<g onclick="alert(1)"/>', '<a xlink:href="javascript:alert(1)"><path d="M 0 0"/></a>',
+    '<image xlink:href="http://elsewhere/x.png"/>', '<image xlink:href="data:image/svg+xml;base64,PHN2Zz4="/>',
+    '<use xlink:href="http://elsewhere/x.svg#a"/>', '<path style="fill: url(http://elsewhere/x)"/>',
+    '<path style="fill: URL( http://elsewhere/x )"/>', '<path clip-path="url(http://elsewhere/x#a)"/>',
+    "<foreignObject><iframe src='http://elsewhere'/></foreignObject>", "<style>@import url(http://elsewhere/x)</style>",
+    '<animate attributeName="href" to="javascript:alert(1)"/>', '<set attributeName="onclick" to="alert(1)"/>',
+    "<text>&lt;script>alert(1)&lt;/script></text>",
+    '<path id="a&quot; onload=&quot;alert(1)"/><use href="#a&quot; onload=&quot;alert(1)"/>',
+)  # fmt: skip
+
+
+def test_nothing_that_runs_or_is_fetched_comes_through():
+    for evil in HOSTILE:
+        made = str(inline(around(evil), "", ""))
+        assert not re.search(r"elsewhere|javascript|svg\+xml", made), evil
+        assert not re.search(r"<(script|a|foreignObject|iframe|style|animate|set)\b", made), evil
+        assert not re.search(r"\son\w+\s*=", re.sub(r'"[^"]*"', '""', made)), evil
+
+
+def test_a_picture_inside_stays():
+    made = str(inline(around('<image xlink:href="data:image/png;base64,AAAA" width="3" height="3"/>'), "", ""))
+    assert 'href="data:image/png;base64,AAAA"' in made
+
+
+def test_what_is_no_svg_and_a_bomb_of_entities_are_refused():
+    levels = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))
+    bomb = f'<!DOCTYPE svg [<!ENTITY l0 "lol">{levels}]><svg><text>&l11;</text></svg>'
+    for text, said in (("", "is no SVG"), ("<svg", "is no SVG"), ("<html/>", "holds <html>"), (bomb, "is no SVG")):
+        with pytest.raises(ArmidError, match=f"a.svg {said}"):
+            inline(text, "", "", "a.svg")
+
+
+@given(st.integers(0, 4000), st.integers(4, 600), st.integers(0, 2**32 - 1))
+def test_few_points_rising_with_both_ends_and_the_extremes(n, most, seed):
+    values = np.random.default_rng(seed).standard_normal(n).round(1)
+    kept = thinned(values, most)
+    assert len(kept) <= max(most, 4)
+    assert np.all(np.diff(kept) > 0)
+    if n:
+        assert (kept[0], kept[-1]) == (0, n - 1)
+        assert values[kept].min() == values.min()
+        assert values[kept].max() == values.max()
+    if n <= most:
+        assert len(kept) == n
+
+
+def test_a_single_spike_is_never_lost():
+    for where in range(0, 50_000, 997):
+        values = np.zeros(50_000)
+        values[where] = 1.0
+        assert where in thinned(values)
+
+
+@pytest.mark.parametrize("value", [0.0, 3.0])
+def test_a_constant_keeps_few_points(value):
+    assert len(thinned(np.full(10_000, value), 100)) <= 100

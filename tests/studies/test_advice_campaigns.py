@@ -8,9 +8,8 @@ from typing import Any
 import pytest
 
 from armid.record import read_campaign
-from stand.advice.command import PROOF, make_base, make_more
-from stand.advice.pairs import read_proof
-from stand.blind.write import key_path
+from stand.advice import PROOF, make_base, make_more, read_proof
+from stand.blind.campaign import key_path
 
 SMALL = """
 [suite]

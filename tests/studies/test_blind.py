@@ -10,18 +10,13 @@ import numpy as np
 import pytest
 
 from armid.record import read_campaign
-from stand.arm import Arm
-from stand.blind.case import cases_of, shuffled
-from stand.blind.command import SUITE, main
-from stand.blind.fit import Shown, fit_declared
-from stand.blind.lanes import declared_speeds
-from stand.blind.suite import read_suite
-from stand.blind.write import key_path
+from stand import RefusalError, families
+from stand.arm import KNOWN, Arm
+from stand.blind.campaign import SUITE, key_path, main
+from stand.blind.draw import Shown, declared_speeds, fit_declared
+from stand.blind.suite import cases_of, read_suite, shuffled
 from stand.effects import Effects
-from stand.manoeuvre import KNOWN
-from stand.motion import Motion
-from stand.refusal import RefusalError
-from stand.trajectory import simulate
+from stand.motion import Motion, simulate
 
 LISTED = {
     "coulomb", "stribeck", "viscous", "quadratic_drag", "seal_friction", "shell_rocking", "tilt", "worm_direction",
@@ -223,6 +218,26 @@ def test_refuses_with_one_sentence_and_writes_nothing(
     assert sentence in said.err
     assert said.err.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["falt=1", "--seed", "1"], "families: 'falt=1' is no FAMILY=N: one of control, fault"),
+        (["fault=x", "--seed", "1"], "'fault=x' is no FAMILY=N"),
+        (["fault=1", "--seed", "-1"], "seed must be 0"),
+        (["fault=1", "--seed", "1", "--suite", "none.toml"], "none.toml cannot be read"),
+    ],
+)
+def test_families_refuse_with_one_sentence(
+    words: list[str], sentence: str, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert families.main(["made", *words]) == 2
+    said = capsys.readouterr()
+    assert sentence in said.err
+    assert said.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_suite_refuses_an_effect_it_does_not_hold(tmp_path: Path) -> None:

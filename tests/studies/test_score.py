@@ -2,16 +2,14 @@
 
 import copy
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from stand.blind.write import key_path
-from stand.score.command import main
-from stand.score.judge import judge
+from stand import RefusalError
+from stand.blind.campaign import key_path
+from stand.score.judge import judge, judge_all, read_json
 from stand.score.targets import Target, targets_of
 
 ROOT = Path(__file__).parents[2]
@@ -161,31 +159,28 @@ def suite(tmp_path: Path) -> Path:
     return folder
 
 
-def test_scores_from_the_command_line(suite: Path) -> None:
-    results = suite.with_name("results")
-    words = [sys.executable, str(ROOT / "studies" / "test_stand.py"), "score", str(suite), str(results)]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    assert "FAIL campaigns without a report: 1 of 2 = 0" in done.stdout
-    score = json.loads((results / "score" / "score.json").read_text())
-    assert [row["judgement"] for row in score["judgements"]] == ["right", "missing"]
-    assert (results / "score" / "judgements.csv").read_text().count("\n") == 3
-    assert len(score["targets"]) == (results / "score" / "targets.csv").read_text().count("\n") - 1
+def scored(suite: Path) -> tuple[list[Any], list[Any]]:
+    key = read_json(key_path(suite))["campaigns"]
+    files = {name: suite.with_name("results") / name / "report.json" for name in key}
+    return judge_all(key, {name: read_json(file) for name, file in files.items() if file.is_file()})
+
+
+def test_a_campaign_without_a_report_is_missing(suite: Path) -> None:
+    rows, missing = scored(suite)
+    assert ([row["judgement"] for row in rows], [row["judgement"] for row in missing]) == (["right"], ["missing"])
+    first = targets_of(rows, len(missing))[0]
+    assert (first.question, first.found, first.among, first.met) == ("campaigns without a report", 1, 2, False)
 
 
 @pytest.mark.parametrize(
     ("text", "sentence"), [("{", "is no JSON"), ("{}", "is no report of a closed loop"), ("[]", "is no report")]
 )
-def test_refuses_what_is_no_report(text: str, sentence: str, suite: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_refuses_what_is_no_report(text: str, sentence: str, suite: Path) -> None:
     (suite.with_name("results") / "c001" / "report.json").write_text(text)
-    assert main([str(suite), str(suite.with_name("results"))]) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
-
-
-def test_refuses_a_suite_without_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(tmp_path / "suite"), str(tmp_path)]) == 2
-    assert "suite.key.json cannot be read" in capsys.readouterr().err
+    with pytest.raises(RefusalError, match=sentence):
+        scored(suite)
+    with pytest.raises(RefusalError, match="cannot be read"):
+        read_json(suite / "nothing.json")
 
 
 def test_nothing_in_the_package_names_a_key() -> None:

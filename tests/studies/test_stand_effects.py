@@ -1,20 +1,29 @@
 """What each added effect of the stand must do: closed forms, equivalences, limits and signs."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from stand.arm import Arm
-from stand.drive import drive, flux, relative_friction, worm_efficiency
-from stand.effects import Effects, read_effects
-from stand.friction import friction
-from stand.manoeuvre import KNOWN
-from stand.motion import Motion
-from stand.refusal import RefusalError
-from stand.trajectory import Trajectory, simulate
-from stand.unlisted import unlisted_torque
+from armid.contract.trials import middle
+from armid.engine import Schedule
+from armid.engine import simulate as simulate_all
+from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
+from stand import RefusalError
+from stand.arm import KNOWN, Arm
+from stand.effects import (
+    Effects,
+    drive,
+    flux,
+    friction,
+    read_effects,
+    relative_friction,
+    unlisted_torque,
+    worm_efficiency,
+)
+from stand.motion import Motion, Trajectory, simulate
 
 ARM = Arm()
 LEVER = ARM.piston_lever
@@ -48,6 +57,11 @@ def states(count: int = 200) -> list[dict[str, float]]:
         ({"sway": 20.0, "sway_hz": 1e-9, "sway_phase_deg": 90.0}, {"torque_offset": 20.0}),
         ({"rocking_hz": 8.0, "rocking_stop": 1e3}, {"rocking_hz": 8.0}),
         ({"base_compliance": 1e-4, "base_hz": 1e-3}, {}),
+        ({"dahl": 40.0, "dahl_stiffness": 1e6}, {"lugre": 40.0, "lugre_stiffness": 1e6, "lugre_breakaway": 1.0,
+                                                 "lugre_damping": 0.0}),
+        ({"dahl": 40.0}, {"bouc_wen": 40.0, "bouc_wen_exponent": 1.0, "bouc_wen_beta": 1.0}),
+        ({"drive_compliance": 5e-11, "drive_damping": 3e5}, {}),
+        ({"cogging": 20.0, "cogging_waves": 1e-6}, {}),
     ],
     ids=lambda told: next(iter(told), "declared"),
 )  # fmt: skip
@@ -80,6 +94,44 @@ def test_friction_of_either_direction_has_its_own_size() -> None:
     effects = Effects(asymmetric_friction=40.0, asymmetric_share=0.25)
     down, up = (friction(ARM, effects, {"speed": speed}) for speed in (1.0, -1.0))
     assert (down, up) == pytest.approx((50.0, -30.0))
+
+
+@pytest.mark.slow
+def test_listed_effects_move_as_those_of_the_package() -> None:
+    """Equations written twice, with other numbers: slopes for ways, amperes for efforts, squares for exponents."""
+    arm, scale = PLANTS["shell_transfer_arm"], 2.0 * ARM.torque_constant * ARM.excitation * ARM.ratio_motor
+    per_square = scale * ARM.eta1 * ARM.eta2 * ARM.eta3
+    lugre, bouc_wen = (replace(e, name=e.form, forms=()) for e in EFFECTS["presliding"].forms)
+    dahl = replace(EFFECTS["presliding"], name="dahl", forms=())
+    names = ("cogging", "torque_constant_droop", "dead_zone", "drive_lag")
+    model = Model(arm, (dahl, lugre, bouc_wen, *(replace(EFFECTS[name], forms=()) for name in names)))
+    pairs = [
+        ({"dahl": 60.0}, {"dahl.level": 60.0, "dahl.way": 60.0 / 2e4}),
+        ({"lugre": 60.0, "lugre_damping": 200.0},
+         {"lugre.level": 60.0, "lugre.way": 60.0 / 2e4, "lugre.excess": 0.5, "lugre.fade": 0.15,
+          "lugre.damping": 0.01}),
+        ({"bouc_wen": 60.0}, {"bouc_wen.level": 60.0, "bouc_wen.way": 60.0 / 2e4, "bouc_wen.unloading": 0.5}),
+        ({"cogging": 30.0, "cogging_second": -0.4},
+         {"cogging.sine": 30.0, "cogging.waves": 24.0, "cogging.second": -0.4}),
+        ({"torque_droop": 200.0, "droop_exponent": 4.0},
+         {"torque_constant_droop.sharpness_squared": (per_square * 200.0**2) ** -2}),
+        ({"drive_dead_zone": 40.0}, {"dead_zone.zone": 40.0}),
+        ({"actuator_lag": 0.02}, {"drive_lag.time_constant": 0.02}),
+    ]  # fmt: skip
+    told = {"p0": ARM.p0, "k": ARM.k, "eta3": ARM.eta3, "n": ARM.n}
+    rest = told | {n: float(middle(p) if p.null is None else p.null) for n, p in model.parameters.items() if "." in n}
+    candidates = np.array(
+        [
+            [*(rest | {"dahl.width": 5e-4, "lugre.width": 5e-4, "bouc_wen.width": 5e-4} | values).values()]
+            for _, values in pairs
+        ]
+    )
+    found = simulate_all(model, Manoeuvre(1e-3, 901), candidates, Schedule(8)).output
+    declared = moved(Effects()).gyro
+    for (effects, _), signal in zip(pairs, found, strict=True):
+        expected = moved(Effects(**effects)).gyro
+        assert np.abs(expected - declared).max() > 0.02, effects
+        assert np.abs(signal - expected).max() < 2e-3, effects
 
 
 def test_the_exponent_of_stribeck_shapes_how_it_fades() -> None:

@@ -4,13 +4,15 @@ import json
 import re
 import sys
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from armid.cli.main import main
 from armid.contract.check import check_thing
-from armid.model import Model
+from armid.model import Model, Output
+from armid.model.effects.sensor import sensor_effects
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import IrregularSamplingWarning, read_campaign
@@ -47,6 +49,7 @@ def identified(folder, plugin, tmp_path_factory):
     return run
 
 
+@pytest.mark.slow
 def test_the_plant_keeps_the_contract(plugin):
     plant = load_registry([plugin]).plants["boom"]
     assert [f"{f.name}: {f.sentence}" for f in check_thing("plants", "boom", plant) if not f.passed] == []
@@ -120,6 +123,7 @@ def test_the_records_are_those_of_the_script(folder, tmp_path, monkeypatch):
     sys.modules.pop("make_records")
 
 
+@pytest.mark.slow
 def test_the_plant_moves_as_its_records_do(folder, plugin):
     """At the truth, with both effects, no sample of a record is far off: the stand and the engine agree."""
     registry = load_registry([plugin])
@@ -139,3 +143,20 @@ def test_the_text_names_what_there_is(folder):
     plant = (folder / "plant.py").read_text()
     for name in re.findall(r"^def (\w+)|^    (\w+)=", plant, flags=re.M):
         assert f"`{name[0] or name[1]}`" in text, name
+
+
+def test_it_may_record_its_angle_and_current_too(folder, plugin):
+    """As the guide shows; the records bring the angle, and no current."""
+    boom = load_registry([plugin]).plants["boom"]
+    plant = replace(
+        boom, output="", output_unit="", ports={**boom.ports, "angle_sensor": "rad"},
+        quantities={**boom.quantities, "recorded_angle": lambda q, angle_sensor: q + angle_sensor},
+        outputs=(Output("angular_velocity", "recorded_speed", "rad/s", port="output"),
+                 Output("angle", "recorded_angle", "rad", port="angle_sensor"), Output("current", "current", "A")),
+    )  # fmt: skip
+    campaign = read_campaign(folder / "campaign", {"boom": plant})
+    assert [o.name for o in campaign.plant.outputs] == ["angular_velocity", "angle"]
+    assert [o.name for o in campaign.unmeasured] == ["current"]
+    assert all(p.shown_start for r in campaign.train for p in r.pieces)
+    assert not any(p.shown_start for r in campaign.holdout for p in r.pieces)
+    assert {"angle_bias", "angle_scale", "angle_lag"} <= set(sensor_effects(campaign.plant))

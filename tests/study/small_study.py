@@ -1,7 +1,11 @@
 """A small study of the arm, identifiers that misbehave, and when two stores hold the same."""
 
+import re
+
 from armid.study.results import StudyResults
 
+# What a runner says beside its output before it opens anything.
+COST = re.compile(r"small: [\d,]+ runs, .+; what is finished already is kept\n")
 STUDY = """\
 name = "small"
 question = "Does it run?"
@@ -42,6 +46,7 @@ PLUGINS = '''\
 """Identifiers that misbehave."""
 
 import ctypes
+import os
 import sys
 import time
 
@@ -92,8 +97,46 @@ def raises(budget):
     return Raises(pop_size=10)
 
 
+class Interrupts(Bad):
+    def misbehave(self):
+        raise KeyboardInterrupt
+
+
+class Writes(Bad):
+    def misbehave(self):
+        for descriptor in range(3, 64):
+            try:
+                os.write(descriptor, b"\\x00\\x00\\x00\\x20what is no message at all .....")
+            except OSError:
+                pass
+
+
+def interrupts(budget):
+    return Interrupts(pop_size=10)
+
+
+def writes(budget):
+    return Writes(pop_size=10)
+
+
 def cannot_be_built(budget):
     return 1 / 0
+
+
+def hangs_when_built(budget):
+    time.sleep(600.0)
+
+
+def segfaults_when_built(budget):
+    ctypes.string_at(0)
+
+
+def leaves_when_built(budget):
+    sys.exit(0)
+
+
+def closes_when_built(budget):
+    os.closerange(0, 256)
 '''
 # What is told of a run for people; everything else of it has to be the same whoever made it and when.
 NOT_COMPARED = ["seconds", "started_at"]
@@ -105,3 +148,10 @@ def same_results(one: StudyResults, two: StudyResults) -> bool:
     runs = one.runs.drop(columns=NOT_COMPARED).equals(two.runs.drop(columns=NOT_COMPARED))
     parameters, traces = one.parameters.equals(two.parameters), one.traces.equals(two.traces)
     return runs and parameters and traces
+
+
+def beside_cost(err: str) -> str:
+    """Return what a runner writes to its error stream behind the cost of the study."""
+    told = COST.match(err)
+    assert told, err
+    return err[told.end() :]

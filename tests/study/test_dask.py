@@ -7,7 +7,7 @@ import sys
 import time
 
 import pytest
-from small_study import RUNS_A_SEED, same_results
+from small_study import same_results
 
 from armid.errors import ArmidError
 from armid.study.results import load_study
@@ -43,17 +43,36 @@ def cluster(tmp_path):
         process.wait()
 
 
+SUITE = """\
+name = "own"
+plant = "shell_transfer_arm"
+budget = 400
+budget_per_parameter = [20, 100]
+seeds = 12
+[suite]
+problems = ["arm_sh*"]
+instances = [1, 2]
+[[identifiers]]
+name = "pso"
+"""
+
+
 @pytest.mark.slow
-def test_a_dask_cluster_that_loses_a_worker(cluster, start, write_study, tmp_path, undisturbed):
+@pytest.mark.parametrize("suite", [False, True])
+def test_a_dask_cluster_that_loses_a_worker(cluster, start, write_study, tmp_path, undisturbed, suite):
     address, workers = cluster
     out = tmp_path / "out"
-    process = start(write_study(SEEDS), "--out", out, "--dask", address)
+    file = write_study(SEEDS)
+    if suite:
+        file.write_text(SUITE, encoding="utf-8")
+        undisturbed = run_study(file, 1, out=tmp_path / "alone")
+    process = start(file, "--out", out, "--dask", address)
     end = time.monotonic() + 600.0
     while not (out / "study.sqlite").exists() or not n_runs(out):
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
         time.sleep(0.05)
-    assert n_runs(out) < SEEDS * RUNS_A_SEED
+    assert n_runs(out) < len(undisturbed.runs)
     workers[0].kill()
     _, err = process.communicate(timeout=600)
     assert process.returncode == 0, err

@@ -1,18 +1,25 @@
 """Full disks, folders that cannot be written, and identifiers that take their worker with them."""
 
+import errno
 import os
+import re
 import resource
 import shutil
+import sqlite3
 import subprocess
 import sys
+import zlib
+from contextlib import closing
 
 import pytest
-from small_study import RUNS_A_SEED, same_results
+from small_study import RUNS_A_SEED, beside_cost, same_results
 
-from armid.errors import ArmidError
+from armid.errors import ArmidError, MachineError
+from armid.study.outcome import ClaimedRun
 from armid.study.results import load_study
 from armid.study.runner import run_study
 from armid.study.store import FILE_NAME
+from armid.study.tasks import Study, perform
 
 SEEDS = 6
 READER = """
@@ -40,6 +47,7 @@ def small_disk(tmp_path):
 
 def ended_with_one_sentence(process):
     out, err = process.communicate(timeout=600)
+    err = beside_cost(err)
     assert (process.returncode, out) == (2, "")
     assert err.startswith("armid: ")
     assert err.count("\n") == 1
@@ -127,11 +135,14 @@ def fail_alone(write_study, out, plugins, undisturbed, errors, **more):
     assert run_study(write_study(1, change=(CHAIN, bad)), **told).runs.equals(found.runs)
 
 
+@pytest.mark.slow
 def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identifiers, undisturbed):
     errors = {
         "raises": "ZeroDivisionError: nothing to divide by",
         "leaves": "SystemExit: 3",
         "segfaults": "the worker process ended by SIGSEGV, 2 times",
+        "interrupts": "the worker process ended with code 130, 2 times",
+        "writes": "what came from the worker process is no message of ours",
     }
     fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors)
 
@@ -139,6 +150,69 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
 def test_an_identifier_that_hangs_is_stopped(write_study, tmp_path, bad_identifiers, undisturbed):
     errors = {"hangs": "stopped at the time limit of 10 s"}
     fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors, time_limit=10.0)
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    pytest.param("hangs", "stopped at the time limit of 8 s", marks=pytest.mark.slow),
+    ("segfaults", "the worker process ended by SIGSEGV, 2 times"), ("leaves", "SystemExit: 0"),
+    ("closes", "the worker process ended"),
+])  # fmt: skip
+def test_what_a_factory_does_harms_no_runner(write_study, tmp_path, bad_identifiers, name, words):
+    file = write_study(1, change=(CHAIN, f'name = "{name}_when_built"'))
+    with pytest.raises(ArmidError, match=rf"identifier '{name}_when_built': it cannot be built: .*{words}"):
+        run_study(file, 1, out=tmp_path / "out", plugins=[f"{bad_identifiers}:{name}_when_built"], time_limit=8.0)
+    assert not (tmp_path / "out").exists()
+
+
+# What a store may hold that no armid writes: SQL, and what is said of it.
+CRAFTED = {
+    "UPDATE identified SET value = 'much'": "'value' of its table 'identified' holds text, real is expected",
+    "UPDATE parameters SET at_bound = x'00'": "'at_bound' of its table 'parameters' holds blob",
+    "UPDATE runs SET seconds = 'long'": "'seconds' of its table 'runs' holds text",
+    "UPDATE runs SET status = 'odd'": "a run has the status 'odd', 'done' or 'failed' is expected",
+    "UPDATE texts SET text = '{broken'": "what it says of its study, its runs or their versions cannot be read",
+    "UPDATE texts SET text = '[1]'": "what it says of its study, its runs or their versions cannot be read",
+    'UPDATE study SET value = \'{"name": "small", "cases": 5}\'': "cannot be read",
+    "UPDATE study SET value = '[]'": "the description of the study lacks 'name'",
+    "ALTER TABLE runs DROP COLUMN seconds": "its table 'runs' has no column 'seconds'",
+    "UPDATE traces SET trace = :bomb": "is no trace of 4 parameters",
+    "UPDATE traces SET names = 'p0'": "the trace of run",
+}
+
+
+@pytest.mark.parametrize("sql", CRAFTED)
+def test_a_crafted_store_is_told_in_one_sentence(sql, undisturbed, tmp_path):
+    """Made by another program, so that its tables are not STRICT."""
+    kept = tmp_path / FILE_NAME
+    shutil.copy(undisturbed.path, kept)
+    with closing(sqlite3.connect(kept)) as copy:
+        copy.execute("PRAGMA writable_schema = 1")
+        copy.execute("UPDATE sqlite_schema SET sql = replace(replace(sql, ', STRICT', ''), 'STRICT', '')")
+        copy.commit()
+    with closing(sqlite3.connect(kept)) as copy:
+        copy.execute(sql, {"bomb": zlib.compress(bytes(400_000_000), 9)} if ":bomb" in sql else {})
+        copy.commit()
+    with pytest.raises(ArmidError, match=re.escape(CRAFTED[sql]) if "trace" not in sql else CRAFTED[sql]):
+        list(load_study(tmp_path).iter_traces())
+
+
+def test_a_damaged_page_is_told(undisturbed, tmp_path):
+    whole = undisturbed.path.read_bytes()
+    schema = whole.index(b"CREATE TABLE study")
+    for content in (whole[: 5 * 4096] + bytes(4 * 4096) + whole[9 * 4096 :],
+                    whole[:schema] + b"CREATE TAB\xccE" + whole[schema + 12 :]):  # fmt: skip
+        (tmp_path / FILE_NAME).write_bytes(content)
+        with pytest.raises(ArmidError, match=r"study\.sqlite (is damaged|cannot be used)"):
+            load_study(tmp_path)
+
+
+def test_a_run_that_was_cut_off_is_made_again(write_study, undisturbed, tmp_path):
+    """An earlier version kept runs whose worker was interrupted."""
+    shutil.copytree(undisturbed.path.parent, tmp_path / "out")
+    with closing(sqlite3.connect(tmp_path / "out" / FILE_NAME)) as store:
+        store.execute("UPDATE identified SET used = 7, stopped = 'interrupted' WHERE used = 40")
+        store.commit()
+    assert same_results(run_study(write_study(SEEDS), jobs=1, out=tmp_path / "out"), undisturbed)
 
 
 def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(write_study, tmp_path, bad_identifiers):
@@ -160,6 +234,23 @@ def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(w
     changed = run_study(file, **told)
     same = set(changed.runs["run"]) & set(first.runs["run"])
     assert same == set(first.runs[kept]["run"])
+
+
+@pytest.mark.parametrize(("error", "of_the_machine"), [
+    (OSError(errno.ENOSPC, "No space left on device"), True), (MemoryError("no room"), True),
+    (OSError(errno.ENOENT, "No such file"), False), (ValueError("a bad value"), False),
+])  # fmt: skip
+def test_a_fault_of_the_machine_marks_no_run(error, of_the_machine, monkeypatch):
+    def failing(settings, cache):
+        raise error
+
+    monkeypatch.setattr(Study, "perform", staticmethod(failing))
+    run = ClaimedRun("r", '{"kind": "identify"}')
+    if of_the_machine:
+        with pytest.raises(MachineError, match="the machine, not a run, is at fault"):
+            perform(run, None)
+    else:
+        assert perform(run, None).status == "failed"
 
 
 def test_a_worker_that_cannot_start_is_told(write_study, tmp_path, monkeypatch):

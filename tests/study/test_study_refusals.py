@@ -114,7 +114,7 @@ def test_arguments_that_no_runner_can_work_with(write_study, tmp_path, told, wor
 
 def test_an_identifier_of_the_user_that_cannot_be_built(write_study, tmp_path, bad_identifiers):
     file = write_study(change=(CHAIN, 'name = "cannot_be_built"'))
-    words = "identifier 'cannot_be_built': it cannot be built: ZeroDivisionError: division by zero"
+    words = "identifier 'cannot_be_built': it cannot be built: plug-in .*: ZeroDivisionError: division by zero"
     with pytest.raises(ArmidError, match=words):
         run_study(file, out=tmp_path / "out", plugins=[f"{bad_identifiers}:cannot_be_built"])
 

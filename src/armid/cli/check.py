@@ -1,41 +1,106 @@
 """`armid check`: whether a user's own things keep the contract; `armid bench`: how fast and how right the engine is."""
 
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from armid.cli.options import examples, plugin_option
-from armid.errors import ArmidError
+from armid.cli.options import command, examples, give, plugin_option, say
+from armid.errors import ArmidError, nearest
 from armid.registry import Registry, load_plugin, load_registry
 
 if TYPE_CHECKING:
     from armid.contract.trials import ContractPoint
 
 
-@click.command("check", epilog=examples("armid check mine.py:my_drag", "armid check studies/campaigns/paper_arm"))
+@command("check", epilog=examples(
+    "armid check mine.py:my_drag --on driven_axis", "armid check studies/campaigns/paper_arm",
+))  # fmt: skip
 @click.argument("thing", metavar="FILE.py:attribute|CAMPAIGN")
+@click.option("--on", metavar="PLANT", help="Try an effect on this plant alone. [default: all that take it]")
+@click.option("--time-limit", default=60.0, show_default=True, metavar="S",
+              help="Longest time of one point, s; kept where the system has alarms, as all but Windows.")  # fmt: skip
 @plugin_option
-def check_command(thing: str, plugins: tuple[str, ...]) -> None:
+def check_command(thing: str, on: str | None, time_limit: float, plugins: tuple[str, ...]) -> None:
     """Run the contract on your own things.
 
     A plant, an effect, a fitness, an identifier or an analysis in a Python file, which is run; an effect is tried on
     every plant that offers its ports, those of --plugin included. A campaign is read, and its model simulated through
-    each record. Every point is printed. Exit code 0 when all hold, 1 when one does not, 2 when there is nothing to try.
+    each record. Every point is printed when it is done; where one takes too long, those after it are not tried. Exit
+    code 0 when all hold, 1 when one does not, 2 when there is nothing to try.
     """
-    kind, name, findings = findings_of(thing, load_registry(plugins))
-    print(f"{kind}: {name}")
-    for finding in findings:
-        print(f"  {'ok  ' if finding.passed else 'FAIL'} {finding.name}: {finding.sentence}")
-    failed = sum(not f.passed for f in findings)
-    print(f"{len(findings) - failed} of {len(findings)} points hold")
+    if not time_limit > 0.0:
+        raise ArmidError(f"--time-limit is {time_limit:g}, a number of seconds above 0 is expected")
+    registry = load_registry(plugins)
+    if on is not None:
+        if on not in registry.plants:
+            raise ArmidError(f"--on '{on}' is no plant: {nearest(on, registry.plants)}")
+        registry.plants = {on: registry.plants[on]}
+    kind, name, points = points_of(thing, registry)
+    tell_points(f"{kind}: {name}", limited(points, time_limit), kind=kind, name=name)
+
+
+def tell_points(title: str, points: "Iterator[ContractPoint]", **about: str) -> None:
+    """Print points as they come and leave with 1 where one does not hold; about: joins them as JSON."""
+    # what cannot be tried at all is refused before anything is printed
+    first = next(points)
+    say(title)
+    told = []
+    for point in chain([first], points):
+        told.append({"name": point.name, "passed": point.passed, "sentence": point.sentence})
+        say(f"  {'ok  ' if point.passed else 'FAIL'} {point.name}: {point.sentence}")
+    failed = sum(not point["passed"] for point in told)
+    say(f"{len(told) - failed} of {len(told)} points hold")
+    give(**about, passed=not failed, points=told)
     if failed:
         sys.exit(1)
 
 
-def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[ContractPoint]"]:
+def limited(points: "Iterator[ContractPoint]", seconds: float) -> "Iterator[ContractPoint]":
+    """Yield the points; where one takes longer, yield one that says so in its place, and no more."""
+    from armid.contract.trials import ContractPoint
+
+    told = 0
+    while True:
+        try:
+            with alarm(seconds):
+                point = next(points)
+        except StopIteration:
+            return
+        except TimeoutError:
+            yield ContractPoint("time limit", False, f"point {told + 1} takes longer than {seconds:g} s; those after "
+                                "it were not tried")  # fmt: skip
+            return
+        told += 1
+        yield point
+
+
+@contextmanager
+def alarm(seconds: float) -> Iterator[None]:
+    """Raise TimeoutError after some seconds, in the main thread of a system that has such a signal."""
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def over(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def points_of(thing: str, registry: Registry) -> tuple[str, str, "Iterator[ContractPoint]"]:
     # simulations and pymoo, which other commands do not need
     from armid.contract.check import check_campaign, check_thing
     from armid.record import read_campaign
@@ -47,7 +112,7 @@ def findings_of(thing: str, registry: Registry) -> tuple[str, str, "list[Contrac
     return kind, name, check_thing(kind, name, found, registry.plants)
 
 
-@click.command("bench", short_help="Measure speed, error and memory.", epilog=examples("armid bench --quick"))
+@command("bench", short_help="Measure speed, error and memory.", epilog=examples("armid bench --quick"))
 @click.option("--quick", is_flag=True, help="Fewer repetitions: rougher figures in a few seconds.")
 @plugin_option
 def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
@@ -61,4 +126,7 @@ def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
     if studies is None:
         raise ArmidError("there is no studies/bench here: the root of armid's source, which holds it, is expected")
     sys.path.insert(0, str(studies))
-    import_module("bench.__main__").main(quick, plugins)
+    load_registry(plugins)
+    rows = import_module("bench.__main__").run_bench(quick=quick)
+    say(import_module("bench.measure").bench_table(rows))
+    give(rows=[vars(row) for row in rows])

@@ -2,11 +2,14 @@
 
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import click
 
-from armid.cli.options import chosen, examples, plugin_option
+from armid.cli.options import command, examples, give, plugin_option, say, wants
+from armid.errors import ArmidError, nearest, quoted
 from armid.model import Effect, Parameter, Plant, refusal_of
+from armid.model.effects.sensor import sensor_effects
 from armid.model.graph import returned_text
 from armid.registry import KINDS, Registry, load_registry
 
@@ -18,22 +21,64 @@ multistart:LOCAL: a local one from ever new starts until the budget is used
 GLOBAL+LOCAL[+LOCAL]: a chain, each phase from the best so far; options share=0.5 (0.5:0.3), NAME.OPTION=VALUE"""
 
 
-@click.command("list", short_help="List what is registered.",
-               epilog=examples("armid list plants", "armid list effects --plugin mine.py:my_drag"))  # fmt: skip
+@command("list", short_help="List what is registered.",
+         epilog=examples("armid list plants", "armid list identifiers --long",
+                         "armid list effects --plugin mine.py:my_drag"))  # fmt: skip
 @click.argument("what", metavar="effects|plants|fitness|identifiers|analyses")
+@click.option(
+    "--long", "is_long", is_flag=True, help="Identifiers with the name, default, unit and meaning of options."
+)
 @plugin_option
-def list_command(what: str, plugins: tuple[str, ...]) -> None:
+def list_command(what: str, is_long: bool, plugins: tuple[str, ...]) -> None:
     """List what is registered: names, equations, parameters, units.
 
     plants: parameters with bounds, states, quantities, ports, inputs, constants and keys of a record. effects: port,
     equation, parameters, source, the plants that take it. fitness: how records join. identifiers: what they need.
     analyses: sections of the report of a study.
     """
-    chosen(what, dict.fromkeys(KINDS), "list")
+    if what not in KINDS:
+        raise ArmidError(f"list '{what}' is not known: {nearest(what, KINDS)}")
     registry = load_registry(plugins)
     texts = {"effects": effect_texts, "plants": plant_texts, "fitness": fitness_texts, "identifiers": identifier_texts,
              "analyses": analysis_texts}  # fmt: skip
-    print("\n\n".join(texts[what](registry)))
+    if wants("quiet"):
+        print("\n".join(getattr(registry, what)))
+    elif wants("json"):
+        give(**{what: {name: entry(thing) for name, thing in getattr(registry, what).items()}})
+    elif is_long and what == "identifiers":
+        say("\n\n".join(map(long_text, registry.identifiers.values())), "", COMPOSED)
+    else:
+        say("\n\n".join(texts[what](registry)))
+
+
+def entry(thing: Any) -> dict[str, Any]:
+    """Return what JSON holds of a registered thing: note, parameters of plants and effects, options of identifiers."""
+    found: dict[str, Any] = {"note": getattr(thing, "note", "") or (getattr(thing, "__doc__", "") or "").strip()}
+    if isinstance(thing, Plant | Effect):
+        keys = ("unit", "low", "high", "null", "fixed", "note")
+        found["parameters"] = {p.name: {key: getattr(p, key) for key in keys} for p in thing.parameters}
+        ports = thing.ports if isinstance(thing, Plant) else {port: returned_text(f) for port, f in thing.adds.items()}
+        found["ports"] = dict(ports)
+    if hasattr(thing, "build"):
+        from armid.identifiers import options_of
+
+        flags = ("is_global", "uses_gradient", "is_stochastic", "needs_residuals")
+        found |= {flag: getattr(thing, flag) for flag in flags} | {"options": options_of(thing)}
+    return found | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
+
+
+def long_text(identifier: Any) -> str:
+    """Return an identifier with a line for each of its options."""
+    from armid.identifiers import options_of
+
+    lines = [f"{identifier.name}: {identifier.note or 'no note'}"]
+    for name, told in options_of(identifier).items():
+        value = (
+            "its own" if told["default"] is None or callable(told["default"]) else quoted(told["default"]).strip("'")
+        )
+        unit = f" [{told['unit']}]" if told["unit"] else ""
+        lines.append(folded(f"  --option {name}={value}{unit} {told['meaning']}"))
+    return "\n".join(lines)
 
 
 def effect_texts(registry: Registry) -> list[str]:
@@ -63,12 +108,12 @@ def places(effect: Effect, plants: Sequence[Plant]) -> str:
     """Return the plants that offer the ports and names of an effect, siblings by what they record."""
     fitting = [p for p in plants if any(not refusal_of(e, p) for e in effect.every_form)]
     names = list(dict.fromkeys(p.name for p in fitting))
-    shown = []
+    told = []
     for name in names:
         units = [p.output_unit for p in fitting if p.name == name]
         whole = len(units) == sum(p.name == name for p in plants)
-        shown.append(name if whole else f"{name} in {', '.join(units)}")
-    return ", ".join(shown) or "no plant"
+        told.append(name if whole else f"{name} in {', '.join(units)}")
+    return ", ".join(told) or "no plant"
 
 
 def folded(line: str) -> str:
@@ -91,7 +136,10 @@ def plant_texts(registry: Registry) -> list[str]:
 
 
 def plant_text(plant: Plant) -> str:
-    lines = [f"{plant.name} (recorded in {plant.output_unit}): {plant.note}"]
+    lines = [f"{plant.name} (recorded in {', '.join(o.unit for o in plant.outputs)}): {plant.note}"]
+    if not plant.records_one_speed:
+        lines += [f"  output {o.name} [{o.unit}] = {o.signal} from {' or '.join(o.factors)}" for o in plant.outputs]
+        lines += [f"  effect of a sensor {name}: {e.note}" for name, e in sensor_effects(plant).items()]
     lines += [f"  parameter {parameter_text(p)}" for p in plant.parameters]
     lines += [f"  state {s.name} [{s.unit}]" for s in plant.states]
     lines += [f"  quantity {name} = {returned_text(f)}" for name, f in plant.quantities.items()]

@@ -1,54 +1,76 @@
 """The command `armid`: its sub-commands, and how errors reach the user."""
 
+import gc
+import logging
+import signal
 import sys
+import threading
 import warnings
+from importlib import import_module
 from typing import Any
 
 import click
 
-from armid.cli.check import bench_command, check_command
-from armid.cli.close_loop import close_loop_command
-from armid.cli.identifiability import identifiability_command
-from armid.cli.identify import identify_command
-from armid.cli.listing import list_command
-from armid.cli.new import new_command
-from armid.cli.options import examples
-from armid.cli.report import report_command
-from armid.cli.simulate import simulate_command
-from armid.cli.study import study_command
-from armid.cli.transfer import export_group, import_group
-from armid.errors import ArmidError
-from armid.registry import place_in_plugin
+from armid.errors import ArmidError, on_a_line
 
 BAD_INPUT, INTERRUPTED = 2, 130
+EPILOG = """\b
+Examples:
+  armid new campaign my_axis                   a folder to put your own records into
+  armid identify my_axis --out results/axis    its parameters, with intervals
+  armid close-loop my_axis --out results/loop  what its declared equations lack
+  armid study studies/table1_short.toml        the paper's Table I, small
+
+\b
+Completion by the shell, for good with this line in ~/.bashrc (zsh: ~/.zshrc, and zsh_source):
+  eval "$(_ARMID_COMPLETE=bash_source armid)"
+"""
+# Command -> its module in armid.cli and its name there: a command is imported when it is asked for.
+COMMANDS = {
+    "simulate": "campaign:simulate_command", "identify": "campaign:identify_command",
+    "close-loop": "campaign:close_loop_command", "identifiability": "campaign:identifiability_command",
+    "list": "listing:list_command", "check": "check:check_command", "doctor": "doctor:doctor_command",
+    "bench": "check:bench_command", "study": "study:study_command", "tune": "study:tune_command",
+    "report": "report:report_command", "import": "transfer:import_group", "export": "transfer:export_group",
+    "new": "new:new_command",
+}  # fmt: skip
 
 
-EPILOG = examples(
-    "armid new campaign my_axis                   a folder to put your own records into",
-    "armid identify my_axis --out results/axis    its parameters, with intervals",
-    "armid close-loop my_axis --out results/loop  what its declared equations lack",
-    "armid study studies/table1_short.toml        the paper's Table I, small",
-)
+class Commands(click.Group):
+    """The commands by name, each imported when it is asked for."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        # click looks for the nearest name there
+        self.commands: dict[str, Any] = dict.fromkeys(COMMANDS)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a command, None for a name that there is not."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, name = COMMANDS[cmd_name].split(":")
+        found: click.Command = getattr(import_module(f"armid.cli.{module}"), name)
+        return found
 
 
-@click.group("armid", epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    "armid", cls=Commands, epilog=EPILOG,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)  # fmt: skip
 @click.version_option(package_name="armid")
 def app() -> None:
     """Identify the unknown parameters of a driven arm from its measured motion.
 
     CAMPAIGN is a folder with campaign.toml and one CSV file a record, or that campaign.toml. Numbers are SI unless a
-    name says otherwise.
+    name says otherwise. Every command takes --json (one object on the standard output) and --quiet.
 
-    Exit codes: 0 done, whatever was found; 1 a point of a contract does not hold (`armid check`); 2 bad input, told in
-    one sentence, nothing half-written; 130 interrupted by Ctrl-C, what was found so far is kept.
+    Exit codes: 0 done, whatever was found; 1 a point of a contract does not hold (`armid check`, `armid doctor`); 2 bad
+    input, told in one sentence, nothing half-written; 130 interrupted by Ctrl-C or SIGTERM, what was
+    found so far is kept.
     """
-
-
-for command in (
-    simulate_command, identify_command, close_loop_command, identifiability_command, list_command, check_command,
-    bench_command, study_command, report_command, import_group, export_group, new_command,
-):  # fmt: skip
-    app.add_command(command)
 
 
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
@@ -56,9 +78,21 @@ def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__:
     print(f"armid: warning: {message}", file=sys.stderr)
 
 
+def asked_to_end(number: int, frame: Any) -> None:
+    """End as by Ctrl-C, so that what is half-written goes; also where Ctrl-C is ignored, as in the background."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.default_int_handler(number, frame)
+    signal.raise_signal(signal.SIGINT)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run a command; bad input gives one sentence and exit code 2."""
     warnings.showwarning = show_warning
+    # imports and figures make many objects that stay: looking through them every 700 is a tenth of a short command
+    gc.set_threshold(20_000)
+    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, asked_to_end)
+    logging.getLogger("armid").setLevel(logging.INFO)
     try:
         code = app.main(arguments, prog_name="armid", standalone_mode=False, obj=arguments or sys.argv[1:])
     except ArmidError as error:
@@ -77,10 +111,12 @@ def main(arguments: list[str] | None = None) -> None:
         stop(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}", BAD_INPUT)
     except MemoryError as error:
         stop(f"not enough memory: {error}; a smaller population, fewer records or shorter ones are expected", BAD_INPUT)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if isinstance(error.__cause__, KeyboardInterrupt):
             # that is how Ctrl-C comes out of a compiled function
             stop("interrupted", INTERRUPTED)
+        from armid.registry import place_in_plugin
+
         place = place_in_plugin(error)
         if place is None:
             raise
@@ -90,5 +126,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 def stop(sentence: str, code: int) -> None:
     """Print a sentence to the error stream and leave."""
-    print(f"armid: {sentence}", file=sys.stderr)
+    print(f"armid: {on_a_line(sentence)}", file=sys.stderr)
     sys.exit(code)

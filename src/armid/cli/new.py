@@ -15,15 +15,17 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.options import chosen, examples
-from armid.cli.report import NewFiles
-from armid.errors import ArmidError
+from armid.cli.options import command, examples, give, say
+from armid.errors import ArmidError, nearest
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
 from armid.registry import load_registry
+from armid.report.result import NewFiles
 
 CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifiers", "plant": "plants",
               "analysis": "analyses"}  # fmt: skip
+# Kind and --style -> the template that stands for the kind's own.
+STYLES = {("identifier", "function"): "identifier_function"}
 CAMPAIGN = "campaign"
 KINDS = (*CATALOGUES, CAMPAIGN)
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
@@ -37,16 +39,20 @@ FIRST_STEP = 0.1
 DIGITS = 6
 
 
-@click.command("new", short_help="Write a starting file of your own.", epilog=examples(
+@command("new", short_help="Write a starting file of your own.", epilog=examples(
     "armid new effect my_drag", "armid check my_drag.py:my_drag", "armid new campaign my_axis --out studies/campaigns",
 ))  # fmt: skip
 @click.argument("kind", metavar="effect|fitness|identifier|plant|analysis|campaign")
 @click.argument("name", metavar="NAME")
 @click.option(
+    "--style", default="", metavar="function",
+    help="Of an identifier: function, for any optimiser that is no algorithm of pymoo (scipy, nevergrad).",
+)  # fmt: skip
+@click.option(
     "--out", default=".", show_default="this folder", type=click.Path(path_type=Path), metavar="FOLDER",
     help="Folder to write to.",
 )  # fmt: skip
-def new_command(kind: str, name: str, out: Path) -> None:
+def new_command(kind: str, name: str, style: str, out: Path) -> None:
     """Write a commented starting file of your own that passes `armid check`.
 
     An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
@@ -55,13 +61,17 @@ def new_command(kind: str, name: str, out: Path) -> None:
     """
     from armid.record import write_campaign
 
-    chosen(kind, dict.fromkeys(KINDS), "kind")
+    if kind not in KINDS:
+        raise ArmidError(f"kind '{kind}' is not known: {nearest(kind, KINDS)}")
+    if style and (kind, style) not in STYLES:
+        raise ArmidError(f"--style '{style}' of kind '{kind}': an identifier has the style 'function'")
+    template = STYLES.get((kind, style), kind)
     taken = set(getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else ())
     if kind == "analysis":
         from armid.study.analyses.catalogue import ANALYSES
 
         taken |= {a.name for a in ANALYSES}
-    check_new_name(kind, name, taken)
+    check_new_name(kind, name, taken, template)
     target = out / (f"{name}.py" if kind in CATALOGUES else name)
     if os.path.lexists(target):
         raise ArmidError(f"{target} exists already: another name, or another folder by --out, is expected")
@@ -69,8 +79,10 @@ def new_command(kind: str, name: str, out: Path) -> None:
         write_campaign(target, campaign_text(name), synthetic_records())
     else:
         with NewFiles(out) as new_files:
-            new_files.path(target.name).write_text(python_file(kind, name), encoding="utf-8")
-    print(f"wrote {target}; try: armid check {target}{f':{name}' if kind in CATALOGUES else ''}")
+            new_files.path(target.name).write_text(python_file(template, name), encoding="utf-8")
+    check = f"armid check {target}{f':{name}' if kind in CATALOGUES else ''}"
+    say(f"wrote {target}; try: {check}")
+    give(wrote=target, check=check)
 
 
 def filled(file: str, **values: object) -> str:
@@ -78,15 +90,15 @@ def filled(file: str, **values: object) -> str:
     return Template((files("armid.cli") / "templates" / file).read_text(encoding="utf-8")).substitute(values)
 
 
-def python_file(kind: str, name: str) -> str:
+def python_file(template: str, name: str) -> str:
     """Return the text of a Python file that declares one thing of a user.
 
-    kind: "effect", "fitness", "identifier" or "plant". name: of the thing, and of the file without its ending.
+    template: a kind, or what STYLES names. name: of the thing, and of the file without its ending.
     """
-    return filled(f"{kind}.py.txt", name=name)
+    return filled(f"{template}.py.txt", name=name)
 
 
-def check_new_name(kind: str, name: str, taken: Collection[str] = ()) -> None:
+def check_new_name(kind: str, name: str, taken: Collection[str] = (), template: str = "") -> None:
     """Refuse a name that a starting file could not have.
 
     taken: names of the same kind that are registered.
@@ -101,7 +113,7 @@ def check_new_name(kind: str, name: str, taken: Collection[str] = ()) -> None:
     check_name(name, kind)
     if name in taken or (kind == "effect" and name in RESERVED):
         raise ArmidError(f"{kind} '{name}' is there already: another name is expected")
-    if name in names_in(python_file(kind, "_")):
+    if name in names_in(python_file(template or kind, "_")):
         raise ArmidError(f"{kind} '{name}' cannot have this name, which the file itself uses: another is expected")
     module = find_spec(name)
     installed = module is not None and str(module.origin).startswith(tuple(sysconfig.get_paths().values()))
@@ -122,7 +134,6 @@ def names_in(text: str) -> set[str]:
 
 
 def campaign_text(name: str) -> str:
-    """Return the text of campaign.toml."""
     return filled("campaign.toml.txt", name=name, inertia=INERTIA, friction=FRICTION, noise=NOISE)
 
 

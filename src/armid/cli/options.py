@@ -1,24 +1,90 @@
-"""Options that several commands share, and how their texts become values."""
+"""Options that several commands share, how their texts become values, and how a command speaks."""
 
-import warnings
-from collections.abc import Callable, Iterable, Mapping
-from math import isfinite
+import json
+import logging
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import click
 
 from armid.errors import ArmidError, nearest
-from armid.model import Effect, Model
-from armid.registry import Registry, load_registry
-
-if TYPE_CHECKING:
-    from armid.problem.space import Space
-    from armid.record import Campaign
 
 
-# By such a factor a value misses its declared range that was told in another unit.
-FAR = 100.0
+def kept(context: click.Context, option: click.Parameter, value: bool) -> None:
+    context.meta[f"armid.{option.name}"] = value
+
+
+# Every command has these two; they are no settings of a result.
+OUTPUT = (
+    (("--json", "json"), "Print the result as one JSON object on the standard output, and nothing else there."),
+    (("--quiet", "quiet"), "Print nothing but errors and warnings; `list` prints names alone."),
+)
+
+
+class Command(click.Command):
+    """A command with --json and --quiet; it prints by `say` and `give` alone."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; it tells on the error stream that a model is being compiled."""
+        # asked here, as what is announced comes from another thread
+        with nullcontext() if wants("quiet") else announcing(lambda text: print(f"armid: {text}", file=sys.stderr)):
+            return super().invoke(ctx)
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self.params += [click.Option(names, is_flag=True, expose_value=False, callback=kept, help=text)
+                        for names, text in OUTPUT]  # fmt: skip
+
+
+@contextmanager
+def announcing(told: Callable[[str], None]) -> Iterator[None]:
+    """Pass on what takes long and is announced."""
+    handler = logging.Handler()
+    handler.emit = lambda record: told(record.getMessage())  # type: ignore[method-assign]
+    log = logging.getLogger("armid")
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+
+
+class Group(click.Group):
+    """Commands below a command."""
+
+    command_class = Command
+
+
+command = partial(click.command, cls=Command)
+
+
+def wants(what: str) -> bool:
+    """Tell whether the running command was given --json ("json") or --quiet ("quiet")."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(f"armid.{what}"))
+
+
+def speaks() -> bool:
+    """Tell whether the running command prints words."""
+    return not (wants("json") or wants("quiet"))
+
+
+def say(*lines: str) -> None:
+    """Print lines as soon as they are said, unless --json or --quiet was given."""
+    if speaks():
+        print(*lines, sep="\n", flush=True)
+
+
+def give(**found: Any) -> None:
+    """Print what was found as one JSON object where --json was given; once a command."""
+    if wants("json"):
+        print(json.dumps(found, allow_nan=False, default=str))
+
+
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
 plugin_option = click.option(
     "--plugin", "plugins", multiple=True, metavar="FILE.py:attribute",
@@ -51,53 +117,26 @@ def out_option(text: str, required: bool = False) -> Callable[[Any], Any]:
     return click.option("--out", required=required, type=click.Path(path_type=Path), metavar="DIR", help=text)
 
 
-def problem_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command CAMPAIGN and the options that say which model is fitted to what of it, see `opened`."""
+def problem_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command CAMPAIGN and the options that say which model is fitted to what of it, see `given`."""
     options = (campaign_argument, effects_option, bounds_option, fix_option, window_option, plugin_option)
     for option in reversed(options):
-        command = option(command)
-    return command
+        function = option(function)
+    return function
 
 
-class Opened(NamedTuple):
-    """What a command on a campaign works with: all that is registered, the records, the declared model, overrides.
-
-    bounds, fixed: name -> (low, high) of --bounds, and value of --fix, SI.
-    """
-
-    registry: Registry
-    campaign: "Campaign"
-    model: Model
-    bounds: dict[str, tuple[float, float]]
-    fixed: dict[str, float]
-
-    def space(self) -> "Space":
-        """Return the space that is searched."""
-        from armid.problem.space import space_of
-
-        return space_of(self.model, self.campaign.parameters, self.bounds, self.fixed)
-
-
-def opened(
-    campaign: Path, effects: str, plugins: Iterable[str], window: str = "", bounds: Iterable[str] = (),
-    fix: Iterable[str] = (),
-) -> Opened:  # fmt: skip
-    """Return what CAMPAIGN, --effects, --plugin, --window, --bounds and --fix stand for; plug-ins run their code.
+def given(
+    effects: str, plugins: Iterable[str], window: str = "", bounds: Iterable[str] = (), fix: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Return what --effects, --plugin, --window, --bounds and --fix stand for, as `armid.by_name.opened` takes it.
 
     Raises ArmidError for whatever of them cannot be used.
     """
-    from armid.record import read_campaign
-
-    registry = load_registry(plugins)
-    read = read_campaign(campaign, registry.plants, registry.effects)
-    if window:
-        read = read.with_window(*interval(window, "--window"))
-    model = read.model(registry.effects)
-    for text in (name.strip() for name in effects.split(",") if name.strip()):
-        name, _, form = text.partition(":")
-        effect: Effect = chosen(name, registry.effects, "effect")
-        model = model + (effect.in_form(form) if form else effect)
-    return Opened(registry, read, model, intervals(bounds, "--bounds"), fixed_values(fix, model))
+    return {
+        "effects": [name for name in effects.split(",") if name.strip()], "plugins": tuple(plugins),
+        "window": interval(window, "--window") if window else None, "bounds": intervals(bounds, "--bounds"),
+        "fix": numbers(fix, "--fix"),
+    }  # fmt: skip
 
 
 def examples(*lines: str) -> str:
@@ -111,7 +150,7 @@ def number(text: str, option: str) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise ArmidError(f"{option}: '{text}' is no number") from error
+        raise ArmidError(f"{option}: '{text}' is no number: one is expected, SI") from error
 
 
 def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> dict[str, str]:
@@ -143,21 +182,7 @@ def value_of(text: str) -> float | int | bool | str:
 
 
 def numbers(texts: Iterable[str], option: str) -> dict[str, float]:
-    """Return NAME -> number."""
     return {name: number(value, f"{option} {name}") for name, value in assignments(texts, option).items()}
-
-
-def fixed_values(texts: Iterable[str], model: Model) -> dict[str, float]:
-    """Return NAME -> number of --fix, SI; warn of one far outside the declared range, as a forgotten factor gives."""
-    found = numbers(texts, "--fix")
-    for name, value in found.items():
-        p = model.parameters.get(name)
-        if p is None or not isfinite(value):
-            continue
-        if abs(value) > FAR * max(abs(p.low), abs(p.high)) or FAR * value < p.low:
-            text = f"--fix {name}={value:g} is far outside the declared range, {p.low:g} to {p.high:g} {p.unit}"
-            warnings.warn(f"{text}; it is taken as it is", stacklevel=2)
-    return found
 
 
 def interval(text: str, option: str) -> tuple[float, float]:
@@ -172,16 +197,6 @@ def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float
     """Return NAME -> (low, high)."""
     found = assignments(texts, option, "NAME=LOW:HIGH")
     return {name: interval(value, f"{option} {name}") for name, value in found.items()}
-
-
-def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
-    """Return what is registered under a name.
-
-    Raises ArmidError with the nearest valid name.
-    """
-    if name not in known:
-        raise ArmidError(f"{what} '{name}' is not known: {nearest(name, known)}")
-    return known[name]
 
 
 def accuracy_of(text: str) -> str | None:

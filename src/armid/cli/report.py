@@ -1,134 +1,39 @@
-"""`armid report`: one page, tables and figures from stored results."""
+"""`armid report`: one page, tables and figures from stored results; and how a command shows its own result."""
 
 import json
-import os
 import shlex
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from armid.cli.options import examples, plugin_option
+from armid.cli.options import command, examples, give, plugin_option, say, speaks
 from armid.errors import ArmidError
 from armid.registry import load_registry
-
-if TYPE_CHECKING:
-    from armid.report.document import Document
-
-DETAILS = "details.json"
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of result of a command on a campaign.
-
-    file : of the result, JSON. page, markdown : names of its page and of its Markdown, "" for none.
-    module, function : of what makes its document of (result, details, SVG by name, command); imported when asked for,
-    as every other command starts faster without it. The module's FIGURES names the SVG files that are on the page.
-    """
-
-    command: str
-    file: str
-    page: str
-    module: str
-    function: str
-    markdown: str = ""
-
-    @property
-    def figures(self) -> tuple[str, ...]:
-        return tuple(import_module(self.module).FIGURES)
-
-    @property
-    def document(self) -> "Callable[..., Document]":
-        made: Callable[..., Document] = getattr(import_module(self.module), self.function)
-        return made
+from armid.report.result import (
+    IDENTIFIABILITY,
+    IDENTIFICATION,
+    LOOP,
+    Kind,
+    NewFiles,
+    Result,
+    document_of,
+    refuse_damaged,
+    refuse_unwritable,
+)
 
 
-IDENTIFICATION = Kind("armid identify", "result.json", "report.html",
-                      "armid.estimation.identify_document", "identify_document")  # fmt: skip
-IDENTIFIABILITY = Kind("armid identifiability", "identifiability.json", "identifiability.html",
-                       "armid.estimation.identifiability_document", "identifiability_document")  # fmt: skip
-LOOP = Kind("armid close-loop", "report.json", "report.html", "armid.loop.document", "loop_document", "report.md")
-
-
-def show_and_write(kind: Kind, result: Mapping[str, Any], details: Mapping[str, Any], out: Path | None,
-                   figures: Mapping[str, Callable[[], Any]]) -> None:  # fmt: skip
-    """Print the document of a result; with a folder, write result, details, figures, page and Markdown, all or none.
-
-    details: but for `made_by`, which is set here. figures: name -> what draws it as matplotlib's.
-    """
-    from armid.report.markdown import markdown
-    from armid.report.style import save
+def show_and_save(found: Result, out: Path | None) -> None:
+    """Print the answer and the main tables of a result, then with a folder write its files, all or none."""
     from armid.report.terminal import show
 
-    stored = {"made_by": made_by(), **details}
-    show(kind.document(result, stored, {}, ""))
-    if out is None:
-        return
-    with NewFiles(out) as files:
-        files.path(kind.file).write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        for name, draw in figures.items():
-            endings = ("png", "svg") if name in kind.figures else ("png",)
-            save(draw(), *(files.path(f"{name}.{ending}") for ending in endings))
-        if details:
-            files.path(DETAILS).write_text(json.dumps(stored, allow_nan=False) + "\n", encoding="utf-8")
-        if kind.markdown:
-            text = markdown(document_of(files.place, kind, str(out)))
-            files.path(kind.markdown).write_text(text, encoding="utf-8")
-        write_page(files, kind, out)
-    print(f"wrote {', '.join(files.names)} to {out}")
-
-
-def write_page(files: "NewFiles", kind: Kind, folder: Path, stored: Path | None = None) -> int:
-    """Write the page of a result that is in `stored` (None: among the new files); return its size in bytes."""
-    from armid.report.html import html
-
-    text = html(document_of(stored or files.place, kind, str(folder)))
-    files.path(kind.page).write_text(text, encoding="utf-8")
-    return len(text.encode())
-
-
-def document_of(folder: Path, kind: Kind, name: str) -> "Document":
-    """Return the document of what a folder holds.
-
-    folder: where the files are. name: of the folder, in the command that makes the page again.
-
-    Raises ArmidError for files that are not what the command writes.
-    """
-    result = read_json(folder / kind.file, kind.command)
-    has_details = (folder / DETAILS).is_file() and kind is not IDENTIFIABILITY
-    details = read_json(folder / DETAILS, kind.command) if has_details else {}
-    files = {figure: folder / f"{figure}.svg" for figure in kind.figures}
-    try:
-        svgs = {figure: path.read_text(encoding="utf-8") for figure, path in files.items() if path.is_file()}
-    except UnicodeDecodeError as error:
-        raise ArmidError(f"{folder} holds a figure that is no text: the SVG of `{kind.command}` is expected") from error
-    try:
-        return kind.document(result, details, svgs, f"armid report {name}")
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise ArmidError(
-            f"{folder / kind.file}, or details.json beside it, is not what `{kind.command}` writes "
-            f"({type(error).__name__}: {error}): a folder that it wrote is expected"
-        ) from error
-
-
-def read_json(path: Path, command: str) -> dict[str, Any]:
-    """Return a stored JSON table.
-
-    Raises ArmidError for a file that is none.
-    """
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ArmidError(f"{path} is no JSON ({error}): what `{command}` wrote is expected") from error
-    if not isinstance(found, dict):
-        raise ArmidError(f"{path} holds no table: what `{command}` wrote is expected")
-    return found
+    document = found.document()
+    if speaks():
+        show(document)
+    files = [] if out is None else found.save(out, made_by())
+    if files:
+        say(f"wrote {', '.join(files)} to {out}")
+    give(**found.to_dict(), answer=document.said, files=files)
 
 
 def made_by() -> dict[str, Any]:
@@ -139,67 +44,10 @@ def made_by() -> dict[str, Any]:
     return {"command": shlex.join(["armid", *words]), "settings": settings}
 
 
-class NewFiles:
-    """Write files beside a folder and move them in when all are there, so that nothing half-written is found.
-
-    names: the files so far. A folder that is made for them goes again when nothing comes into it.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.names: list[str] = []
-
-    def __enter__(self) -> "NewFiles":
-        if self.folder.exists() and not self.folder.is_dir():
-            raise ArmidError(f"--out {self.folder} is a file: a folder is expected")
-        self._is_new = not self.folder.exists()
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._beside = TemporaryDirectory(dir=self.folder, prefix=".armid-")
-        return self
-
-    @property
-    def place(self) -> Path:
-        """Where the files are until all are there."""
-        return Path(self._beside.name)
-
-    def path(self, name: str) -> Path:
-        """Return where to write a file for now.
-
-        Raises ArmidError when a folder has its name.
-        """
-        if (self.folder / name).is_dir():
-            raise ArmidError(f"--out {self.folder} holds a folder {name}: a place for a file of that name is expected")
-        self.names.append(name)
-        path = self.place / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        if kind is None:
-            for name in self.names:
-                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                os.replace(self.place / name, self.folder / name)
-        self._beside.cleanup()
-        if self._is_new:
-            with suppress(OSError):
-                self.folder.rmdir()
-
-
-def refuse_unwritable(folder: Path | None) -> None:
-    """Refuse a folder before the work, not after it.
-
-    Raises ArmidError for a file, OSError for a place where nothing can be written.
-    """
-    if folder is not None:
-        with NewFiles(folder):
-            pass
-
-
 STUDY, PAGE = "study.sqlite", "report.html"
-BESIDE = "each table is there as CSV and LaTeX too, each figure as SVG."
 
 
-@click.command("report", short_help="Write the page of stored results.", epilog=examples(
+@command("report", short_help="Write the page of stored results.", epilog=examples(
     "armid report results/table1_short", "armid report results/four_strokes",
 ))  # fmt: skip
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
@@ -219,23 +67,31 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     printed; one that is not complete is reported as far as it is, and the report says so. An analysis of your own,
     --plugin FILE.py:name, becomes a section of it.
     """
+    from armid.report.html import html
+    from armid.report.markdown import markdown
+    from armid.report.terminal import show
+
     kind = kind_in(folder)
+    refuse_unwritable(folder if kind else None)
     if kind is None:
         report_study(folder, key, plugins)
         return
     if key is not None:
         raise ArmidError(f"{folder} holds no study, and a key is the truth of a study's campaigns: none is expected")
-    with NewFiles(folder) as files:
-        size = write_page(files, kind, folder, folder)
-    print(f"wrote {kind.page} ({size / 1e6:.1f} MB) to {folder}")
+    document = document_of(folder, kind, str(folder))
+    with NewFiles(folder) as files, refuse_damaged(folder, kind):
+        if speaks():
+            show(document)
+        page = html(document)
+        files.path(kind.page).write_text(page, encoding="utf-8")
+        files.path(kind.markdown).write_text(markdown(document), encoding="utf-8")
+    say(f"wrote {kind.page} ({len(page.encode()) / 1e6:.1f} MB) and {kind.markdown} to {folder}")
+    give(answer=document.said, folder=folder, files=files.names)
 
 
 def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
-    from armid.report.files import write_files
-    from armid.report.html import html
-    from armid.report.markdown import markdown
     from armid.report.terminal import show
-    from armid.study.document import report_of
+    from armid.study.document import report_of, write_report
     from armid.study.results import load_study
 
     results = load_study(folder)
@@ -243,15 +99,13 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
     again = shlex.join(["armid", "report", f"results/{results.study['name']}", *named])
     document = report_of(results, key, load_registry(plugins).analyses, again)
     place = results.path.parent
+    refuse_unwritable(place)
+    if speaks():
+        show(document)
     with NewFiles(place) as files:
-        write_files(document, files.path)
-        files.path("report.md").write_text(
-            markdown(document, f"Made from the stored results by `{again}`; {BESIDE}"), encoding="utf-8"
-        )
-        svgs = {f.name: (files.place / f"{f.name}.svg").read_text(encoding="utf-8") for f in document.figures}
-        files.path(PAGE).write_text(html(document, svgs), encoding="utf-8")
-    show(document)
-    print(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
+        write_report(document, files)
+    say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
+    give(answer=document.said, folder=place, files=files.names)
 
 
 def kind_in(folder: Path) -> Kind | None:

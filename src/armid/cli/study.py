@@ -1,4 +1,4 @@
-"""`armid study`: run what is missing of a study."""
+"""`armid study`: run what is missing of a study; `armid tune`: set the options of its identifiers."""
 
 import sys
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armid.cli.options import examples, out_option, plugin_option
+from armid.cli.options import command, examples, give, out_option, plugin_option, say, speaks
 
 if TYPE_CHECKING:
     from armid.study.runner import Ending
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 MOST_NAMED = 300
 
 
-@click.command("study", short_help="Run what is missing of a study.", epilog=examples(
+@command("study", short_help="Run what is missing of a study.", epilog=examples(
     "armid study studies/table1_short.toml",
     "armid study studies/table1.toml --jobs 2 --only 'row 1/pso*'",
     "armid study mine.toml --plugin mine.py:my_search --out results/mine",
@@ -45,26 +45,33 @@ def study_command(
     with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
     from armid.study.runner import TIME_LIMIT_S, ProgressBar, absolute, run
-    from armid.study.tasks import read_study
+    from armid.study.tasks import Study, read_study
 
-    with ProgressBar() as watch:
+    with ProgressBar(speaks()) as watch:
         known = read_study(study, absolute(plugins))
+        if isinstance(known, Study) and speaks():
+            # beside the output, whose first line is the answer
+            print(f"{known.name}: {known.cost()}; what is finished already is kept", file=sys.stderr, flush=True)
         limit = TIME_LIMIT_S if time_limit is None else time_limit
         ending = run(known, study, jobs, dask, out, limit, only, retry, watch.update)
-    for line in words(ending):
-        print(line)
+    answer = show_answer(ending.folder) if ending.counts.done else []
+    say(*words(ending))
+    counts = {key: getattr(ending.counts, key) for key in ("planned", "done", "failed", "missing")}
+    give(study=known.name, folder=ending.folder, answer=answer, **counts, interrupted=ending.interrupted)
     if ending.interrupted:
         sys.exit(130)
-    if ending.counts.done:
-        show_table(ending.folder)
 
 
-def show_table(folder: Path) -> None:
+def show_answer(folder: Path) -> list[str]:
+    """Print the answer so far with its table; return its sentences."""
     from armid.report.terminal import show
     from armid.study.document import summary_of
     from armid.study.results import load_study
 
-    show(summary_of(load_study(folder)))
+    document = summary_of(load_study(folder))
+    if speaks():
+        show(document)
+    return document.said
 
 
 def words(ending: "Ending") -> list[str]:
@@ -83,3 +90,44 @@ def words(ending: "Ending") -> list[str]:
     if counts.failed:
         lines.append(f"{counts.failed} runs failed, the first: {ending.first_error[:MOST_NAMED]}")
     return lines
+
+
+@command("tune", short_help="Tune the identifiers of a study on other instances.", epilog=examples(
+    "armid tune studies/suite/suite.toml --out out/tuned",
+    "armid study out/tuned/tuned.toml --out out/suite_tuned",
+))  # fmt: skip
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--configurations", type=click.IntRange(1), default=20, show_default=True, help="Tried of each.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of proposals and searches.")
+@out_option("Folder of the tuned study. [default: results/NAME_tuned]")
+@plugin_option
+def tune_command(
+    study: Path, configurations: int, seed: int, out: Path | None, plugins: tuple[str, ...]
+) -> None:  # fmt: skip
+    """Write STUDY again with each identifier twice, as it is and tuned.
+
+    Every identifier gets the same number of configurations, its defaults among them, judged by the area over the
+    convergence curve on the instances that [suite] calls train; the study itself is run on others. Needs Optuna.
+    """
+    from armid.errors import ArmidError
+    from armid.report.result import NewFiles
+    from armid.study.runner import RESULTS, absolute
+    from armid.study.tasks import Study, read_study
+    from armid.study.tune import training, tunable, tune, tuned_study
+
+    known = read_study(study, absolute(plugins))
+    if not isinstance(known, Study):
+        raise ArmidError(f"study '{known.name}' closes loops, armid tune expects one that identifies")
+    cases, entries = training(known), tunable(known)
+    most = sum(entry.budgets(len(case.bounds))[-1] for entry in entries for case in cases)
+    say(f"{known.name}: {len(entries)} identifiers, {configurations} configurations each on {len(cases)} training "
+        f"instances: {configurations * most:,} simulations at most")  # fmt: skip
+    found = []
+    for entry in entries:
+        found.append(tune(entry, known, cases, configurations, seed))
+        say(f"{entry.label}: area {found[-1].default:.3f} as it is, {found[-1].tuned:.3f} tuned, {found[-1].options}")
+    folder = RESULTS / f"{known.name}_tuned" if out is None else out
+    with NewFiles(folder) as files:
+        files.path("tuned.toml").write_text(tuned_study(known, found), encoding="utf-8")
+    say(f"wrote tuned.toml to {folder}")
+    give(study=known.name, folder=folder, tuned={each.label: each.options for each in found})

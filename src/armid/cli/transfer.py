@@ -4,18 +4,23 @@ from pathlib import Path
 
 import click
 
-from armid.cli.options import examples, out_option, plugin_option
-from armid.cli.report import NewFiles, refuse_unwritable
+from armid.cli.options import Group, examples, give, out_option, plugin_option, say
 from armid.errors import ArmidError
 from armid.registry import load_registry
+from armid.report.result import NewFiles, refuse_unwritable
 
 
-@click.group("import")
+@click.group("import", cls=Group)
 def import_group() -> None:
     """Make a campaign from public measured data.
 
     The data themselves are not part of this package.
     """
+
+
+def told(folder: Path) -> None:
+    say(f"wrote {folder}")
+    give(folder=folder)
 
 
 @import_group.command("emps", epilog=examples("armid import emps FOLDER --out studies/campaigns/emps"))
@@ -32,7 +37,7 @@ def emps(folder: Path | None, out: Path, plugins: tuple[str, ...]) -> None:
     from armid.record.importers import import_emps
 
     load_registry(plugins)
-    print(f"wrote {import_emps(folder, out)}")
+    told(import_emps(folder, out))
 
 
 @import_group.command("dfki", short_help="Import DFKI's torque-limited simple pendulum: a rotary axis that swings up.",
@@ -50,10 +55,10 @@ def dfki(folder: Path, out: Path, holdout: str | None, plugins: tuple[str, ...])
     from armid.record.importers import import_dfki
 
     load_registry(plugins)
-    print(f"wrote {import_dfki(folder, out, holdout)}")
+    told(import_dfki(folder, out, holdout))
 
 
-@click.group("export", short_help="Write stored results for other programs.")
+@click.group("export", cls=Group, short_help="Write stored results for other programs.")
 def export_group() -> None:
     """Write stored results in the formats of other programs."""
 
@@ -78,7 +83,8 @@ def ioh_command(folder: Path, out: Path) -> None:
         n_runs = export_ioh(load_study(folder), files.path)
         if not n_runs:
             raise ArmidError(f"{folder} holds no trace of a finished run: nothing can be exported")
-    print(f"wrote {n_runs} runs in {len(files.names)} files to {out}")
+    say(f"wrote {n_runs} runs in {len(files.names)} files to {out}")
+    give(folder=out, runs=n_runs, files=files.names)
 
 
 @export_group.command("reports")
@@ -98,4 +104,5 @@ def reports_command(folder: Path, out: Path) -> None:
         raise ArmidError(f"{folder} holds a study of kind '{results.study['kind']}', '{CLOSES_LOOP}' is expected")
     with NewFiles(out) as files:
         n_reports = export_reports(results, files.path)
-    print(f"wrote {n_reports} reports to {out}")
+    say(f"wrote {n_reports} reports to {out}")
+    give(folder=out, files=files.names)

@@ -1,6 +1,6 @@
 """The entrance to all contracts; those of a campaign and of a fitness."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,8 @@ from armid.contract.equations import check_effect, check_plant
 from armid.contract.identifier import check_identifier
 from armid.contract.trials import ContractPoint
 from armid.errors import ArmidError
+from armid.estimation.mends import Suspicion
+from armid.estimation.screen import screen
 from armid.identifiers import as_identifier
 from armid.model import PLANTS, Effect, Plant
 from armid.problem.fitness import Fitness, as_fitness
@@ -149,50 +151,58 @@ Array = NDArray[np.float64]
 INTERVAL, NOISE = 1e-3, 0.01
 
 
-def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> list[ContractPoint]:
-    """Run the contract of a plant, an effect, a fitness, an identifier or an analysis.
+def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> Iterator[ContractPoint]:
+    """Run the contract of a plant, an effect, a fitness, an identifier or an analysis, and yield each point when done.
 
     kind: "plants", "effects", "fitness", "identifiers" or "analyses". plants: those on which an effect is tried.
     Raises ArmidError for an object that does not even have the form of its kind.
     """
     if kind == "plants":
-        return check_plant(thing)
-    if kind == "effects":
-        return check_effect(thing, plants)
-    if kind == "fitness":
-        return check_fitness(as_fitness(name, thing))
-    if kind == "analyses":
-        return check_analysis(name, thing)
-    return check_identifier(as_identifier(name, thing))
+        yield from check_plant(thing)
+    elif kind == "effects":
+        yield from check_effect(thing, plants)
+    elif kind == "fitness":
+        yield from check_fitness(as_fitness(name, thing))
+    elif kind == "analyses":
+        yield from check_analysis(name, thing)
+    else:
+        yield from check_identifier(as_identifier(name, thing))
 
 
-def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> list[ContractPoint]:
-    """Try a campaign that was read: its model composes, and follows every record to its end.
+def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[ContractPoint]:
+    """Try a campaign that was read: its model composes, and follows every record to its end; records are plausible.
 
-    Free parameters are in the middle of their range. effects: name -> those that it may declare.
+    Free parameters are in the middle of their range; for what is plausible see `screen`. effects: name -> those that
+    it may declare.
     """
     n_train, n_holdout = len(campaign.train), len(campaign.holdout)
     text = f"{n_train} to train on, {n_holdout} held out"
-    found = [ContractPoint("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")]
+    yield ContractPoint("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")
     for record in campaign.records:
         noise, n = record.noise, record.measured.size
         text = f"{n} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
-        found.append(ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})"))
+        yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})")
     try:
         model = campaign.model(effects)
         space = space_of(model, campaign.parameters)
         free = ", ".join(space.free_names) or "nothing"
-        moves = [ContractPoint("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")]
+        yield ContractPoint("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")
         middle = 0.5 * (space.low + space.high)[space.free]
         for replay in replays(campaign.records, model, space):
             signal = replay.signal(space.complete(middle[np.newaxis]))[0]
             whole = bool(np.isfinite(signal).all())
             size = f"up to {np.max(np.abs(signal)):.3g}" if whole else "diverges"
             text = f"simulated {size}, measured up to {np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
-            moves.append(ContractPoint(f"moves in {replay.record.file}", whole, text))
+            yield ContractPoint(f"moves in {replay.record.file}", whole, text)
+        yield from plausible(screen(campaign, model, space))
     except ArmidError as error:
-        moves = [ContractPoint("model", False, str(error))]
-    return found + moves
+        yield ContractPoint("model", False, str(error))
+
+
+def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:
+    """Return a failing point for each mistake that a screen has found, a passing one where there is none."""
+    wrong = [ContractPoint(f"plausible ({s.kind})", False, s.sentence) for s in found]
+    return wrong or [ContractPoint("plausible", True, "no sign, unit, clock or manoeuvre of a record looks wrong")]
 
 
 def check_fitness(fitness: Fitness) -> list[ContractPoint]:

@@ -1,7 +1,8 @@
 """The contracts of plants and of effects."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,33 +21,32 @@ from armid.contract.trials import (
     strengths_of,
     trial_manoeuvres,
 )
-from armid.engine import FINE, calibrate, simulate
+from armid.engine import FINE, along, calibrate, simulate
+from armid.engine.calibrate import difference
 from armid.errors import ArmidError
 from armid.model import PLANTS, Effect, Manoeuvre, Model, Plant
 from armid.model.effect import Equation
+from armid.model.plant import SPEEDS
 
 Array = NDArray[np.float64]
-UNITS = ("rad/s", "m/s")
-# Shares of the plant's speed scale: at null, and against scipy.
+# Shares of the size of an output: at null, and against scipy.
 NULL_TOLERANCE, REFERENCE_TOLERANCE = 1e-12, 1e-5
 N_CANDIDATES, AWAY = 16, 0.3
 # Shares of the range at which the response to a strength is compared, and by how much it may bend between them.
 SMALL, BENT = np.array([1e-4, 2e-4]), 0.05
 
 
-def check_plant(plant: Plant) -> list[ContractPoint]:
-    """Try a plant and its siblings on trial manoeuvres."""
-    found = []
+def check_plant(plant: Plant) -> Iterator[ContractPoint]:
+    """Try a plant and its siblings on trial manoeuvres, and yield each point when it is done."""
     for p in (plant, *plant.variants):
         try:
             model = Model(p)
             simulate(model, trial_manoeuvres(p)[0].shortened(2), nominal(model))
         except ArmidError as error:
-            here = [ContractPoint("binds", False, str(error))]
+            here: Iterable[ContractPoint] = [ContractPoint("binds", False, str(error))]
         else:
-            here = [*plant_declared(model), *plant_moves(model)]
-        found += [replace(f, name=f"{f.name}, {p.name} in {p.output_unit}") for f in here]
-    return found
+            here = chain(plant_declared(model), plant_moves(model))
+        yield from (replace(f, name=f"{f.name}, {p.name} in {units_of(p)}") for f in here)
 
 
 def plant_declared(model: Model) -> list[ContractPoint]:
@@ -58,31 +58,35 @@ def plant_declared(model: Model) -> list[ContractPoint]:
     return [
         ContractPoint("binds", True, f"{len(model.parameters)} parameters, {len(model.states)} states; ports: {ports}"),
         *check_parameters(plant.parameters),
-        ContractPoint("unit", plant.output_unit in UNITS,
-                      f"records {plant.output_unit}, {' or '.join(UNITS)} is expected"),
-        ContractPoint("printed", plant.output in str(model), "print(model) shows its equations"),
+        ContractPoint("unit", not plant.records_one_speed or plant.output_unit in SPEEDS,
+                      f"records {units_of(plant)}; {' or '.join(SPEEDS)} without `outputs`"),
+        ContractPoint("printed", all(o.signal in str(model) for o in plant.outputs),
+                      "print(model) shows its equations"),
         finding("guards", idle, "nothing depends on guard {}, or it never moves",
                 f"all of {len(plant.guards)} guards are used"),
     ]  # fmt: skip
 
 
-def plant_moves(model: Model) -> list[ContractPoint]:
+def plant_moves(model: Model) -> Iterator[ContractPoint]:
     manoeuvres, x = trial_manoeuvres(model.plant), nominal(model)
-    moved = [float(np.ptp(simulate(model, m, x).output)) for m in manoeuvres]
-    size = f"the signal runs over {', '.join(f'{v:.2g}' for v in moved)} {model.plant.output_unit}"
-    return [
-        ContractPoint("moves", 0.0 not in moved, size), finite(model, manoeuvres, over_box(model, N_CANDIDATES)),
-        deterministic(model, manoeuvres[0], over_box(model, 9)),
-        *(replace(agrees(model, model, x, m), name=f"compiled (manoeuvre {i + 1})") for i, m in enumerate(manoeuvres)),
-    ]  # fmt: skip
+    moved = [float(np.ptp(y)) for m in manoeuvres for y in simulate(model, m, x).outputs]
+    size = f"the signal runs over {', '.join(f'{v:.2g}' for v in moved)} {units_of(model.plant)}"
+    yield ContractPoint("moves", 0.0 not in moved, size)
+    yield finite(model, manoeuvres, over_box(model, N_CANDIDATES))
+    yield deterministic(model, manoeuvres[0], over_box(model, 9))
+    for i, m in enumerate(manoeuvres):
+        yield replace(agrees(model, model, x, m), name=f"compiled (manoeuvre {i + 1})")
 
 
-def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS, strict: bool = False) -> list[ContractPoint]:
-    """Try an effect, in each of its forms, on every plant that offers its ports and names.
+def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS, strict: bool = False) -> Iterator[ContractPoint]:
+    """Try an effect, in each of its forms, on every plant that offers its ports; yield each point when it is done.
 
     strict: a function without a docstring fails; otherwise that is only said.
     """
-    return check_effects([effect], plants, strict)[0]
+    for form in effect.every_form:
+        models, refusals = composed(form, plants)
+        points = chain(declared(form, models, refusals, strict), *(check_on(form, m, m) for m in models))
+        yield from (of_form(point, form) for point in points)
 
 
 def check_effects(
@@ -95,33 +99,42 @@ def check_effects(
     """
     found: list[list[ContractPoint]] = [[] for _ in effects]
     for k in range(max((len(effect.every_form) for effect in effects), default=0)):
-        places = [i for i, effect in enumerate(effects) if k < len(effect.every_form)]
-        forms = [effects[i].every_form[k] for i in places]
-        for i, form, here in zip(places, forms, check_forms(forms, plants, strict), strict=True):
-            found[i] += [replace(f, name=f"{f.name} in the form {form.form}") if form.form else f for f in here]
+        forms = {i: effect.every_form[k] for i, effect in enumerate(effects) if k < len(effect.every_form)}
+        fits = {i: composed(form, plants) for i, form in forms.items()}
+        here = {i: declared(form, *fits[i], strict) for i, form in forms.items()}
+        for plant in siblings(plants):
+            models = {i: model for i, (several, _) in fits.items() for model in several if model.plant is plant}
+            joint = joint_model(plant, [forms[i] for i in models])
+            for i, model in models.items():
+                here[i] += check_on(forms[i], model, joint or model)
+        for i, form in forms.items():
+            found[i] += [of_form(point, form) for point in here[i]]
     return found
 
 
-def check_forms(forms: Sequence[Effect], plants: Mapping[str, Plant], strict: bool) -> list[list[ContractPoint]]:
-    """Try effects, each in the form that it has, on every plant and its siblings."""
-    moved: list[list[ContractPoint]] = [[] for _ in forms]
-    fitting: list[list[str]] = [[] for _ in forms]
-    refusals: list[list[str]] = [[] for _ in forms]
-    for plant in (p for given in plants.values() for p in (given, *given.variants)):
-        models: dict[int, Model] = {}
-        for i, form in enumerate(forms):
-            try:
-                models[i] = Model(plant) + form
-                fitting[i].append(plant.name)
-            except ArmidError as error:
-                refusals[i].append(f"{plant.name}: {error}")
-        joint = joint_model(plant, [forms[i] for i in models])
-        for i, model in models.items():
-            moved[i] += check_on(forms[i], model, joint or model)
-    return [
-        [binding(*names), *check_parameters(form.parameters), has_null(form), documented(form, strict), *on_plants]
-        for form, names, on_plants in zip(forms, zip(fitting, refusals, strict=True), moved, strict=True)
-    ]
+def of_form(point: ContractPoint, form: Effect) -> ContractPoint:
+    return replace(point, name=f"{point.name} in the form {form.form}") if form.form else point
+
+
+def siblings(plants: Mapping[str, Plant]) -> list[Plant]:
+    return [p for given in plants.values() for p in (given, *given.variants)]
+
+
+def composed(form: Effect, plants: Mapping[str, Plant]) -> tuple[list[Model], list[str]]:
+    """Return the models of an effect with each plant that takes it, and why the others do not."""
+    models, refusals = [], []
+    for plant in siblings(plants):
+        try:
+            models.append(Model(plant) + form)
+        except ArmidError as error:
+            refusals.append(f"{plant.name}: {error}")
+    return models, refusals
+
+
+def declared(form: Effect, models: Sequence[Model], refusals: list[str], strict: bool) -> list[ContractPoint]:
+    """Check what can be told of an effect without moving."""
+    return [binding([m.plant.name for m in models], refusals), *check_parameters(form.parameters), has_null(form),
+            documented(form, strict)]  # fmt: skip
 
 
 def joint_model(plant: Plant, effects: Sequence[Effect]) -> Model | None:
@@ -136,22 +149,27 @@ def joint_model(plant: Plant, effects: Sequence[Effect]) -> Model | None:
     return model
 
 
-def check_on(effect: Effect, alone: Model, model: Model) -> list[ContractPoint]:
+def check_on(effect: Effect, alone: Model, model: Model) -> Iterator[ContractPoint]:
     """Try an effect on one plant; alone: the plant with the effect; model: the same or one with other effects."""
-    where = f"on {alone.plant.name} in {alone.plant.output_unit}"
+    where = f"on {alone.plant.name} in {units_of(alone.plant)}"
     manoeuvres = trial_manoeuvres(alone.plant)
     try:
         simulate(model, manoeuvres[0].shortened(2), nominal(model))
     except ArmidError as error:
-        return [ContractPoint(f"compiles {where}", False, str(error))]
-    spread = np.concatenate([within(model, alone, over_box(alone, N_CANDIDATES)), corners(model, effect)])
-    found = [
-        printed(effect, alone), null_law(alone, model, manoeuvres), acts(effect, model, manoeuvres),
-        responds(effect, model, manoeuvres), finite(model, manoeuvres, spread),
-        deterministic(model, manoeuvres[0], within(model, alone, over_box(alone, 9))), on_arrays(effect, alone),
-        agrees(model, alone, away(alone, effect, AWAY), manoeuvres[0]),
-    ]  # fmt: skip
-    return [replace(f, name=f"{f.name} {where}") for f in found]
+        yield ContractPoint(f"compiles {where}", False, str(error))
+        return
+    points: tuple[Callable[[], ContractPoint], ...] = (
+        lambda: printed(effect, alone), lambda: null_law(alone, model, manoeuvres),
+        lambda: acts(effect, model, manoeuvres), lambda: responds(effect, model, manoeuvres),
+        lambda: finite(model, manoeuvres, np.concatenate([within(model, alone, over_box(alone, N_CANDIDATES)),
+                                                          corners(model, effect)])),
+        lambda: deterministic(model, manoeuvres[0], within(model, alone, over_box(alone, 9))),
+        lambda: on_arrays(effect, alone),
+        lambda: agrees(model, alone, away(alone, effect, AWAY), manoeuvres[0]),
+    )  # fmt: skip
+    for point in points:
+        found = point()
+        yield replace(found, name=f"{found.name} {where}")
 
 
 def within(model: Model, part: Model, candidates: Array) -> Array:
@@ -170,14 +188,37 @@ def printed(effect: Effect, model: Model) -> ContractPoint:
 
 
 def null_law(alone: Model, model: Model, manoeuvres: list[Manoeuvre]) -> ContractPoint:
-    """Tell whether at null, whatever its other parameters are, the model moves as it does without the effect."""
-    bare = Model(model.plant)
+    """Tell whether at null, whatever its other parameters are, the model moves as it does without the effect.
+
+    Where all that it adds is exactly 0 along the motion, that motion is the plant's own, which need not be compiled;
+    else the two are compared.
+    """
     population = at_null(alone, N_CANDIDATES)
+    if adds_nothing(alone, model, population, manoeuvres):
+        return ContractPoint("null law", True, "at null it adds exactly 0 all along the motion")
+    bare = Model(model.plant)
     own = [n in bare.parameters for n in alone.parameters]
     full = within(model, alone, population)
-    difference = max(distance(bare, population[:, own], model, full, m) for m in manoeuvres)
-    kept = difference <= NULL_TOLERANCE * model.plant.scales.speed
-    return ContractPoint("null law", kept, f"at null the signal differs by {difference:.2g} {model.plant.output_unit}")
+    apart = max(distance(bare, population[:, own], model, full, m) for m in manoeuvres)
+    kept = apart <= NULL_TOLERANCE * model.plant.sizes[0]
+    return ContractPoint("null law", kept, f"at null the signal differs by {apart:.2g} {model.plant.output_unit}")
+
+
+def adds_nothing(alone: Model, model: Model, population: Array, manoeuvres: list[Manoeuvre]) -> bool:
+    """Tell whether all that the last effect of a model adds is exactly 0 along the motions of a population."""
+    effect = alone.effects[-1]
+    terms = [f"{effect.name}.{port}" for port in effect.adds]
+    for m in manoeuvres:
+        schedule = calibrate(model, m, within(model, alone, population), spans=False).schedule
+        for candidate in within(model, alone, population):
+            with np.errstate(all="ignore"):
+                try:
+                    values = along(model, m, candidate, schedule, terms).values()
+                except (TypeError, ValueError):  # statements that arrays cannot take: the compiled models are compared
+                    return False
+            if not all(np.array_equal(value, np.zeros_like(value)) for value in values):
+                return False
+    return True
 
 
 def acts(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> ContractPoint:
@@ -195,7 +236,7 @@ def distance(one: Model, x: Array, other: Model, y: Array, manoeuvre: Manoeuvre)
     a, b = simulate(one, manoeuvre, x, schedule), simulate(other, manoeuvre, y, schedule)
     if not np.array_equal(a.failed, b.failed):
         return np.inf
-    return float(np.max(np.abs(a.output[~a.failed] - b.output[~b.failed]), initial=0.0))
+    return difference(a, b, one)
 
 
 def responds(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> ContractPoint:
@@ -206,7 +247,8 @@ def responds(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Contr
     answers = np.zeros((len(strengths), 2))
     for m in manoeuvres:
         both = np.concatenate([still, strengths.reshape(-1, still.shape[1])])
-        output = simulate(model, m, both, calibrate(model, m, both, spans=False).schedule).output
+        run = simulate(model, m, both, calibrate(model, m, both, spans=False).schedule)
+        output = run.joint(model.plant.sizes)
         moved = np.abs(output[1:] - output[0]).max(axis=1).reshape(len(strengths), 2) / SMALL
         answers = np.where(moved[:, 1:] > answers[:, 1:], moved, answers)
     names = [p.name for p in strengths_of(effect)]
@@ -229,10 +271,11 @@ def finite(model: Model, manoeuvres: list[Manoeuvre], spread: Array) -> Contract
 
 def deterministic(model: Model, manoeuvre: Manoeuvre, candidates: Array) -> ContractPoint:
     """Tell whether the same candidates give the same signal again, bit for bit."""
-    first, second = (simulate(model, manoeuvre, candidates).output for _ in range(2))
-    same = bool(np.array_equal(first, second, equal_nan=True))
-    return ContractPoint("deterministic", same, "the same candidates move the same, bit for bit" if same else
-                   "the same candidates move differently when they are simulated again")  # fmt: skip
+    runs = [np.moveaxis(simulate(model, manoeuvre, candidates).outputs, 1, 0) for _ in range(2)]
+    differ = np.flatnonzero([not np.array_equal(a, b, equal_nan=True) for a, b in zip(*runs, strict=True)])
+    text = f"candidate {differ[0] + 1} moves differently when it is simulated again" if differ.size else (
+        "the same candidates move the same, bit for bit")  # fmt: skip
+    return ContractPoint("deterministic", not differ.size, text)
 
 
 def on_arrays(effect: Effect, model: Model) -> ContractPoint:
@@ -254,14 +297,19 @@ def on_arrays(effect: Effect, model: Model) -> ContractPoint:
 def agrees(model: Model, alone: Model, candidate: Array, manoeuvre: Manoeuvre) -> ContractPoint:
     """Tell whether the compiled model agrees with plain functions under scipy; alone, candidate: what they simulate."""
     compiled = within(model, alone, candidate[np.newaxis])
-    found = simulate(model, manoeuvre, compiled, calibrate(model, manoeuvre, compiled, FINE).schedule).output[0]
+    run = simulate(model, manoeuvre, compiled, calibrate(model, manoeuvre, compiled, FINE).schedule)
     try:
         with np.errstate(all="ignore"):
-            error = float(np.max(np.abs(found - simulate_plainly(alone, manoeuvre, candidate))))
+            missed = np.abs(run.outputs[:, 0] - simulate_plainly(alone, manoeuvre, candidate)).max(axis=1)
     except ArmidError as refused:
         return ContractPoint("compiled", False, str(refused))
-    return ContractPoint("compiled", error <= REFERENCE_TOLERANCE * model.plant.scales.speed,
+    error = float(np.max(missed / model.plant.sizes)) * model.plant.sizes[0]
+    return ContractPoint("compiled", error <= REFERENCE_TOLERANCE * model.plant.sizes[0],
                    f"the compiled model is within {error:.2g} of its plain functions under scipy")  # fmt: skip
+
+
+def units_of(plant: Plant) -> str:
+    return ", ".join(o.unit for o in plant.outputs)
 
 
 def binding(fitting: list[str], refusals: list[str]) -> ContractPoint:

@@ -12,7 +12,7 @@ from pymoo.optimize import minimize
 
 from armid.contract.trials import ContractPoint
 from armid.identifiers import Identifier
-from armid.problem.meter import Log, Meter, Metered, MeterTermination
+from armid.problem.meter import BudgetIgnoredError, Log, Meter, Metered, MeterTermination
 
 Array = NDArray[np.float64]
 
@@ -61,27 +61,35 @@ RAISES_AT = 50
 CUT_AT = 217
 
 
-def check_identifier(identifier: Identifier) -> list[ContractPoint]:
-    """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed."""
-    (meter, problem), (again, _) = (run(identifier, 1, noise=noise) for noise in (1, 2))
-    log, alike = meter.log(), same(meter, run(identifier, 2)[0])
-    says = "stochastic" if identifier.is_stochastic else "not stochastic"
-    seeded = f"declared {says}, and another seed asks for {'the same' if alike else 'other'} candidates"
+def check_identifier(identifier: Identifier) -> Iterator[ContractPoint]:
+    """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed.
+
+    Each point is yielded when it is done.
+    """
+    try:
+        meter, problem = run(identifier, 1)
+    except BudgetIgnoredError as error:
+        yield ContractPoint("exact budget", False, str(error))
+        return
+    log = meter.log()
     best = f"the best of the log is {np.min(log.F):.3g}, the best that is kept {meter.best_f:.3g}"
-    return [
-        ContractPoint("exact budget", 0 < meter.used <= BUDGET, f"{meter.used} of {BUDGET} simulations used"),
-        ContractPoint("inside the box", problem.outside == 0, f"{problem.outside} candidates outside the bounds"),
-        ContractPoint("best never lost", meter.best_f == float(np.min(log.F)), best),
-        ContractPoint(
-            "improves", meter.best_f < float(np.median(log.F[:20])), "better than the median of its first 20"
-        ),
-        ContractPoint("reproducible", same(meter, again), "the same seed asks for the same candidates, bit for bit"),
-        ContractPoint("seed", alike != identifier.is_stochastic, seeded),
-        failing(identifier, meter, "survives failures", bare=False),
-        failing(identifier, meter, "survives NaN", bare=True),
-        raising(identifier),
-        resumed(identifier, meter),
-    ]
+    yield ContractPoint("exact budget", 0 < meter.used <= BUDGET, f"{meter.used} of {BUDGET} simulations used")
+    yield ContractPoint("inside the box", problem.outside == 0, f"{problem.outside} candidates outside the bounds")
+    yield ContractPoint("best never lost", meter.best_f == float(np.min(log.F)), best)
+    early = float(np.median(log.F[:20]))
+    yield ContractPoint("improves", meter.best_f < early, f"from {early:.3g}, the median of its first 20, to "
+                        f"{meter.best_f:.3g}")  # fmt: skip
+    again = difference(meter, run(identifier, 1, noise=2)[0])
+    text = "the same seed asks for the same candidates, bit for bit"
+    yield ContractPoint("reproducible", not again, f"the same seed again {again}" if again else text)
+    other = difference(meter, run(identifier, 2)[0])
+    says = "stochastic" if identifier.is_stochastic else "not stochastic"
+    text = f"declared {says}, and another seed {other or 'asks for the same candidates'}"
+    yield ContractPoint("seed", bool(other) == identifier.is_stochastic, text)
+    yield failing(identifier, meter, "survives failures", bare=False)
+    yield failing(identifier, meter, "survives NaN", bare=True)
+    yield raising(identifier)
+    yield resumed(identifier, meter)
 
 
 def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -> ContractPoint:
@@ -131,9 +139,11 @@ def resumed(identifier: Identifier, meter: Meter) -> ContractPoint:
     cut = Log(log.X[:known].copy(), log.F[:known].copy(), log.failed[:known].copy())
     again, problem = run(identifier, 1, Trial(Meter(BUDGET, resume_from=cut)))
     saved = again.used - problem.simulated
-    text = f"{saved} of {known} candidates answered from the log, {problem.simulated} simulated, the same in the end"
+    differs = difference(meter, again)
+    text = (f"{saved} of {known} candidates answered from the log, {problem.simulated} simulated, "
+            f"{differs or 'the same in the end'}")  # fmt: skip
     enough = saved == again.recalled and (saved == known or identifier.needs_residuals)
-    return ContractPoint("resumable", same(meter, again) and enough, text)
+    return ContractPoint("resumable", not differs and enough, text)
 
 
 def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: int = 1) -> tuple[Meter, Trial]:
@@ -158,7 +168,11 @@ def disturbed(noise: int) -> Iterator[None]:
         np.random.set_state(kept_by_numpy)
 
 
-def same(one: Meter, other: Meter) -> bool:
-    """Tell whether two runs asked for the same and were told the same."""
+def difference(one: Meter, other: Meter) -> str:
+    """Return from which candidate on two runs differ, in words, "" where they asked and were told the same."""
     a, b = one.log(), other.log()
-    return a.X.shape == b.X.shape and bool(np.array_equal(a.X, b.X) and np.array_equal(a.F, b.F))
+    n = min(len(a.F), len(b.F))
+    alike = (a.X[:n] == b.X[:n]).all(axis=1) & (a.F[:n] == b.F[:n]) if n else np.ones(0, np.bool_)
+    if alike.all() and len(a.F) == len(b.F):
+        return ""
+    return f"differs from candidate {(n if alike.all() else int(np.argmin(alike))) + 1} on"

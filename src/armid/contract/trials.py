@@ -164,7 +164,7 @@ MOST_RATES = 100_000
 
 
 def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Array:
-    """Return the recorded signal of one candidate, (n_samples,), error about 1e-9 of its size.
+    """Return the recorded signals of one candidate, (n_outputs, n_samples), error about 1e-9 of their size.
 
     DOP853, restarted at every kink and switch, and at every sample where inputs drive the machine.
     candidate: whole parameter vector, SI. Raises ArmidError when scipy does not get on.
@@ -172,8 +172,8 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
     plain = PlainModel(model, manoeuvre, candidate)
     times, states = manoeuvre.times(), plain.start()
     closed = plain.switched(times[0], states, tuple(0.0 for _ in plain.latches))
-    out = np.empty(len(times))
-    out[0] = plain.output(times[0], states, closed)
+    out = np.empty((len(model.plant.outputs), len(times)))
+    out[:, 0] = plain.recorded(times[0], states, closed)
     length = 1 if plain.inputs else len(times) - 1
     for first in range(0, len(times) - 1, length):
         begin, n = times[first], first + 1
@@ -187,7 +187,7 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
             before, closed = closed, plain.switched(float(begin), states, closed)
             for t, y in zip(run.t, np.reshape(run.y, (len(states), -1)).T, strict=True):
                 plain.sample = n
-                out[n] = plain.output(t, y, closed if t == begin else before)
+                out[:, n] = plain.recorded(t, y, closed if t == begin else before)
                 n += 1
     return out
 
@@ -202,7 +202,7 @@ class PlainModel:
         self.graph = model.graph
         self.states = [k.replace(".", "__") for k in model.states]
         self.latches = [k.replace(".", "__") for k in model.latches]
-        self.output_key = model.plant.output
+        self.signals = [o.signal for o in model.plant.outputs]
         self.known = dict(zip((k.replace(".", "__") for k in model.parameters), map(float, candidate), strict=True))
         self.known |= dict(zip(model.constants, model.constant_values(manoeuvre.constants), strict=True))
         self.manoeuvre, self.inputs = manoeuvre, {i.name: i.hold or manoeuvre.hold for i in model.plant.inputs}
@@ -218,15 +218,13 @@ class PlainModel:
         if tuple(keys) not in self.orders:
             self.orders[tuple(keys)] = self.graph.order(keys)
         for node in self.orders[tuple(keys)]:
-            if node.kind == "port":
-                known[node.key] = sum(known[t] for t in node.terms)
-            else:
-                assert node.function is not None
-                known[node.key] = node.function(**{a: known[k] for a, k in node.arguments})
+            known[node.key] = node.value(known)
         return [known[k] for k in keys]
 
     def start(self) -> Array:
-        return np.array(self.evaluate([f"initial__{s}" for s in self.states], {}), dtype=float)
+        begin = self.manoeuvre.start_time
+        driven = {"time": begin} | {name: self.input_at(name, begin) for name in self.inputs}
+        return np.array(self.evaluate([f"initial__{s}" for s in self.states], driven), dtype=float)
 
     def moment(self, time: float, states: Array, closed: Latches) -> dict[str, Any]:
         values: dict[str, Any] = dict(zip(self.states, states, strict=True))
@@ -254,8 +252,8 @@ class PlainModel:
     def guard(self, key: str, time: float, states: Array, closed: Latches) -> float:
         return float(self.evaluate([key], self.moment(time, states, closed))[0])
 
-    def output(self, time: float, states: Array, closed: Latches) -> float:
-        return float(self.evaluate([self.output_key], self.moment(time, states, closed))[0])
+    def recorded(self, time: float, states: Array, closed: Latches) -> list[float]:
+        return self.evaluate(self.signals, self.moment(time, states, closed))
 
     def switched(self, time: float, states: Array, closed: Latches) -> Latches:
         return tuple(

@@ -1,6 +1,9 @@
 """Choose how finely time is cut, from the error measured on a spread of candidates."""
 
+from bisect import bisect_left
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +14,7 @@ from armid.errors import ArmidError
 from armid.model import Manoeuvre, Model
 
 STANDARD, FINE = "standard", "fine"
-# Errors of the recorded signal that are allowed, as shares of the plant's speed scale (arm: 2 rad/s).
+# Errors of the recorded signals that are allowed, as shares of their sizes (arm: 2 rad/s).
 ALLOWED = {STANDARD: 5e-6, FINE: 1e-7}
 # What steps over several samples may change: for good (all of them together, shares of the speed scale; one step does a
 # hundredth of it, which no derivative sees), and between their ends (shares of the allowed error).
@@ -29,22 +32,42 @@ MOST_VALUES, PART = 2**23, 8
 
 @dataclass(frozen=True)
 class Calibration:
-    """Hold a schedule and the error [unit of the signal] that was measured for it on the probes."""
+    """Hold a schedule and the error that was measured for it on the probes.
+
+    error: [unit of the first output], of all outputs the largest as a share of the output's size.
+    """
 
     schedule: Schedule
     error: float
     reached: bool
 
 
-def accuracy_against(noise: float, model: Model) -> str:
-    """Return "fine" where noise of an rms [unit of the signal] would not hide the standard error, else "standard"."""
-    return FINE if noise < NOISE_HIDES * ALLOWED[STANDARD] * model.plant.scales.speed else STANDARD
+def accuracy_against(noise: Mapping[str, float], model: Model) -> str:
+    """Return "fine" where noise would not hide the standard error of an output, else "standard".
+
+    noise: output -> rms [its unit]; "" for the only output of a plant.
+    """
+    sizes = {o.name: size for o, size in zip(model.plant.outputs, model.plant.sizes, strict=True)}
+    sizes[""] = model.plant.sizes[0]
+    hidden = all(rms >= NOISE_HIDES * ALLOWED[STANDARD] * sizes[name] for name, rms in noise.items())
+    return STANDARD if hidden else FINE
 
 
 def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:
-    """Return candidates spread evenly between bounds (Kronecker sequence), shape (n_probes, n_parameters).
+    """Return candidates spread evenly between bounds (Kronecker sequence).
 
     x_i = frac(i a), a_j = g**-j with g the root of g**(d + 1) = g + 1. Source: Roberts 2018, generalised golden ratio.
+
+    Parameters
+    ----------
+    low, high : array, SI, (n_parameters,)
+        The bounds.
+    n_probes : int
+        How many.
+
+    Returns
+    -------
+    array, SI, (n_probes, n_parameters)
     """
     return low + (high - low) * ((np.arange(1, n_probes + 1)[:, np.newaxis] * golden_steps(len(low))) % 1.0)
 
@@ -72,9 +95,14 @@ def calibrate(
     candidates : (n_candidates, n_parameters), SI
         Usually `probes` of the bounds.
     accuracy : "standard" or "fine"
-        5e-6 or 1e-7 of the plant's speed scale.
+        5e-6 or 1e-7 of the size of each output (of a speed, the plant's speed scale).
     spans
         Look for steps over several samples too, which pays when many populations follow.
+
+    Returns
+    -------
+    Calibration
+        The schedule, and the error of the engine with it.
 
     Raises
     ------
@@ -85,7 +113,7 @@ def calibrate(
         raise ArmidError(f"accuracy '{accuracy}' is unknown: {' or '.join(ALLOWED)} is expected")
     if len(candidates) > PART and len(candidates) * manoeuvre.n_samples > MOST_VALUES:
         return in_parts(model, manoeuvre, candidates, accuracy)
-    allowed = ALLOWED[accuracy] * model.plant.scales.speed
+    allowed = ALLOWED[accuracy] * model.plant.sizes[0]
     runs: dict[int, Simulation] = {}
 
     def run(n: int) -> Simulation:
@@ -93,7 +121,7 @@ def calibrate(
 
     error = np.inf
     for n in SUBSTEPS:
-        error = difference(run(n), run(2 * n)) * 16 / 15
+        error = difference(run(n), run(2 * n), model) * 16 / 15
         if run(n).failed.any():
             failed, finest = run(n).failed, run(SUBSTEPS[-1]).failed
             error = np.inf if (failed & ~finest).any() or finest.all() else error
@@ -147,24 +175,30 @@ def long_steps(
     switched = (np.min(list(run.switch_times.values()), axis=0) - manoeuvre.start_time) / manoeuvre.interval
     samples = np.where(np.isfinite(switched), switched, manoeuvre.n_samples - 1)
     start, last = 0, int(np.sort(samples)[-min(N_UNSWITCHED, len(samples))])
+
+    def longer(first: int, span: int) -> NDArray[np.int64]:
+        return np.where(np.arange(len(plan)) < first, plan, span)
+
+    def holds(first: int, span: int) -> bool:
+        tried = simulate(model, manoeuvre, candidates, replace(schedule, plan=longer(first, span)))
+        kept = lasting_difference(tried, run, manoeuvre.interval) <= lasting
+        return kept and difference(tried, run, model) <= PASSING * allowed
+
     for span in (2, 4, 8):
-        for first in range(start + 10 - start % 10, last - span, 10 if start < 200 else 40):
-            longer = plan.copy()
-            longer[first:] = span
-            tried = simulate(model, manoeuvre, candidates, replace(schedule, plan=longer))
-            kept = lasting_difference(tried, run, manoeuvre.interval) <= lasting
-            if kept and difference(tried, run) <= PASSING * allowed:
-                plan, start = longer, first
-                break
-        else:
+        places = range(start + 10 - start % 10, last - span, 10 if start < 200 else 40)
+        # the later long steps begin, the less they change
+        found = bisect_left(places, True, key=partial(holds, span=span))
+        if found == len(places):
             break
+        start = places[found]
+        plan = longer(start, span)
     return plan if plan.max() > 1 else None
 
 
-def difference(a: Simulation, b: Simulation) -> float:
-    """Return the largest difference of two simulations where both hold."""
-    good = ~(a.failed | b.failed)
-    return float(np.max(np.abs(a.output[good] - b.output[good]), initial=0.0))
+def difference(a: Simulation, b: Simulation, model: Model) -> float:
+    """Return the largest difference of two simulations where both hold [unit of the first output]."""
+    good, (x, y) = ~(a.failed | b.failed), (run.joint(model.plant.sizes) for run in (a, b))
+    return float(np.max(np.abs(x[good] - y[good]), initial=0.0))
 
 
 def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:

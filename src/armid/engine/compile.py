@@ -1,25 +1,23 @@
 """Compiled simulators: one generated module for each model, kept on disk so that a second start compiles nothing."""
 
+import gc
 import hashlib
-import importlib.util
 import linecache
-import os
+import logging
 import re
 import sys
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from threading import RLock
+from threading import RLock, Timer
 from types import ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
 
-import llvmlite
-import numba
-import numpy as np
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
 from armid.engine import generate, simd, simd_math
+from armid.engine.cache import VERSIONS, keep, kept_in, read_whole, write_whole
 from armid.engine.generate import KernelParts, kernel_parts
 from armid.errors import ArmidError
 from armid.model import Model
@@ -30,10 +28,11 @@ LANE_WIDTH = 8
 Kernel = Callable[..., Any]
 # What a generated module is made by and compiled from.
 MADE_FROM = [generate.TEMPLATE, *(Path(str(module.__file__)) for module in (generate, simd, simd_math))]
-VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, sys.version)
 KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
 # Threads that ask for the same model at once share one kernel, which numba then compiles once.
 LOCK = RLock()
+LOG = logging.getLogger("armid")
+SLOW_S, MOST_NAMED = 2.0, 3
 
 
 def compile_model(model: Model) -> tuple[Kernel, int]:
@@ -44,17 +43,33 @@ def compile_model(model: Model) -> tuple[Kernel, int]:
     with LOCK:
         if model not in KERNELS:
             kernel = load_module(kernel_parts(model, LANE_WIDTH)).simulate
-            KERNELS[model] = (without_registries(kernel), LANE_WIDTH)
+            KERNELS[model] = (keep(kernel, kernel.py_func.__module__), LANE_WIDTH)
         return KERNELS[model]
 
 
-def cache_folder() -> Path:
-    """Return the folder of generated modules (ARMID_CACHE, else the user's cache folder)."""
-    given = os.environ.get("ARMID_CACHE")
-    if given:
-        return Path(given)
-    base = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
-    return (Path(base) if base else Path.home() / ".cache") / "armid"
+@contextmanager
+def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
+    """Stand around the first call of a kernel, which compiles it: tell so where that takes more than 2 s.
+
+    Python's garbage collector is kept still meanwhile: the compiler makes millions of objects that live to its end, and
+    looking through them takes a fifth of its time.
+    """
+    if getattr(kernel, "signatures", True):
+        yield
+        return
+    name = " + ".join([model.plant.name, *(e.name for e in model.effects[:MOST_NAMED])])
+    more = f" and {len(model.effects) - MOST_NAMED} effects more" if len(model.effects) > MOST_NAMED else ""
+    timer = Timer(SLOW_S, LOG.info, (f"compiling {name}{more}; it is kept for the next time",))
+    timer.daemon = True
+    timer.start()
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        if collecting:
+            gc.enable()
 
 
 def module_name(parts: KernelParts) -> str:
@@ -68,74 +83,27 @@ def module_name(parts: KernelParts) -> str:
 
 
 def load_module(parts: KernelParts) -> ModuleType:
-    """Return the generated module, from the cache folder where it is there; its text is made only where it is not.
-
-    Raises ArmidError when the cache folder cannot be written.
-    """
-    name, folder = module_name(parts), cache_folder()
+    """Return the generated module, from the cache folder where it is there; its text is made only where it is not."""
+    name, folder = module_name(parts), kept_in()
     if name in sys.modules:
         return sys.modules[name]
-    path = folder / f"{name}.py"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if not is_whole(path):
-            text = parts.text()
-            write_at_once(path, text)
-            write_at_once(path.with_suffix(".sha256"), hashlib.sha256(text.encode()).hexdigest())
-    except OSError as error:
-        raise ArmidError(f"the cache folder {folder} cannot be written ({error.strerror}): set ARMID_CACHE to a "
-                         "folder that can") from error  # fmt: skip
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+    file = f"{name}.py" if folder is None else str(folder / f"{name}.py")
+    content = None if folder is None else read_whole(Path(f"{file}.bin"))
+    text = parts.text() if content is None else content.decode()
+    if folder is not None and content is None:
+        write_whole(Path(f"{file}.bin"), text.encode())
+    module = ModuleType(name)
+    module.__file__ = file
+    # where errors look for the lines of a file that may not be there
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    exec(compile(text, file, "exec"), vars(module))
     return module
-
-
-def is_whole(path: Path) -> bool:
-    """Tell whether a module is there and is what was written: its digest stands beside it."""
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest() == path.with_suffix(".sha256").read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return False
-
-
-def write_at_once(path: Path, text: str) -> None:
-    """Write a file so that another process sees all of it or nothing."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
-        part.write(text.encode())
-    os.replace(part.name, path)
-
-
-def without_registries(kernel: Any) -> Any:
-    """Return the kernel, made to load its machine code from disk with numba's runtime alone.
-
-    Numba loads every typing and lowering rule it has before it loads machine code that needs none of them: half of the
-    time that a second start takes. What is left out here is loaded by numba itself as soon as something is compiled.
-    Rests on private names of numba; where a version does not have them, the kernel stays as it is.
-    """
-    cache: Any = getattr(kernel, "_cache", None)
-    if not (hasattr(cache, "_load_overload") and hasattr(cache, "_guard_against_spurious_io_errors")):
-        return kernel
-    try:
-        from numba.core.runtime import rtsys
-    except ImportError:
-        return kernel
-
-    def load_overload(signature: Any, target_context: Any) -> Any:
-        rtsys.initialize(target_context)
-        with cache._guard_against_spurious_io_errors():
-            return cache._load_overload(signature, target_context)
-
-    cache.load_overload = load_overload
-    return kernel
 
 
 def compile_error(error: Exception) -> ArmidError:
     """Return the error to raise for an equation that cannot be compiled, naming the equation where numba names it."""
-    text, equation = str(error), re.compile(r"\bdef f__(\w+)\(")
+    text, equation = str(error), re.compile(r"(?:\bdef |<function )f__(\w+)")
     found = equation.search(text) or equation.search(definition_above(error))
     name = f"the equation '{found[1].replace('__scalar', '').replace('__', '.')}'" if found else "an equation"
     return ArmidError(f"{name} cannot be compiled ({cause(text)}): numpy, math, numbers and plain functions of numbers "

@@ -33,6 +33,7 @@ TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
 OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
 OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur")
 OF_CARRIED = ("n", "o", "r")
+OF_OUTPUTS = ("rec",)
 OF_GUARDS = ("ga", "gb", "gm", "gd", "ge", "c")
 
 
@@ -41,22 +42,26 @@ class KernelParts:
     """Hold what the template is filled with: local names of one model, and its equations.
 
     equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
-    width: candidates side by side. parameters, constants: what a simulation is given, in order. fixed: quantities that
-    do not move, computed once. states, inputs, latches: what moves, each in its order. latch_guards: the guard of each
-    latch; kinks: the other guards; jumping_guards: whether a kink may jump at a sample, as only inputs do.
-    wide: whether there are so many effects that what is rarely needed is compiled but once.
+    width: candidates side by side. parameters, starts: what each candidate is given, in order; constants: what all are.
+    fixed: quantities that do not move, computed once. states, inputs, latches: what moves, each in its order.
+    outputs: recorded signals. latch_guards: the guard of each latch; kinks: the other guards; driven_start: whether a
+    state starts where the inputs say; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
+    whether there are so many effects that what is rarely needed is compiled but once.
     """
 
     equations: str
     width: int
     parameters: list[str]
+    starts: list[str]
     constants: list[str]
     fixed: list[str]
     states: list[str]
     inputs: list[str]
     latches: list[str]
+    outputs: list[str]
     latch_guards: list[str]
     kinks: list[str]
+    driven_start: bool
     jumping_guards: bool
     wide: bool
 
@@ -73,12 +78,13 @@ class KernelParts:
         guards = [*self.latch_guards, *self.kinks]
         times = [f"time_of_{k}" for k in self.latches]
         carried = [*self.latches, *times, *self.states, *(f"ga_{g}" for g in guards)]
-        prefixed = ((self.states, OF_STATES), (self.inputs, OF_INPUTS), (guards, OF_GUARDS), (carried, OF_CARRIED))
+        prefixed = ((self.states, OF_STATES), (self.inputs, OF_INPUTS), (self.outputs, OF_OUTPUTS),
+                    (guards, OF_GUARDS), (carried, OF_CARRIED))  # fmt: skip
         lists = {prefix: listed(names, f"{prefix}_") for names, prefixes in prefixed for prefix in prefixes}
         lists |= {
             "x": listed(self.states), "x_n": listed(self.states, "n_"), "fixed": listed(self.fixed),
             "latches": listed(self.latches), "latches_n": listed(self.latches, "n_"), "times": listed(times),
-            "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.constants),
+            "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.starts + self.constants),
         }  # fmt: skip
         names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
         return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
@@ -155,28 +161,34 @@ class Emitter:
         latch_guards = [f"guard__{k.replace('.', '__')}" for k in model.latches]
         kinks = [n.key for n in self.graph.of_kind("guard") if n.key not in latch_guards]
         guards, inputs = [*latch_guards, *kinks], [i.name for i in model.plant.inputs]
-        fixed = self.fixed_keys([*rates, *guards, model.plant.output])
+        recorded = [o.signal for o in model.plant.outputs]
+        fixed = self.fixed_keys([*rates, *guards, *recorded])
         used = [f"{word}_{effect}" for effect in self.strengths for word in ("using", "used")]
         lists: dict[str, Iterable[str]] = {
-            "parameters": model.parameters, "constants": model.constants, "fixed": fixed, "states": model.states,
+            "parameters": model.parameters, "starts": model.starts, "fixed": fixed, "states": model.states,
+            "constants": [c for c in model.constants if c not in model.starts],
             "inputs": inputs, "latches": model.latches, "latch_guards": latch_guards, "kinks": kinks,
         }  # fmt: skip
         names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
         names["fixed"] += used
-        given = [*names["parameters"], *names["constants"]]
+        names["outputs"] = [o.name for o in model.plant.outputs]
+        given = [*names["parameters"], *names["starts"], *names["constants"]]
+        starts = [n.replace("rate__", "initial__", 1) for n in rates]
+        at_start = [variable(k) for k in ("time", *inputs)] if self.uses(starts, ["time", *inputs]) else []
         moving = [variable("time"), *names["latches"], *names["states"], *names["inputs"], *names["fixed"]]
         switches = [line for effect, nulls in self.strengths.items() for line in use_lines(effect, nulls)]
         values = [f"1.0 * {variable(k)}" for k in fixed] + used
         texts = [
             self.function("fixed_values", given, self.assignments(fixed, True) + switches, values),
-            self.evaluation("start_values", given, [n.replace("rate__", "initial__", 1) for n in rates], True),
+            self.evaluation("start_values", given + at_start, starts, True),
             self.evaluation("rates", moving, rates),
             self.evaluation("guards", moving, guards),
-            self.evaluation("recorded", moving, [model.plant.output]),
+            self.evaluation("recorded", moving, recorded),
         ]
         equations = self.function_texts() + "\n\n".join(texts)
         jumping = bool(kinks) and self.uses(guards, inputs)
-        return KernelParts(equations, width, **names, jumping_guards=jumping, wide=bool(self.strengths))
+        wide = bool(self.strengths)
+        return KernelParts(equations, width, **names, driven_start=bool(at_start), jumping_guards=jumping, wide=wide)
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:
         """Tell whether nodes depend on one of the wanted ones."""
@@ -207,9 +219,8 @@ class Emitter:
     def expression(self, key: str) -> str:
         """Return the right-hand side of a node."""
         node = self.graph.nodes[key]
-        if node.kind == "port":
+        if node.function is None:
             return " + ".join(map(variable, node.terms)) or "0.0"
-        assert node.function is not None
         name = f"f__{key}"
         self.called.add(name)
         if name not in self.sources.definitions:

@@ -10,11 +10,12 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core.errors import TypingError
-from numba.extending import intrinsic, models, overload, register_model
+from numba.extending import intrinsic, lower_builtin, models, overload, register_model, type_callable
 
 DOUBLE = ir.DoubleType()
 INT32 = ir.IntType(32)
 INT64 = ir.IntType(64)
+NUMBERS = (types.Float, types.Integer, types.Boolean)
 # No `nnan` or `ninf`: a diverging candidate must stay visible as NaN or infinity. No `reassoc`: the order in which an
 # equation is written is the order in which it is computed.
 FLAGS = ("contract", "nsz", "arcp")
@@ -41,7 +42,7 @@ class LanesModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def is_number(numba_type: Any) -> bool:
-    return isinstance(numba_type, (types.Float, types.Integer, types.Boolean))
+    return isinstance(numba_type, NUMBERS)
 
 
 def mixes_lanes(*numba_types: Any) -> bool:
@@ -163,15 +164,22 @@ def n_lanes(typing_context, value):
 
 
 def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
-    """Give numba the operator for lanes with lanes and lanes with numbers."""
+    """Give numba the operator for lanes with lanes and lanes with numbers.
 
-    @intrinsic
-    def act(typing_context, a, b):
-        return elementwise(lanes_of(a, b), compute, a, b)
+    It is written into its caller: as a function it would have to be compiled for each pair of types.
+    """
 
-    @overload(python_operator, inline="never")
-    def operate(a, b):
-        return (lambda a, b: act(a, b)) if mixes_lanes(a, b) else None
+    @type_callable(python_operator)
+    def operator_type(context):
+        return lambda a, b: lanes_of(a, b) if mixes_lanes(a, b) else None
+
+    def operate(context, builder, signature, arguments):
+        values = zip(arguments, signature.args, strict=True)
+        width = signature.return_type.width
+        return compute(builder, *(to_lanes(context, builder, v, t, width) for v, t in values))
+
+    for pair in ((Lanes, Lanes), *((Lanes, n) for n in NUMBERS), *((n, Lanes) for n in NUMBERS)):
+        lower_builtin(python_operator, *pair)(operate)
 
 
 def comparison(symbol: str) -> Callable[..., Any]:

@@ -33,7 +33,7 @@ from armid.engine.simd import (
     with_lane,
 )
 
-compiled = numba.njit(error_model="numpy")
+compiled = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 SMALLEST, LARGEST = 2.2250738585072014e-308, 1.7976931348623157e308

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model
+from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model, compiling
 from armid.errors import ArmidError, nearest
 from armid.model import Manoeuvre, Model
 
 Array = NDArray[np.float64]
 # Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
 SHARES = 4
-# A candidate whose signal exceeds so many times the plant's speed scale has diverged.
+# A candidate one of whose signals exceeds so many times its size has diverged.
 DIVERGED = 1e3
 
 
@@ -52,16 +52,28 @@ class Schedule:
 class Simulation:
     """Hold what a population did.
 
-    output: recorded signal, shape (n_candidates, n_samples), SI, NaN from the sample on at which a candidate diverged.
+    outputs: recorded signals, shape (n_outputs, n_candidates, n_samples), SI, NaN from the sample on at which a
+        candidate diverged; output: the first of them.
     failed: shape (n_candidates,), True where it diverged.
     switch_times: latch -> time [s] of its switch, shape (n_candidates,), NaN where it never switched.
     states: state -> shape (n_candidates, n_samples); empty unless asked for.
     """
 
-    output: Array
+    outputs: Array
     failed: NDArray[np.bool_]
     switch_times: dict[str, Array]
     states: dict[str, Array]
+
+    @property
+    def output(self) -> Array:
+        """Signal of the first output, (n_candidates, n_samples), SI."""
+        return np.asarray(self.outputs[0])
+
+    def joint(self, sizes: Sequence[float]) -> Array:
+        """Return all outputs end to end as shares of their sizes, times that of the first, (n_candidates, n)."""
+        if len(sizes) == 1:
+            return self.output
+        return np.concatenate([sizes[0] / size * y for size, y in zip(sizes, self.outputs, strict=True)], axis=-1)
 
 
 def simulate(
@@ -98,20 +110,24 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
     spans = (replace(schedule, plan=None) if states else schedule).spans(manoeuvre.n_samples)
     # The plant says whether an input keeps the value of its last sample, else the record does.
     holds = [i.hold or manoeuvre.hold for i in model.plant.inputs] or [""]
+    given = dict(zip(model.constants, model.constant_values(manoeuvre.constants), strict=True))
+    starts = np.array([given.pop(name) for name in model.starts])
     settings = (
-        np.array(model.constant_values(manoeuvre.constants) or [0.0]), input_values(model, manoeuvre),
+        np.array(list(given.values()) or [0.0]), input_values(model, manoeuvre),
         float(manoeuvre.interval), manoeuvre.n_samples, schedule.substeps, schedule.refinement,
         float(schedule.fresh_samples), spans, np.array([hold == "zero" for hold in holds]),
-        float(manoeuvre.start_time), DIVERGED * model.plant.scales.speed,
+        float(manoeuvre.start_time),
+        DIVERGED * np.array(model.plant.sizes),
     )  # fmt: skip
-    return Prepared(model, kernel, width, schedule.weights, manoeuvre.n_samples, settings, states)
+    return Prepared(model, kernel, width, schedule.weights, manoeuvre.n_samples, starts, settings, states)
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """Simulate populations through one manoeuvre, everything but the candidates made ready once.
 
-    settings: arguments of the kernel between the candidates and where their results go.
+    starts: of the manoeuvre, in the order of `model.starts`. settings: arguments of the kernel between the candidates
+    and where their results go.
     """
 
     model: Model
@@ -119,24 +135,30 @@ class Prepared:
     width: int
     weights: Array | None
     n_samples: int
+    starts: Array
     settings: tuple[Any, ...]
     states: bool
 
-    def run(self, population: ArrayLike, threads: int = 1) -> Simulation:
-        """Simulate every candidate; arguments, result and errors as of `simulate`."""
+    def run(self, population: ArrayLike, threads: int = 1, starts: Array | None = None) -> Simulation:
+        """Simulate every candidate; arguments, result and errors as of `simulate`.
+
+        starts: where each candidate starts in place of where the manoeuvre does, (n_candidates, n_starts), SI.
+        """
         model = self.model
         candidates = as_population(model, population)
         n = len(candidates)
-        rows, places = arranged(candidates, self.width, self.weights)
-        output = np.empty((n, self.n_samples))
+        starts = np.broadcast_to(self.starts if starts is None else starts, (n, len(self.starts)))
+        rows, places = arranged(candidates, starts, self.width, self.weights)
+        outputs = np.empty((len(model.plant.outputs), n, self.n_samples))
         switches = np.full((len(model.latches), rows.shape[1]), np.nan)
         trace = np.empty((len(model.states), n, self.n_samples) if self.states else (0, 0, 0))
         given = (rows.ravel(), rows.shape[1], *self.settings, places)
-        run(self.kernel, given, (output, switches.ravel(), trace), rows.shape[1] // self.width, threads)
+        with compiling(model, self.kernel):
+            run(self.kernel, given, (outputs, switches.ravel(), trace), rows.shape[1] // self.width, threads)
         kept = dict(zip(model.states, trace, strict=True)) if self.states else {}
         inverse = np.argsort(places[:n], kind="stable")
         times = {name: row[inverse] for name, row in zip(model.latches, switches, strict=True)}
-        return Simulation(output, np.isnan(output[:, -1]), times, kept)
+        return Simulation(outputs, np.isnan(outputs[0, :, -1]), times, kept)
 
 
 def as_population(model: Model, population: ArrayLike) -> Array:
@@ -160,16 +182,19 @@ def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
     return np.array([manoeuvre.inputs[name] for name in names], dtype=np.float64) if names else np.zeros((1, 1))
 
 
-def arranged(candidates: Array, width: int, weights: Array | None) -> tuple[Array, NDArray[np.int64]]:
-    """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
+def arranged(
+    candidates: Array, starts: Array, width: int, weights: Array | None
+) -> tuple[Array, NDArray[np.int64]]:  # fmt: skip
+    """Return parameters and starts as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
     n = len(candidates)
     if n <= width:
         weights = None  # within one group the order saves nothing
     order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
     places = np.full(n + -n % width, -1)
     places[:n] = order
-    rows = np.empty((candidates.shape[1], len(places)))
-    rows[:, :n] = candidates.T if weights is None else candidates[order].T
+    whole = np.hstack([candidates, starts]) if starts.size else candidates
+    rows = np.empty((whole.shape[1], len(places)))
+    rows[:, :n] = whole.T if weights is None else whole[order].T
     rows[:, n:] = rows[:, n - 1 : n]
     return rows, places
 
@@ -218,12 +243,7 @@ def along(
     for name, key in keys.items():
         if key not in model.graph.nodes:
             raise ArmidError(f"'{name}' is no name of plant '{model.plant.name}': {nearest(name, model.graph.nodes)}")
-    for node in model.graph.order(keys.values()):
-        if node.kind == "port":
-            values[node.key] = sum((values[t] for t in node.terms), np.zeros(1))
-        else:
-            assert node.function is not None
-            values[node.key] = node.function(**{a: values[k] for a, k in node.arguments})
+    values = model.graph.values(keys.values(), values)
     return {
         name: np.broadcast_to(np.asarray(values[key], dtype=float), times.shape).copy() for name, key in keys.items()
     }

@@ -81,22 +81,25 @@ class Offer:
 
 
 def offers(
-    motions: "Motions", grid: Iterable[Feasible], space: Space, x: Array, fisher: Array, level: Level,
+    motions: "Motions", grid: Iterable[Feasible], space: Space, x: Array, fisher: Array, levels: Sequence[Level],
     by: str = VOLUME,
 ) -> tuple[Offer, ...]:  # fmt: skip
     """Return what each feasible manoeuvre would buy, the best first.
 
-    F' = F + f J^T J / level^2 with J the sensitivities in the new record; deviations are those of F'^-1. Ranking counts
-    the box as a first record, so that what is not determined yet has a finite deviation, too.
+    F' = F + sum over outputs of f J^T J / level^2 with J the sensitivities in the new record; deviations are those of
+    F'^-1. Ranking counts the box as a first record, so that what is not determined yet has a finite deviation, too.
     motions: at the estimate. x: the estimate, SI, (n_free,). fisher: information of the records, in shares of the
-    range, (n_free, n_free). level: expected of the new record. by: "volume", "worst" or "shrinkage".
+    range, (n_free, n_free). levels: expected of the outputs of the new record, see `expected_levels`. by: "volume",
+    "worst" or "shrinkage".
     """
     low, span = space.low[space.free], space.high[space.free] - space.low[space.free]
     candidates = space.complete(low + stencil((x - low) / span) * span)
     before, found = np.sqrt(np.diag(inverse(fisher))) * span, []
     for feasible, signals in motions.signals(grid, candidates):
-        slopes = slopes_of(signals)
-        more = fisher + level.effective_fraction / level.rms**2 * slopes @ slopes.T
+        more = fisher
+        for level, signal in zip(levels, signals, strict=True):
+            slopes = slopes_of(signal)
+            more = more + level.effective_fraction / level.rms**2 * slopes @ slopes.T
         found.append(Offer(feasible, before, np.sqrt(np.diag(inverse(more))) * span, gain(fisher, more, by)))
     return tuple(sorted(found, key=lambda offer: -offer.gain))
 
@@ -111,11 +114,18 @@ def gain(fisher: Array, more: Array, by: str) -> float:
     return float(before.max() / after.max() if by == WORST else np.max(before / after))
 
 
-def expected_level(levels: Sequence[Level]) -> Level:
-    """Return the level to expect of a new record: the mean square and the mean share of independent samples."""
-    rms = float(np.sqrt(np.mean([level.rms**2 for level in levels])))
-    share = float(np.mean([level.effective_fraction for level in levels]))
-    return Level(rms, share, any(level.from_residual for level in levels), any(level.assumed for level in levels))
+def expected_levels(replays: Sequence[Replay], levels: Sequence[Level]) -> tuple[Level, ...]:
+    """Return the level to expect of each output that the records hold: mean square, mean share of independent samples.
+
+    levels: of the replays.
+    """
+    places = sorted({r.place for r in replays})
+    groups = [[level for r, level in zip(replays, levels, strict=True) if r.place == place] for place in places]
+    return tuple(
+        Level(float(np.sqrt(np.mean([level.rms**2 for level in group]))),
+              float(np.mean([level.effective_fraction for level in group])),
+              any(level.from_residual for level in group), any(level.assumed for level in group)) for group in groups
+    )  # fmt: skip
 
 
 def manoeuvre_grid(model: Model, records: Sequence[Record]) -> tuple[Feasible, ...]:
@@ -274,27 +284,33 @@ class Motions:
         self.schedule = fine_schedule(replays)
         self.candidate = candidate
         self.speed_limit = np.inf if speed_limit is None else speed_limit
-        self.slowest = MOVES * max(float(np.sqrt(np.mean(r.measured**2))) for r in replays)
+        self.places = sorted({r.place for r in replays})
+        self.slowest = [MOVES * max(float(np.sqrt(np.mean(r.measured**2))) for r in replays if r.place == place)
+                        for place in self.places]  # fmt: skip
         self.travel = key_travel(self.model.plant)
         self.extents = self._recorded_extents(replays) if self.model.plant.inputs else {}
 
     def signals(self, grid: Iterable[Feasible], candidates: Array) -> Iterator[tuple[Feasible, Array]]:
         """Yield each manoeuvre that can be made with the signals of candidates in its window.
 
-        candidates: whole, SI, shape (n_candidates, n_parameters). Signals: shape (n_candidates, n_samples).
+        candidates: whole, SI, shape (n_candidates, n_parameters). Signals: of the outputs that the records hold, shape
+        (n_outputs, n_candidates, n_samples).
         """
         population = np.concatenate([self.candidate[np.newaxis], candidates])
         for feasible in grid:
             run = simulate(self.model, feasible.manoeuvre, population, self.schedule, states=True)
             if self.can_be_made(run):
-                yield feasible, run.output[1:, feasible.window]
+                yield feasible, run.outputs[self.places, 1:, feasible.window]
 
     def can_be_made(self, run: Simulation) -> bool:
         """Tell whether the first candidate moves, within the travel, the gyro's range and what was recorded."""
         if run.failed.any():
             return False
-        speed, states = run.output[0], {name: values[0] for name, values in run.states.items()}
-        moves = bool(np.sqrt(np.mean(speed**2)) >= self.slowest) and bool(np.abs(speed).max() <= self.speed_limit)
+        signals, states = run.outputs[self.places, 0], {name: values[0] for name, values in run.states.items()}
+        moves = any(np.sqrt(np.mean(y**2)) >= slowest for y, slowest in zip(signals, self.slowest, strict=True))
+        outputs = [self.model.plant.outputs[place] for place in self.places]
+        speeds = [np.abs(y).max() for y, o in zip(signals, outputs, strict=True) if o.unit in ("rad/s", "m/s")]
+        moves = moves and max(speeds, default=0.0) <= self.speed_limit
         inside = all(low <= states[name].min() and states[name].max() <= high
                      for name, (low, high) in self.travel.items())  # fmt: skip
         return moves and inside and all(np.ptp(states[name]) <= wide for name, wide in self.extents.items())

@@ -2,19 +2,30 @@
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.design import VOLUME, Motions, Offer, expected_level, manoeuvre_grid, offers
-from armid.estimation.information import SINGULAR, Information, information_at, level_weights, levels_of
-from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine
+from armid.estimation.constants import columns_of, common_factors, products
+from armid.estimation.design import VOLUME, Motions, Offer, expected_levels, manoeuvre_grid, offers
+from armid.estimation.information import (
+    SINGULAR,
+    Information,
+    information_at,
+    information_of,
+    level_weights,
+    levels_of,
+)
+from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine, with_fitted_starts
 from armid.estimation.profile import Profile, profiles
 from armid.model import Model
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space
+from armid.problem.starts import with_starts
 from armid.record import Campaign
+from armid.report.result import IDENTIFIABILITY, Kind, Result
 
 Array = NDArray[np.float64]
 Members = tuple[int, ...]
@@ -93,16 +104,19 @@ def smallest(scaled: Array, among: Members, index: float) -> Members:
     return among
 
 
-@dataclass(frozen=True, eq=False)
-class Examination:
-    """Hold what the train records say about the free parameters at one candidate.
+@dataclass(frozen=True, eq=False, repr=False)
+class Examination(Result):
+    """Hold what the train records say about the free parameters at one candidate; it prints itself.
 
     x: SI, shape (n_free,): the least-squares estimate, or the point that was asked for (given). minimum: the
     least-squares estimate, (n_free,). information: Cramer-Rao deviations, correlations, Fisher matrix at x. groups:
-    parameters that move together there. profiles: one for each free parameter, about the minimum. offers: what one more
-    record would buy, the best first. ranked_by: by what they are ranked.
+    parameters that move together there. combinations: what is known only together with constants, in words. wider:
+    standard deviations that count the tolerances of the constants, SI, (n_free,). profiles: one for each free
+    parameter, about the minimum. offers: what one more record would buy, the best first. ranked_by: by what they are
+    ranked.
     """
 
+    kind: ClassVar[Kind] = IDENTIFIABILITY
     campaign: Campaign
     model: Model
     space: Space
@@ -112,6 +126,8 @@ class Examination:
     minimum: Array
     information: Information
     groups: tuple[Group, ...]
+    combinations: tuple[str, ...]
+    wider: Array
     profiles: tuple[Profile, ...]
     offers: tuple[Offer, ...]
     ranked_by: str
@@ -156,10 +172,12 @@ def examine(
         raise ArmidError("no parameter is free: at least one is expected to be examined")
     train = replays(campaign.train, model, space, accuracy)
     if x is None:
+        train = with_fitted_starts(train, space)
         first = estimate(train, space)
         start = refine(train, space, first, level_weights(levels_of(train, space, first, noise)))
     else:
         start = np.asarray(x, dtype=np.float64)
+        train = with_starts(train, space.complete(start[np.newaxis])[0])
         low, high = space.low[space.free], space.high[space.free]
         for name, value, a, b in zip(space.free_names, start, low, high, strict=True):
             if not a <= value <= b:
@@ -173,8 +191,16 @@ def examine(
     minimum = records.values(z)
     at = minimum if x is None else start
     information = information_at(train, space, at, levels_of(train, space, at, noise))
+    weighed = WeightedRecords(train, space, level_weights(information.levels))
+    z_at = weighed.shares(at)
+    residual, slopes = weighed.residual_and_slopes(z_at)
+    within = products(weighed, z_at, campaign.tolerances)
+    relative = slopes * (at / weighed.span)
+    wider = information_of(weighed, z_at, None, columns_of(within, len(residual))).deviation
+    levels = expected_levels(train, information.levels)
     motions = Motions(train, space.complete(at[np.newaxis])[0], campaign.gyro_range)
     grid = manoeuvre_grid(model, [r.record for r in train])
-    bought = offers(motions, grid, space, at, information.fisher, expected_level(information.levels), by)
+    bought = offers(motions, grid, space, at, information.fisher, levels, by)
     return Examination(campaign, model, space, train, at, x is not None, minimum, information,
-                       groups(information.fisher, space.free_names), found, bought, by)  # fmt: skip
+                       groups(information.fisher, space.free_names), common_factors(space.free_names, relative, within),
+                       wider if within else information.deviation, found, bought, by)  # fmt: skip

@@ -10,22 +10,23 @@ from numpy.typing import NDArray
 from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index, normalised
 from armid.estimation.identify import versions_of
-from armid.estimation.identify_document import correlation_table
 from armid.estimation.information import Level, level_weights, sensitivities
 from armid.estimation.profile import THRESHOLD, Profile
 from armid.problem.space import Space
 from armid.report.document import (
     Column,
     Document,
-    Figure,
     Section,
-    Sentences,
     Table,
+    correlation_tables,
     finite,
     listed,
     made_section,
+    remark_parts,
+    stored_figures,
     table,
 )
+from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, look, pyplot
 from armid.units import SHOWN, shown
 
@@ -53,14 +54,15 @@ def identifiability_document(
 
     details: `made_by`, where it is known; for the others see `identify_document`.
     """
-    figures = {name: (Figure(name, *FIGURES[name], svg=svg),) for name, svg in svgs.items()}
+    figures = stored_figures(FIGURES, svgs)
     answer, remarks = answer_and_remarks(result)
     parameters, offers = parameter_table(result), offer_table(result)
-    rest = (Sentences(remarks),) if remarks else ()
-    correlated = (correlation_table(result["correlation"]),) if len(result["correlation"]) > 1 else ()
+    noise = [text for text in result.get("for_the_record", ()) if text in remarks]
+    correlated = correlation_tables(result["correlation"])
+    rest = remark_parts([text for text in remarks if text not in noise], noise)
     sections: tuple[Section, ...] = (
         Section("Parameters", (parameters, *figures.get("profiles", ()))),
-        Section("What must be known", rest),
+        *(Section(part.title, (part,)) for part in rest),
         Section("What the records see", (*correlated, *figures.get("sensitivities", ()))),
         Section("The next record", (offers,)),
         made_section(details.get("made_by", {}), result["versions"], again),
@@ -101,14 +103,16 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
         unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
         curved = "not determined" if p["low"] is None else interval_text(factor * p["low"], factor * p["high"])
         profile = p["profile"]
-        bounded = {(True, True): "yes", (True, False): "below only", (False, True): "above only"}.get(
-            (profile["bounded_low"], profile["bounded_high"]), "NO")  # fmt: skip
+        bounded = {(True, True): "", (True, False): "not above", (False, True): "not below"}.get(
+            (profile["bounded_low"], profile["bounded_high"]), "NOT BOUNDED")  # fmt: skip
         flag = "AT ITS BOUND" if p["bound_active"] else "" if profile["agrees_with_curvature"] else "THEY DIFFER"
-        rows.append((name, factor * p["value"], unit, deviation_of(result, name, p["deviation"]), curved,
-                     profile_text(profile, factor), bounded, flag))  # fmt: skip
-    columns = ["parameter", Column("value", "value", ".6g"), "unit", "deviation", "95 % by curvature",
-               "95 % by profile", "bounded", Column("remark", "")]  # fmt: skip
-    return table("What the records say", columns, rows)
+        rows.append((name, factor * p["value"], unit, profile_text(profile, factor),
+                     ", ".join(word for word in (flag, bounded) if word),
+                     deviation_of(result, name, p["deviation"]), curved))  # fmt: skip
+    columns = ["parameter", Column("value", "value", ".6g"), "unit", "95 % by profile", Column("remark", "remark"),
+               "deviation", "95 % by curvature"]  # fmt: skip
+    note = "Remark: not above, not below: no bound on that side." if any(row[4] for row in rows) else ""
+    return table("What the records say", columns, rows, note)
 
 
 def interval_text(low: float, high: float) -> str:
@@ -146,9 +150,8 @@ def offer_table(result: Mapping[str, Any], most: int = MOST_OFFERS) -> Table:
     names, offers = list(result["parameters"]), result["offers"]
     if len(names) > MOST_COLUMNS:
         names = most_helped(names, offers)
-    some = (
-        "" if len(names) == len(result["parameters"]) else f", {len(names)} of {len(result['parameters'])} parameters"
-    )
+    n_all = len(result["parameters"])
+    some = "" if len(names) == n_all else f", {len(names)} of {n_all} parameters"
     repeats = [offer for offer in offers[most:] if " once more" in offer["words"]][:1]
     rows = [("none", *(deviation_of(result, name, result["parameters"][name]["deviation"]) for name in names), 1.0)]
     for offer in (*offers[:most], *repeats):
@@ -169,10 +172,14 @@ def most_helped(names: list[str], offers: list[Mapping[str, Any]]) -> list[str]:
     return [names[i] for i in sorted(np.argsort(-helped, kind="stable")[:MOST_COLUMNS])]
 
 
+def parts_of(found: Examination) -> Parts:
+    return Parts(result_of(found), {}, figures_of(found))
+
+
 def result_of(found: Examination) -> dict[str, Any]:
     """Return everything of an examination that JSON can hold, SI throughout; what is not known is null."""
     names, correlation, fisher = found.space.free_names, found.information.correlation, found.information.fisher
-    levels = {r.record.file: level for r, level in zip(found.replays, found.information.levels, strict=True)}
+    levels = {r.name: level for r, level in zip(found.replays, found.information.levels, strict=True)}
     return {
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
@@ -196,6 +203,7 @@ def result_of(found: Examination) -> dict[str, Any]:
             }} for o in found.offers
         ],
         "remarks": remarks(found),
+        "for_the_record": level_remarks(found),
         "versions": versions_of(PACKAGES),
     }  # fmt: skip
 
@@ -205,6 +213,7 @@ def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
     value, half = float(found.x[i]), float(found.information.half_width[i])
     return {
         "value": value, "unit": profile.unit, "deviation": finite(found.information.deviation[i]),
+        "deviation_with_tolerances": finite(found.wider[i]),
         "low": finite(value - half), "high": finite(value + half),
         "bound_low": profile.box[0], "bound_high": profile.box[1], "bound_active": bool(found.at_bound[i]),
         "profile": {
@@ -236,6 +245,11 @@ def remarks(found: Examination) -> list[str]:
     said += [f"{p.name} is not seen at all in these records: any value in the box leaves them as they are."
              for p in found.profiles if not fisher[names.index(p.name), names.index(p.name)] > 0.0]  # fmt: skip
     said += [text for p in found.profiles if (text := profile_remark(found, p))]
+    said += [f"With the constants within their tolerances, {text}." for text in found.combinations]
+    if (found.wider > found.information.deviation).any():
+        each = (f"{n} {deviation_text(found.space, i, float(found.wider[i]), float(found.x[i]))}"
+                for i, n in enumerate(names))  # fmt: skip
+        said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(each)}.")
     said += point_remarks(found) + level_remarks(found)
     if found.offers:
         return [*said, f"One more record, {offer_text(found, found.offers[0])}."]
@@ -299,7 +313,7 @@ def level_remarks(found: Examination) -> list[str]:
     """Return what the intervals rest on: noise, residual, or an assumption; records that say the same together."""
     texts: dict[str, list[str]] = {}
     for replay, level in zip(found.replays, found.information.levels, strict=True):
-        texts.setdefault(level_text(level, found.campaign.unit, replay.record.noise.rms), []).append(replay.record.file)
+        texts.setdefault(level_text(level, replay.record.unit, replay.record.noise.rms), []).append(replay.name)
     said = [f"{listed(files[:MOST_NAMED])}: {text}" for text, files in texts.items()]
     return said[:MOST_NAMED] + ([f"So it is with {len(said) - MOST_NAMED} more."] if len(said) > MOST_NAMED else [])
 
@@ -336,7 +350,6 @@ LINE = 60
 
 
 def figures_of(found: Examination) -> dict[str, Callable[[], Any]]:
-    """Return name -> what draws a figure."""
     return {"profiles": lambda: profile_figure(found), "sensitivities": lambda: sensitivity_figure(found)}
 
 
@@ -352,7 +365,7 @@ def profile_figure(found: Examination) -> Any:
     for axis in axes.flat[len(shown) :]:
         axis.set_visible(False)
     for axis in axes[:, 0]:
-        axis.set_ylabel("rise of $\\chi^2$")
+        axis.set_ylabel("rise of chi2")
     handles = dict(pair for axis in axes.flat for pair in zip(*axis.get_legend_handles_labels()[::-1], strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False)
     figure.suptitle(fill(f"{title(found)}: profile likelihood", LINE * columns // 2 + 15), fontsize="large")
@@ -360,7 +373,6 @@ def profile_figure(found: Examination) -> Any:
 
 
 def draw_profile(axis: Any, profile: Profile) -> None:
-    """Draw one profile into an axis."""
     unit, factor = SHOWN.get(profile.unit, (profile.unit, 1.0))
     left, right = view(profile)
     grid = np.linspace(left, right, 200)
@@ -425,7 +437,7 @@ def sensitivity_figure(found: Examination) -> Any:
         # how much of the information on each parameter comes from each record
         squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
         shares = 100 * squares / np.where(squares.sum(axis=0) > 0.0, squares.sum(axis=0), 1.0)
-        files = [r.record.file.removesuffix(".csv") for r in found.replays]
+        files = [r.name.replace(".csv", "") for r in found.replays]
         draw_map(right, found, shares, files, "share of the information [%]", vmin=0, vmax=100, cmap="Blues", fmt=".0f",
                  annot=len(files) <= 14, annot_kws={"size": 11 if len(files) <= 8 else 8})  # fmt: skip
     for axis, i in zip(axes, order, strict=False):
@@ -442,7 +454,7 @@ def telling(found: Examination, jacobians: list[Array]) -> list[int]:
     order = np.argsort([-np.sum(j**2) for j in jacobians], kind="stable")
     seen: dict[object, int] = {}
     for i in order:
-        seen.setdefault(identity(found.replays[i].record.manoeuvre), int(i))
+        seen.setdefault((found.replays[i].place, identity(found.replays[i].record.manoeuvre)), int(i))
     return list(seen.values())[:MOST_RECORDS]
 
 
@@ -465,7 +477,7 @@ def draw_sensitivities(axis: Any, found: Examination, i: int, jacobian: Array) -
         curve = jacobian[:, j] / largest if largest > 0.0 else jacobian[:, j]
         axis.plot(replay.times, curve, lw=1.7, label=name, **look(j))
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
-    axis.set_title(f"{replay.record.file}: sensitivities, each scaled to 1", fontsize="medium")
+    axis.set_title(f"{replay.name}: sensitivities, each scaled to 1", fontsize="medium")
     axis.set(xlabel="time [s]", ylabel="scaled, 1", ylim=(-1.08, 1.08))
     axis.margins(x=0.01)
 

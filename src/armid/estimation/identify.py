@@ -3,10 +3,11 @@
 import platform
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,31 +15,46 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 
 from armid.errors import ArmidError
-from armid.estimation.information import Information, information_at
-from armid.estimation.least_squares import (
-    held_by_bound,
-)
+from armid.estimation.information import MISFIT, Information, information_at
+from armid.estimation.least_squares import held_by_bound, with_fitted_starts
+from armid.estimation.mends import Suspicion
 from armid.identifiers import Identifier, can_run_directly, run_directly
 from armid.model import Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
-from armid.problem.meter import Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem, Replay, fitness_of, replays, weights_of
+from armid.problem.meter import BudgetIgnoredError, Meter, MeterTermination
+from armid.problem.problem import (
+    IdentificationProblem,
+    Replay,
+    fitness_of,
+    judged_by,
+    output_sizes,
+    replays,
+    signals_of,
+    weights_of,
+)
 from armid.problem.similarity import similarity
 from armid.problem.space import Space
 from armid.record import Campaign
+from armid.report.document import finite
+from armid.report.result import IDENTIFICATION, Kind, Result
 
 Array = NDArray[np.float64]
 
 
 INTERRUPTED = "interrupted"
+# Where only noise is left, S2 below the first with S1 above the second: S2 pairs the few intervals between landmarks by
+# order, and a landmark of noise unpairs them, so that neither S2 nor S is usable.
+SHAPE_FALLS, NUMBERS_AGREE = 0.9, 0.95
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Hold errors of one candidate on some records.
+    """Hold errors of one candidate on some records of one output.
 
-    rmse: pooled over all samples [rad/s or m/s]; nrmse: each record divided by its rms; chi2_per_sample: mean of
-    (residual / noise)^2, None without noise; s, s1, s2: similarity degrees, mean weighted by duration.
+    rmse: pooled over all samples [unit]; nrmse: each record divided by its rms; chi2_per_sample: mean of
+    (residual / noise)^2, None without noise; s, s1, s2: similarity degrees, mean weighted by duration of the records
+    where they are usable, NaN where they are in none. unit: of the output; span: from the smallest to the largest value
+    that was measured [unit].
     """
 
     rmse: float
@@ -47,16 +63,31 @@ class Errors:
     s: float
     s1: float
     s2: float
+    unit: str = ""
+    span: float = np.nan
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
-    """Hold the result of one run.
+@dataclass(frozen=True)
+class JointErrors(Errors):
+    """Hold errors of the plant's first output, NaN where no record holds it, beside those of each output.
 
-    candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
-    (None without such records). trace: evaluations and best fitness at each improvement.
+    joint_nrmse: root of the mean square, over the outputs, of rmse over span.
     """
 
+    joint_nrmse: float = np.nan
+    outputs: Mapping[str, Errors] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result):
+    """Hold the result of one run; it prints itself, and has a table, figures and files.
+
+    candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
+    (None without such records). trace: evaluations and best fitness at each improvement. suspicions: what a screen of
+    the records found.
+    """
+
+    kind: ClassVar[Kind] = IDENTIFICATION
     campaign: Campaign
     model: Model
     space: Space
@@ -65,8 +96,8 @@ class Identification:
     candidate: Array
     value: float
     information: Information
-    train: Errors
-    holdout: Errors | None
+    train: JointErrors
+    holdout: JointErrors | None
     trace: tuple[NDArray[np.int64], Array]
     train_replays: tuple[Replay, ...]
     holdout_replays: tuple[Replay, ...]
@@ -75,6 +106,7 @@ class Identification:
     n_failed: int
     seed: int
     stopped: str
+    suspicions: tuple[Suspicion, ...] = ()
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
@@ -98,8 +130,9 @@ def identify(
 ) -> Identification:
     """Search the free parameters on the train records, then judge the best candidate on train and holdout.
 
-    Holdout records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so
-    far is judged, `stopped` is "interrupted".
+    Starts of train records in motion are fitted with the parameters, about those of the least-squares estimate. Holdout
+    records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so far is
+    judged, `stopped` is "interrupted".
 
     Parameters
     ----------
@@ -121,11 +154,12 @@ def identify(
     ArmidError
         For a negative seed, a fitness that the identifier cannot minimise, and when every candidate diverged.
     """
-    if seed < 0:
-        raise ArmidError(f"the seed is {seed}, a whole number of at least 0 is expected")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ArmidError(f"the seed is {seed!r}, a whole number of at least 0 is expected")
     identifier.refuse(fitness)
     identifier.build(Meter(budget, target).budget)  # refuses bad options before anything is calibrated
     train = replays(campaign.train, model, space, accuracy)
+    train = with_fitted_starts(train, space)
     meter = Meter(budget, target)
     if space.free.any():
         stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
@@ -136,18 +170,18 @@ def identify(
         x = meter.best_x
     else:
         stopped, x = "no parameter is free", np.empty(0)
-    candidate = space.complete(x[np.newaxis])[0]
+    candidate, seen = space.complete(x[np.newaxis])[0], judged_by(fitness, train)
     if len(x):
         value = meter.best_f
     else:  # nobody has asked for its fitness yet
-        signals = [r.signal(candidate[np.newaxis]) for r in train]
-        value = float(fitness_of(fitness, train, [r.measured for r in train], signals, weights_of(fitness, train))[0])
-    holdout = replays(campaign.holdout, model, space, accuracy)
+        signals, measured = signals_of(seen, candidate[np.newaxis]), [r.measured for r in seen]
+        value = float(fitness_of(fitness, seen, measured, signals, weights_of(fitness, seen), output_sizes(seen))[0])
+    holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     errors = campaign_errors(train, candidate)
     assert errors is not None
     trace = meter.trace()
     return Identification(
-        campaign, model, space, fitness, identifier.name, candidate, value, information_at(train, space, x),
+        campaign, model, space, fitness, identifier.name, candidate, value, information_at(seen, space, x),
         errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
         budget, meter.used, meter.n_failed, seed, stopped,
     )  # fmt: skip
@@ -174,6 +208,10 @@ def search(
                 run_directly(algorithm, problem, seed, is_over)
             else:
                 run_by_pymoo(algorithm, problem, meter, seed, is_over)
+        except BudgetIgnoredError:
+            if meter.best_x is None:
+                raise
+            return f"{identifier.name} went on after its budget and was stopped"
         except (KeyboardInterrupt, SystemError) as error:
             # also where compiled code has wrapped it
             is_interrupt = isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
@@ -206,25 +244,39 @@ def versions_of(packages: Sequence[str]) -> dict[str, str]:
 
 
 def record_errors(replay: Replay, candidate: Array) -> Errors:
-    """Return the errors of one whole candidate on one record, infinite where it diverged."""
+    """Return the errors of one whole candidate on one record of one output, infinite where it diverged."""
     measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])
     square = float(mean_square(measured, simulated)[0])
-    s, s1, s2 = (float(v[0]) for v in similarity(measured, simulated, replay.pieces[0].manoeuvre.interval))
-    noise = replay.record.noise.rms
+    noise, interval = replay.record.noise.rms, replay.pieces[0].manoeuvre.interval
+    s, s1, s2 = (float(v[0]) for v in similarity(measured, simulated, interval, noise=noise))
     chi2 = float(chi_square(measured, simulated, noise)[0]) / len(measured) if noise > 0.0 else None
-    return Errors(np.sqrt(square), np.sqrt(square / float(np.mean(measured**2))), chi2, s, s1, s2)
+    if s2 < SHAPE_FALLS and s1 > NUMBERS_AGREE and chi2 is not None and chi2 < MISFIT:
+        s = s2 = np.nan
+    nrmse = np.sqrt(square / float(np.mean(measured**2)))
+    return Errors(np.sqrt(square), nrmse, chi2, s, s1, s2, replay.record.unit, float(np.ptp(measured)))
 
 
-def campaign_errors(replays: tuple[Replay, ...], candidate: Array) -> Errors | None:
+def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors | None:
     """Return the joined errors of one whole candidate, None without records."""
     if not replays:
         return None
+    plant = replays[0].model.plant
+    groups = [(o, [r for r in replays if r.place == i]) for i, o in enumerate(plant.outputs)]
+    outputs = {o.name: output_errors(group, candidate) for o, group in groups if group}
+    joint = float(np.sqrt(np.mean([(e.rmse / e.span) ** 2 for e in outputs.values()])))
+    absent = Errors(np.nan, np.nan, None, np.nan, np.nan, np.nan, plant.outputs[0].unit)
+    return JointErrors(**vars(outputs.get(plant.outputs[0].name, absent)), joint_nrmse=joint, outputs=outputs)
+
+
+def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
+    """Return the joined errors of one whole candidate on records of one output."""
     each = [record_errors(r, candidate) for r in replays]
     n = np.array([r.record.n_samples for r in replays], dtype=float)
     duration = np.array([r.record.duration for r in replays])
 
     def pooled(values: list[float], weights: Array) -> float:
-        return float(np.sum(np.array(values) * weights) / weights.sum())
+        told = ~np.isnan(values)
+        return float(np.sum(np.array(values)[told] * weights[told]) / weights[told].sum()) if told.any() else np.nan
 
     chi2 = [e.chi2_per_sample for e in each if e.chi2_per_sample is not None]
     return Errors(
@@ -234,27 +286,56 @@ def campaign_errors(replays: tuple[Replay, ...], candidate: Array) -> Errors | N
         s=pooled([e.s for e in each], duration),
         s1=pooled([e.s1 for e in each], duration),
         s2=pooled([e.s2 for e in each], duration),
+        unit=each[0].unit,
+        span=float(np.ptp(np.concatenate([r.measured for r in replays]))),
     )
+
+
+def errors_entry(errors: Errors | None) -> dict[str, Any] | None:
+    """Return errors as JSON can hold them, null for what is not finite, None for none."""
+
+    def without_nan(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {k: without_nan(v) for k, v in value.items()}
+        return value if isinstance(value, str) else finite(value)
+
+    return None if errors is None else without_nan(asdict(errors))
+
+
+def outputs_entry(replays: Sequence[Replay]) -> dict[str, dict[str, Any]]:
+    """Return output -> its unit and its noise, the mean over records, in the order of the plant, for JSON."""
+    each = [(o, [r.record.noise.rms for r in replays if r.place == i])
+            for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
+    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in each if rms}
+
+
+def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:
+    """Return file -> errors of one whole candidate on the outputs that it holds."""
+    files = dict.fromkeys(r.record.file for r in replays)
+    found = {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
+    return {file: errors for file, errors in found.items() if errors is not None}
 
 
 @contextmanager
 def ctrl_c_waits() -> Iterator[Callable[[], bool]]:
     """Hold Ctrl-C back and yield a function that says whether it came; a second one interrupts at once.
 
-    Raised inside a compiled function it would come out as a SystemError, or not at all. Only the main thread gets it.
+    Raised inside a compiled function it would come out as a SystemError, or not at all. Only the main thread gets it;
+    a process that ignores it goes on ignoring it, and holds back SIGTERM where a command has given that a meaning.
     """
     came: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
+    asked = signal.SIGTERM if signal.getsignal(signal.SIGINT) is signal.SIG_IGN else signal.SIGINT
+    before = signal.getsignal(asked) or signal.default_int_handler
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield lambda: False
         return
-    before = signal.getsignal(signal.SIGINT) or signal.default_int_handler
 
     def first(number: int, _: object) -> None:
         came.append(number)
-        signal.signal(signal.SIGINT, before)
+        signal.signal(asked, before)
 
-    signal.signal(signal.SIGINT, first)
+    signal.signal(asked, first)
     try:
         yield lambda: bool(came)
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(asked, before)

@@ -1,7 +1,6 @@
 """The document of an identification, and what of it is stored: result.json and details.json."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from functools import partial
 from textwrap import fill
 from typing import Any
@@ -9,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.estimation.identify import Errors, Identification, record_errors, versions_of
-from armid.estimation.information import MISFIT, collinear
+from armid.estimation.identify import Identification, errors_by_file, errors_entry, outputs_entry, versions_of
+from armid.estimation.information import collinear
 from armid.problem.fitness import SIMILARITIES
-from armid.problem.problem import Replay
+from armid.problem.problem import Replay, judged_by
 from armid.report.document import (
     ERROR_NOTE,
     MOST_RECORDS,
@@ -21,22 +20,27 @@ from armid.report.document import (
     Figure,
     Gallery,
     Section,
-    Sentences,
+    Struck,
     Table,
     Text,
+    correlation_tables,
     curve_entry,
     error_table,
     finite,
     listing,
     made_section,
+    others_text,
     points,
     record_axes,
     records_note,
+    remark_parts,
     rmse_text,
     small_axes,
+    stored_figures,
     table,
     value_text,
 )
+from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, pyplot
 from armid.units import SHOWN, shown
 
@@ -54,16 +58,15 @@ def figures_of(found: Identification) -> dict[str, Callable[[], Any]]:
 def fit_figure(found: Identification) -> Any:
     """Draw measured and simulated signal of each record, the residual below."""
     replays = chosen(found)
-    figure, axes = record_axes(len(replays), 4.4, 0.6, (3, 1.4))
-    unit, factor = SHOWN[found.campaign.unit]
+    figure, axes = record_axes(len(replays), 4.4, (3, 1.4))
     for pair, replay in zip(axes, replays, strict=True):
+        factor, unit = shown(1.0, replay.record.unit)
         measured, simulated = replay.measured, replay.signal(found.candidate[np.newaxis])[0]
         rms = factor * np.sqrt(np.mean((measured - simulated) ** 2))
-        pair[0].set_title(f"{replay.record.file} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
+        pair[0].set_title(f"{replay.name} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
         curves = {"measured": measured, "simulated": simulated, "residual": measured - simulated}
-        draw_record(pair, {name: (replay.times, y) for name, y in curves.items()}, found.campaign.unit)
-    figure.align_ylabels()
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+        draw_record(pair, {name: (replay.times, y) for name, y in curves.items()}, replay.record.unit)
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=2, frameon=False)
     there_are = len(found.train_replays) + len(found.holdout_replays)
     model = " + ".join([found.model.plant.name, *(e.name for e in found.model.effects)])
     some = "" if len(replays) == there_are else f" ({len(replays)} of {there_are} records)"
@@ -88,7 +91,7 @@ def record_figure(curves: Mapping[str, Mapping[str, Any]], unit: str) -> Any:
 
 
 def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) -> None:
-    (upper, lower), (unit, factor) = axes, SHOWN[si_unit]
+    (upper, lower), (factor, unit) = axes, shown(1.0, si_unit)
     looks = {"measured": {"color": OKABE_ITO["black"], "lw": 1.6},
              "simulated": {"color": OKABE_ITO["vermilion"], "lw": 1.3, "ls": "--"}}  # fmt: skip
     for name, look in looks.items():
@@ -97,7 +100,7 @@ def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) ->
     x, y = curves["residual"]
     lower.axhline(0.0, color=GREY, lw=0.8)
     lower.plot(x, factor * y, color=OKABE_ITO["blue"], lw=0.8)
-    upper.set_ylabel(f"speed [{unit}]")
+    upper.set_ylabel(f"{'speed' if si_unit in ('rad/s', 'm/s') else 'signal'} [{unit}]")
     upper.tick_params(labelbottom=False)
     lower.set(ylabel=f"residual\n[{unit}]", xlabel="time [s]")
     for axis in axes:
@@ -108,13 +111,14 @@ def convergence_figure(found: Identification) -> Any:
     """Draw the best fitness, or for a similarity its degree, against the number of simulations."""
     from matplotlib.ticker import LogLocator, StrMethodFormatter
 
-    similarity = found.fitness.name in SIMILARITIES
+    similarity = found.fitness.name.partition(":")[0] in SIMILARITIES
     evaluations, values = found.trace
     x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
     figure, axis = pyplot().subplots(figsize=(6.8, 4.2), layout="constrained")
-    unit, factor = SHOWN[found.campaign.unit] if found.fitness.unit == "signal" else ("", 1.0)
-    shown = 1.0 - y if similarity else y * factor
-    axis.step(x, shown, where="post", color=OKABE_ITO["blue"], lw=1.8)
+    si_unit = fitness_unit(found)
+    factor, unit = shown(1.0, si_unit) if si_unit else (1.0, "")
+    height = 1.0 - y if similarity else y * factor
+    axis.step(x, height, where="post", color=OKABE_ITO["blue"], lw=1.8)
     if not similarity and np.min(y) > 0.0:
         # plain numbers at 1, 2, 5
         axis.set_yscale("log")
@@ -123,21 +127,26 @@ def convergence_figure(found: Identification) -> Any:
         axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))
     named = f"{found.fitness.name} [{unit}]" if unit else found.fitness.name
     axis.set(ylabel="similarity degree of the best" if similarity else f"best {named}", xlabel="simulations")
-    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {shown[-1]:.6g} {unit}"
+    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {height[-1]:.6g} {unit}"
     axis.set_title(text.rstrip(), fontsize="medium")
     return figure
+
+
+def fitness_unit(found: Identification) -> str:
+    """Return the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs."""
+    seen = {r.record.unit: r.record.output for r in judged_by(found.fitness, found.train_replays)}
+    return next(iter(seen)) if found.fitness.unit == "signal" and len(seen) == 1 else ""
 
 
 Array = NDArray[np.float64]
 PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {"convergence": ("The search", "Best so far against the number of simulations.")}
+MOST_KNOWN_FIRST = 3
 OLD = (
     "details.json is not in this folder: an earlier version of armid wrote it, so the curves, what is to be known, the "
     "settings and the command are not on this page; the same `armid identify` again writes them."
 )
-# S2 below the first with S1 above the second: landmarks that do not match, not signals that differ.
-SHAPE_FALLS, NUMBERS_AGREE = 0.9, 0.95
 # A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
 FAR_FROM_MINIMUM = 4.0
 # A mean square on held-out records of more times that on the fitted ones than this.
@@ -163,8 +172,9 @@ def identify_document(
     unit = result["unit"]
     parameters, errors = parameter_table(result), train_and_holdout(result)
     said = [text for text in details.get("remarks", ()) if text not in details["warnings"]]
-    remarks = (Sentences(tuple(said)),) if said else ()
-    correlated = (correlation_table(result["correlation"]),) if len(result["correlation"]) > 1 else ()
+    first = [text for text in details.get("known_first", said) if text in said]
+    correlated = correlation_tables(result["correlation"])
+    remarks = remark_parts(first, [text for text in said if text not in first])
     each = [(file, e["role"], e) for file, e in result["error_by_record"].items()]
     value = result["fitness_value"]
     search = [
@@ -174,12 +184,12 @@ def identify_document(
         ("seed", str(result["seed"])), ("stopped", result["stopped"]),
         ("engine's error [rad/s or m/s]", f"{result['engine_error']:.2g}"),
     ]  # fmt: skip
-    figures = tuple(Figure(name, *FIGURES[name], svg=svg) for name, svg in svgs.items())
+    figures = stored_figures(FIGURES, svgs).get("convergence", ())
     sections = (
-        Section("Parameters", (parameters, *correlated)),
-        *(Section("What must be known", (part,)) for part in remarks),
-        Section("Errors", (errors, error_table("Each record", ["record", "role"], each, unit))),
+        Section("Parameters", (parameters,)),
         *([fit_section(details, unit)] if details else []),
+        *(Section(part.title, (part,)) for part in remarks),
+        Section("Errors", (errors, error_table("Each record", ["record", "role"], each, unit), *correlated)),
         Section("Search", (table("How it went", ["what", "value"], search), *figures)),
         Section("Equations", (listing("The model that was identified", result["model"]),)),
         made_section(details.get("made_by", {}), result["versions"], again),
@@ -196,22 +206,39 @@ def identify_document(
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     """Return parameters, errors, and what stands against them."""
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
-    first = "; ".join(f"{name} = {value_text(p)}" for name, p in free.items()) + "." if free else "Nothing was free."
+    first = f"{lead(free)}: {'; '.join(f'{name} = {held_text(p)}' for name, p in free.items())}."
     train, holdout = result["error"]["train"], result["error"]["holdout"]
-    out = "no record was held out"
+    out = "no record was held out, so that nothing judges the model"
     if holdout is not None:
         out = f"{rmse_text(holdout, result['unit'])} on those held out"
-    noise, unit = shown(float(np.mean([n["rms"] for n in result["noise"].values()])), result["unit"])
+    outputs = result.get("outputs") or {"": {"noise_rms": np.mean([n["rms"] for n in result["noise"].values()])}}
+    noise, unit = shown(float(next(iter(outputs.values()))["noise_rms"]), result["unit"])
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
-              f"the noise is {noise:.3g} {unit}.")  # fmt: skip
+              f"the noise is {noise:.3g} {unit}.{others_text(train, holdout)}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
     lost = [name for name, p in free.items() if p["low"] is None]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
     doubts += details.get("warnings", ())
-    trusted = "No parameter is held by a bound, and the search has come to the minimum." if free else ""
-    third = " ".join(doubts) or trusted
-    return (first, second, third) if third else (first, second)
+    if not free:
+        return "Nothing was free: the model was judged as it is.", second
+    trusted = "No parameter is held by a bound, and the search has come to the minimum."
+    return first, second, " ".join(doubts) or trusted
+
+
+def lead(free: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return whether the parameters were found, and whether their intervals hold."""
+    doubts = {p.get("interval_doubt", "") for p in free.values()}
+    if not any(doubts):
+        return "Found, with 95 % intervals"
+    if len(doubts) == 1:
+        return f"Found, but no interval holds, since {doubts.pop()}"
+    return "Found, with 95 % intervals where they hold"
+
+
+def held_text(p: Mapping[str, Any]) -> str:
+    """Return a stored parameter, with its interval where it holds."""
+    return value_text(p if p.get("interval_holds", True) else {**p, "low": None})
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
@@ -220,21 +247,17 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
     for name, p in result["parameters"].items():
         unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
         if p["bound_low"] is None:
-            rows.append((name, factor * p["value"], unit, "", "", "fixed"))
+            rows.append((name, factor * p["value"], unit, "fixed", "", ""))
             continue
         interval = "not determined" if p["low"] is None else f"{factor * p['low']:.6g} to {factor * p['high']:.6g}"
         bounds = f"{factor * p['bound_low']:.4g} to {factor * p['bound_high']:.4g}"
-        rows.append((name, factor * p["value"], unit, interval, bounds, "AT ITS BOUND" if p["bound_active"] else ""))
-    value, remark = Column("value", "value", ".6g"), Column("remark", "")
-    return table("Parameters", ["parameter", value, "unit", "95 % interval", "bounds", remark], rows)
-
-
-def correlation_table(correlation: Mapping[str, Mapping[str, float | None]]) -> Table:
-    """Return the correlations of the estimates."""
-    rows = [(name, *row.values()) for name, row in correlation.items()]
-    note = "Near +1 or -1: a change of one is made up for by the other."
-    columns = ["parameter", *(Column(name, name, "+.3f") for name in correlation)]
-    return table("Correlation of the estimates", columns, rows, note)
+        holds = p.get("interval_holds", True)
+        remark = "AT ITS BOUND" if p["bound_active"] else "" if holds else "does not hold"
+        shown_interval = interval if holds or p["low"] is None else Struck(interval)
+        rows.append((name, factor * p["value"], unit, remark, shown_interval, bounds))
+    columns = ["parameter", Column("value", "value", ".6g"), "unit", "remark", "95 % interval", "bounds"]
+    kept = [i for i, c in enumerate(columns) if i != 3 or any(row[3] for row in rows)]
+    return table("Parameters", [columns[i] for i in kept], [[row[i] for i in kept] for row in rows])
 
 
 def train_and_holdout(result: Mapping[str, Any]) -> Table:
@@ -246,7 +269,7 @@ def train_and_holdout(result: Mapping[str, Any]) -> Table:
 
 def fit_section(details: Mapping[str, Any], unit: str) -> Section:
     figures = tuple(
-        Figure(f"r{i}", f"{r['file']} ({r['role']})", "", partial(record_figure, r["curves"], unit))
+        Figure(f"r{i}", f"{r['file']} ({r['role']})", "", partial(record_figure, r["curves"], r.get("unit", unit)))
         for i, r in enumerate(details["records"])
     )  # fmt: skip
     text = (
@@ -257,18 +280,27 @@ def fit_section(details: Mapping[str, Any], unit: str) -> Section:
     return Section("Fit of each record", (gallery,), text + records_note(len(figures), details["n_records"]))
 
 
+def parts_of(found: Identification) -> Parts:
+    return Parts(result_of(found), details_of(found), figures_of(found))
+
+
 def result_of(found: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
     names, correlation = found.information.names, found.information.correlation
-    replays = (*found.train_replays, *found.holdout_replays)
-    by_record = {r.record.file: {"role": r.record.role, **errors(record_errors(r, found.candidate))} for r in replays}
-    noises = {r.record.file: r.record.noise for r in replays}
+    replays, doubts = (*found.train_replays, *found.holdout_replays), interval_doubts(found)
+    roles = {r.record.file: r.record.role for r in replays}
+    by_file = {file: errors_entry(e) for file, e in errors_by_file(replays, found.candidate).items()}
+    by_record = {file: {"role": roles[file], **(e or {})} for file, e in by_file.items()}
+    noises: dict[str, dict[str, Any]] = {}
+    for noise, r in ((r.record.noise, r) for r in replays):
+        told = {"rms": noise.rms, "mean": noise.mean, "source": noise.source}
+        noises.setdefault(r.record.file, dict(told, outputs={}))["outputs"][r.record.output] = told
     return {
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
         "effects": [e.name for e in found.model.effects],
-        "parameters": {name: entry(found, i) for i, name in enumerate(found.space.names)},
-        "error": {"train": errors(found.train), "holdout": None if found.holdout is None else errors(found.holdout)},
+        "parameters": {name: entry(found, i, doubts) for i, name in enumerate(found.space.names)},
+        "error": {"train": errors_entry(found.train), "holdout": errors_entry(found.holdout)},
         "error_by_record": by_record,
         "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
         "unit": found.campaign.unit,
@@ -280,35 +312,45 @@ def result_of(found: Identification) -> dict[str, Any]:
         "failed": found.n_failed,
         "stopped": found.stopped,
         "seed": found.seed,
-        "noise": {file: {"rms": n.rms, "mean": n.mean, "source": n.source} for file, n in noises.items()},
+        "noise": noises,
+        "outputs": outputs_entry(replays),
         "engine_error": max(r.engine_error for r in found.train_replays),
         "model": str(found.model),
-        "versions": versions(),
+        "versions": versions_of(PACKAGES),
     }
 
 
-def versions() -> dict[str, str]:
-    """Return package -> version, of Python too."""
-    return versions_of(PACKAGES)
-
-
-def entry(found: Identification, i: int) -> dict[str, Any]:
-    """Return value, interval, bounds and flag of one parameter; a fixed one has neither interval nor bounds."""
-    space, value, ends = (
-        found.space,
-        float(found.candidate[i]),
-        dict.fromkeys(("low", "high", "bound_low", "bound_high")),
-    )
+def entry(found: Identification, i: int, doubts: Mapping[str, str]) -> dict[str, Any]:
+    """Return value, interval, bounds and flags of one parameter; a fixed one has neither interval nor bounds."""
+    space, value = found.space, float(found.candidate[i])
+    ends: dict[str, Any] = dict.fromkeys(("low", "high", "bound_low", "bound_high"))
     if space.free[i]:
         half = found.information.half_width[found.information.names.index(space.names[i])]
+        doubt = doubts[space.names[i]]
         ends = {"low": finite(value - half), "high": finite(value + half),
-                "bound_low": float(space.low[i]), "bound_high": float(space.high[i])}  # fmt: skip
+                "bound_low": float(space.low[i]), "bound_high": float(space.high[i]),
+                "interval_holds": not doubt, "interval_doubt": doubt}  # fmt: skip
     return {"value": value, "unit": space.units[i], **ends, "bound_active": bool(found.at_bound[i])}
 
 
-def errors(found: Errors) -> dict[str, float | None]:
-    """Return errors with null for what is not finite."""
-    return {k: finite(v) for k, v in asdict(found).items()}
+def interval_doubts(found: Identification) -> dict[str, str]:
+    """Return, for each free parameter, why its interval does not hold, "" where it does."""
+    information, held = found.information, [found.space.names[i] for i in np.flatnonzero(found.at_bound)]
+    if far_from_minimum(found):
+        return dict.fromkeys(information.names, "the search has not come to the minimum")
+    if any(level.from_residual for level in information.levels):
+        return dict.fromkeys(information.names, "what the model leaves is more than the noise")
+    doubts = dict.fromkeys(information.names, "") | dict.fromkeys(held, "its bound holds it")
+    for pair in (pair[:2] for pair in collinear(information)):
+        for name, other in (pair, pair[::-1]):
+            if other in held and not doubts[name]:
+                doubts[name] = f"it is correlated with {other}, which its bound holds"
+    return doubts
+
+
+def far_from_minimum(found: Identification) -> bool:
+    """Tell whether a least-squares step from here would be many standard deviations long."""
+    return bool(np.nan_to_num(np.abs(found.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
 
 
 def details_of(found: Identification) -> dict[str, Any]:
@@ -321,12 +363,14 @@ def details_of(found: Identification) -> dict[str, Any]:
         measured, simulated = replay.measured, replay.signal(found.candidate[np.newaxis])[0]
         curves = {"measured": measured, "simulated": simulated, "residual": measured - simulated}
         records.append({
-            "file": replay.record.file, "role": replay.record.role, "noise_rms": replay.record.noise.rms,
+            "file": replay.name, "role": replay.record.role, "noise_rms": replay.record.noise.rms,
+            "unit": replay.record.unit,
             "n_samples": len(measured), "curves": {name: curve_entry(replay.times, y) for name, y in curves.items()},
         })  # fmt: skip
     return {
         "remarks": remarks(found),
-        "warnings": convergence_remarks(found),
+        "known_first": ranked(found)[:MOST_KNOWN_FIRST],
+        "warnings": [*(s.sentence for s in found.suspicions), *convergence_remarks(found)],
         "records": records,
         "n_records": len(replays),
         "search": curve_entry(found.trace[0].astype(float), found.trace[1]),
@@ -334,37 +378,35 @@ def details_of(found: Identification) -> dict[str, Any]:
 
 
 def remarks(found: Identification) -> list[str]:
-    """Return what a reader must know, one sentence each."""
-    information, (unit, factor) = found.information, SHOWN[found.campaign.unit]
-    said = [bound_remark(found, int(i)) for i in np.flatnonzero(found.at_bound)] + convergence_remarks(found)
-    for a, b, r in collinear(information):
-        said.append(f"{a} and {b} can hardly be told apart on these records (correlation {r:+.3f}): a change of one is "
-                    "made up for by the other.")  # fmt: skip
+    """Return what a reader must know, the most important first, then what is for the record, one sentence each."""
+    return ranked(found) + noise_remarks(found)
+
+
+def ranked(found: Identification) -> list[str]:
+    """Return what stands against the result, the most important first."""
+    information = found.information
+    said = [s.sentence for s in found.suspicions] + convergence_remarks(found)
+    said += [bound_remark(found, int(i)) for i in np.flatnonzero(found.at_bound)]
+    said += misfit_remarks(found)
     deviations = zip(information.names, information.deviation, strict=True)
     said += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
+    pairs = collinear(information)
+    if pairs:
+        told = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs)
+        said.append(f"Hardly to be told apart on these records (correlation): {told}; a change of one is made up for "
+                    "by the other.")  # fmt: skip
     if found.n_failed:
         said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
-    replays = (*found.train_replays, *found.holdout_replays)
-    said += [text for replay in replays if (text := shape_remark(replay, found.candidate))]
-    said += [
-        f"{r.record.file}: the engine is off by up to {factor * r.engine_error:.2g} {unit} even at its "
+    return said + [
+        f"{r.name}: the engine is off by up to {engine_error_text(r)} even at its "
         "finest steps: the equations are stiff there, or switch somewhere without a guard."
-        for r in replays if not all(c.reached for c in r.calibrations)
+        for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)
     ]  # fmt: skip
-    return said + noise_remarks(found)
 
 
-def shape_remark(replay: Replay, candidate: Array) -> str:
-    """Return a sentence where S2 falls though the residual is no more than noise, else "".
-
-    S2 pairs few intervals between landmarks; one landmark that is only noise, near an end, can unpair them all.
-    """
-    e = record_errors(replay, candidate)
-    only_noise = e.chi2_per_sample is not None and e.chi2_per_sample < MISFIT
-    if not (e.s2 < SHAPE_FALLS and e.s1 > NUMBERS_AGREE and only_noise):
-        return ""
-    return (f"{replay.record.file}: S2 is {e.s2:.3f} though S1 is {e.s1:.3f}: the shape similarity pairs a few "
-            "intervals by order, and a landmark of noise unpairs them; look at S1 and RMSE.")  # fmt: skip
+def engine_error_text(replay: Replay) -> str:
+    value, unit = shown(replay.engine_error, replay.record.unit)
+    return f"{value:.2g} {unit}"
 
 
 def bound_remark(found: Identification, i: int) -> str:
@@ -380,12 +422,12 @@ def bound_remark(found: Identification, i: int) -> str:
 def convergence_remarks(found: Identification) -> list[str]:
     """Return what is to be said of a search that has not come to the minimum, or of one that does not carry over."""
     said = []
-    steps = np.abs(np.nan_to_num(found.information.step))
-    if len(steps) and steps.max() > FAR_FROM_MINIMUM:
+    if far_from_minimum(found):
+        steps = np.abs(np.nan_to_num(found.information.step))
         name = found.information.names[int(np.argmax(steps))]
         said.append(f"The search has not come to the least-squares minimum: a step from here would move {name} by "
-                    f"{steps.max():.3g} of its standard deviations, so the intervals do not hold; a larger budget, "
-                    "another seed, fitness rmse or --option velocity_limit=0.2 may get there.")  # fmt: skip
+                    f"{steps.max():.3g} of its standard deviations, so the intervals do not hold; identifier "
+                    "least_squares on fitness rmse, a larger budget or another seed may get there.")  # fmt: skip
     train, holdout = found.train.chi2_per_sample, None if found.holdout is None else found.holdout.chi2_per_sample
     if train is not None and holdout is not None and holdout > CARRIES_OVER * max(train, 1.0):
         said.append(f"The fit does not carry over: its mean square is {holdout:.3g} times that of the noise on the "
@@ -394,31 +436,39 @@ def convergence_remarks(found: Identification) -> list[str]:
 
 
 def noise_remarks(found: Identification) -> list[str]:
-    replays, unit = found.train_replays, found.campaign.unit
-    said = [noise_remark(r, unit) for r in replays if len(replays) <= MOST_NAMED]
-    if not said:
-        values = [shown(r.record.noise.rms, unit)[0] for r in replays]
-        said.append(f"{len(replays)} records: noise {min(values):.3g} to {max(values):.3g} {SHOWN[unit][0]} rms.")
-    above = [(r.record, level.rms) for r, level in zip(replays, found.information.levels, strict=True)
-             if level.from_residual]  # fmt: skip
+    replays = found.train_replays
+    said = [noise_remark(r) for r in replays if len(replays) <= MOST_NAMED]
+    for output in dict.fromkeys(r.record.output for r in replays if not said):
+        of = [r.record for r in replays if r.record.output == output]
+        values = [shown(record.noise.rms, record.unit)[0] for record in of]
+        name = f"{output}, {len(of)} records" if len(of) < len(replays) else f"{len(of)} records"
+        unit = shown(0.0, of[0].unit)[1]
+        said.append(f"{name}: noise {min(values):.3g} to {max(values):.3g} {unit} rms.")
+    return said
+
+
+def misfit_remarks(found: Identification) -> list[str]:
+    """Return on which records the residual is more than the noise, and what follows."""
+    pairs = zip(judged_by(found.fitness, found.train_replays), found.information.levels, strict=True)
+    above = [(level.rms / r.record.noise.rms if r.record.noise.rms else np.inf, r.name)
+             for r, level in pairs if level.from_residual]  # fmt: skip
+    if not above:
+        return []
+    told = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_NAMED])
+    more = f" (so it is in {len(above)} records)" if len(above) > MOST_NAMED else ""
     why = "the model, in which nothing is free, lacks something."
     if found.space.free.any():
         why = (
             "the model lacks something, or the search has not come to the minimum; the intervals are widened to the "
             "residual and its correlation in time, and hold only as far as what is lacking averages out."
         )
-    for record, rms in above[:MOST_NAMED]:
-        times = rms / record.noise.rms if record.noise.rms else np.inf
-        said.append(f"{record.file}: the residual is {times:.3g} times the noise: {why}")
-    if len(above) > MOST_NAMED:
-        said.append(f"So it is with {len(above) - MOST_NAMED} more records.")
-    return said
+    return [f"The residual is this many times the noise: {told}{more}: {why}"]
 
 
-def noise_remark(replay: Replay, unit: str) -> str:
-    noise = replay.record.noise
+def noise_remark(replay: Replay) -> str:
+    noise, unit = replay.record.noise, replay.record.unit
     value, name = shown(noise.rms, unit)
-    text = f"{replay.record.file}: noise {value:.3g} {name} rms"
+    text = f"{replay.name}: noise {value:.3g} {name} rms"
     if noise.source == "rest":
         mean = shown(noise.mean or 0.0, unit)[0]
         return f"{text} and mean {mean:+.3g} {name} (shown, not subtracted) from {noise.n_samples} samples at rest."

@@ -2,16 +2,20 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from armid.engine import simulate
+from armid.errors import ArmidError
 from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
 from armid.problem.problem import Replay
 from armid.problem.space import Space
+from armid.problem.starts import by_file
 from armid.record.noise import correlation_sum
-from armid.record.record import NOISE_FREE
+from armid.record.record import NOISE_FREE, Noise
 
 Array = NDArray[np.float64]
 NORMAL_95 = 1.959963984540054
@@ -20,6 +24,8 @@ SINGULAR = 1e-13
 # A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
 # engine it is the engine's.
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
+# Chance below which a residual is no noise; independent samples in the blocks whose means are looked at.
+CHANCE, BLOCKS = 1e-3, (8, 32)
 # What is assumed for a record without noise, as a share of its rms speed.
 ASSUMED = 1e-3
 
@@ -82,6 +88,10 @@ def information_at(
         Free parameters.
     levels : tuple of Level
         One for each record; None: as measured, see `level_of`.
+
+    Returns
+    -------
+    Information
     """
     levels = tuple(level_of(r, space, x) for r in replays) if levels is None else levels
     noise_free = any(level.rms == 0.0 for level in levels)
@@ -93,15 +103,23 @@ def information_at(
     return replace(found, deviation=shown, step=np.zeros(len(x)))
 
 
-def information_of(records: LeastSquaresProblem, z: Array, trust: Array | None = None) -> Information:
+def information_of(
+    records: LeastSquaresProblem, z: Array, trust: Array | None = None, doubts: Array | None = None
+) -> Information:
     """Return intervals and correlations at a candidate, in shares of the range, from the weights of a problem.
 
-    trust: 1 for each sample whose residual is noise, below it where the residual is larger, (n_samples,).
+    trust: 1 for each sample whose residual is noise, below it where the residual is larger, (n_samples,). doubts: what
+    one standard deviation of each further unknown does to the weighted signal, (n_samples, n_doubts); the estimate is
+    then one of all together.
     """
     residual, jacobian = records.residual_and_slopes(z)
     rows = np.ones(len(residual)) if trust is None else np.sqrt(trust)
     residual, jacobian = rows * residual, rows[:, np.newaxis] * jacobian
     total = jacobian.T @ jacobian
+    if doubts is not None and doubts.shape[1]:
+        others = rows[:, np.newaxis] * doubts
+        mixed = others.T @ jacobian
+        total = total - mixed.T @ np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, mixed)
     covariance = inverse(total)
     determined = np.where(np.isfinite(covariance), covariance, 0.0)
     step = np.clip(z + determined @ (jacobian.T @ residual), 0.0, 1.0) - z
@@ -117,10 +135,21 @@ def information_of(records: LeastSquaresProblem, z: Array, trust: Array | None =
 
 
 def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
-    """Return d signal / d parameter x range in the windows of a record, shape (n_samples, n_free).
+    """Return d signal / d parameter x range in the windows of a record.
 
     Central differences with steps of 1e-4 of the range, moved inside the box where they would leave it; all perturbed
-    candidates run as one population. x: free parameters, SI, (n_free,).
+    candidates run as one population.
+
+    Parameters
+    ----------
+    replay, space
+        The record, ready to be simulated, and the box.
+    x : array, SI, (n_free,)
+        Free parameters.
+
+    Returns
+    -------
+    array, signal's unit, (n_samples, n_free)
     """
     records = WeightedRecords((replay,), space, (1.0,))
     return records.residual_and_slopes(records.shares(x))[1]
@@ -129,24 +158,26 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
 def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
     """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,).
 
-    By central differences; nothing for a machine that starts from rest.
+    By central differences; nothing for a machine that starts from rest, or where the start is fitted.
     """
     candidate = records.space.complete(records.values(z)[np.newaxis])
-    for i, replay in enumerate(records.replays):
-        row = 0
+    for outputs in by_file(records.replays):
+        replay, row = outputs[0], 0
         # a speed held for a second is the size of a position
         move = 1e-4 * replay.model.plant.scales.speed
         for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
-            for name, deviation in piece.start_deviation.items():
+            for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
                 runs = []
                 for sign in (1.0, -1.0):
                     constants = dict(piece.manoeuvre.constants)
                     constants[name] = constants.get(name, 0.0) + sign * move
                     manoeuvre = replace(piece.manoeuvre, constants=constants)
-                    runs.append(simulate(replay.model, manoeuvre, candidate, calibration.schedule).output[0])
+                    runs.append(simulate(replay.model, manoeuvre, candidate, calibration.schedule).outputs[:, 0])
                 changes = [np.zeros(r.record.n_samples) for r in records.replays]
-                slope = (runs[0] - runs[1])[piece.window] / (2.0 * move)
-                changes[i][row : row + piece.n_samples] = deviation * slope
+                slopes = (runs[0] - runs[1])[:, piece.window] / (2.0 * move)
+                for i in (i for i, r in enumerate(records.replays) if r in outputs):
+                    slope = slopes[records.replays[i].place]
+                    changes[i][row : row + piece.n_samples] = deviation * slope
                 yield records.weighted(changes)
             row += piece.n_samples
 
@@ -190,12 +221,34 @@ def level_of(replay: Replay, space: Space, x: Array) -> Level:
     noise = replay.record.noise
     residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
     rms = float(np.sqrt(np.mean(residual**2)))
-    # How well the noise itself is known: its mean square scatters by 2/n_eff.
-    doubt = 1.0 + 3.0 * np.sqrt(2.0 / (noise.n_samples * noise.effective_fraction))
-    noise_like = rms**2 <= MISFIT * doubt * noise.rms**2
-    if not np.isfinite(rms) or noise_like or rms <= ENGINE_ERRORS * replay.engine_error:
+    if not np.isfinite(rms) or is_noise(residual, noise) or rms <= ENGINE_ERRORS * replay.engine_error:
         return Level(noise.rms, noise.effective_fraction)
-    return Level(rms, 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+    return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+
+
+def is_noise(residual: Array, noise: Noise) -> bool:
+    """Tell whether a residual, (n_samples,), may be the noise of its record and nothing more.
+
+    By F tests, in independent samples: its mean square against that of the rest; the means of its blocks, where a
+    smooth misfit far below the noise of a sample stands out, against its own mean square. Noise from differences is a
+    lower bound that knows no correlation: there only a mean square of more than twice that is a misfit.
+    """
+    if noise.rms == 0.0:
+        return not residual.any()
+    square, share = float(np.mean(residual**2)), noise.effective_fraction
+    ratio, known = square / noise.rms**2, noise.n_samples * share
+    if noise.source != "rest":
+        # how well the noise itself is known: its mean square scatters by 2/n_eff
+        return bool(ratio <= MISFIT * (1.0 + 3.0 * np.sqrt(2.0 / known)))
+    tests = [(ratio, residual.size * share, known)]
+    for length in (ceil(n / share) for n in BLOCKS):
+        blocks = residual[: residual.size // length * length].reshape(-1, length).mean(axis=1)
+        if blocks.size:
+            spread = float(np.mean(blocks**2)) * length * share / square
+            # of white noise nothing else has to be known
+            tests.append((spread, blocks.size, residual.size if share == 1.0 else known))
+    # scipy.stats would take longer to load than an identification
+    return all(float(fdtrc(above, below, value)) > CHANCE for value, above, below in tests)
 
 
 def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | None = None) -> tuple[Level, ...]:
@@ -206,6 +259,8 @@ def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | 
     x: free parameters, SI, shape (n_free,).
     """
     if noise is not None:
+        if len({r.place for r in replays}) > 1:
+            raise ArmidError(f"a noise of {noise:g} was given, but records hold several outputs: none is expected")
         return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
     found = []
     for replay in replays:

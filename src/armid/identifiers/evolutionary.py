@@ -1,7 +1,7 @@
 """pymoo's own swarm, genetic algorithm and differential evolution, their options checked and safe from NaN."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -26,6 +26,8 @@ from armid.identifiers.search import Array, Ask, Search, SearchTask, SwarmEvalua
 from armid.problem.meter import PENALTY
 
 Check = Callable[[str, Any], Any]
+# Of each start of CMA-ES: candidates at a time, first standard deviation, most simulations; and what it has used.
+Restarts = Generator[tuple[float, float, float], int, None]
 VARIANT = re.compile(r"DE/(rand|best|target-to-best)/[12]/(bin|exp|hypercube|line)")
 
 
@@ -55,9 +57,11 @@ class PymooAlgorithm:
         refuse_unknown(options, self.options, f"'{self.name}'")
         given = {"pop_size": self.pop_size} | options
         checked_values = {option: self.options[option](option, value) for option, value in given.items()}
+        return self.algorithm()(evaluator=SwarmEvaluator(finite=True), **checked_values)
+
+    def algorithm(self) -> Any:
         module, kind = self.place.split(":")
-        algorithm = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{module}"), kind)
-        return algorithm(evaluator=SwarmEvaluator(finite=True), **checked_values)
+        return getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{module}"), kind)
 
     def identifier(self) -> Identifier:
         return Identifier(self.name, self, self.note, is_global=True)
@@ -105,8 +109,9 @@ class Cmaes(DeclaredSearch):
         def normal(*shape: int) -> Array:
             return task.random.standard_normal(shape)
 
-        cube, n_candidates = task.cube, float(self.n_candidates)
+        cube, restarts = task.cube, self.restarts(task.random)
         start = cube.drawn(task.random) if task.start is None else cube.point(task.start)
+        n_candidates, step, most = next(restarts)
         while True:
             # quiet, writing no file, drawing from the task's generator and not from the global one; in one dimension
             # cma fails where a standard deviation reaches its limit, so that there is none
@@ -115,13 +120,45 @@ class Cmaes(DeclaredSearch):
                 "verbose": -10, "verb_log": 0, "verb_disp": 0, "signals_filename": "",
                 "maxstd": np.inf if cube.n == 1 else None,
             }  # fmt: skip
-            strategy = CMAEvolutionStrategy(start, self.initial_step, settings)
-            while not strategy.stop():
+            strategy, used = CMAEvolutionStrategy(start, step, settings), 0
+            while not strategy.stop() and used < most:
                 points = strategy.ask()
                 told = yield Ask(cube.candidates(np.array(points)))
                 strategy.tell(points, np.minimum(told.F, PENALTY))
-            n_candidates *= self.growth
+                used += len(points)
+            n_candidates, step, most = restarts.send(used)
             start = cube.drawn(task.random)
+
+    def restarts(self, random: np.random.Generator) -> Restarts:
+        """Yield population, first standard deviation and most simulations of each start; is sent what was used."""
+        n_candidates = float(self.n_candidates)
+        while True:
+            yield n_candidates, self.initial_step, np.inf
+            n_candidates *= self.growth
+
+
+@dataclass(frozen=True)
+class BipopCmaes(Cmaes):
+    """CMA-ES with two kinds of restarts that share the budget evenly (Hansen 2009, doi:10.1145/1570256.1570333).
+
+    The large ones grow as in IPOP. A small one has lambda_0 (lambda / 2 lambda_0)^(U^2) candidates, lambda those of the
+    last large one, a first step smaller by 10^(-2 U'), and at most half of what the last large one used.
+    """
+
+    name, note = "bipop_cmaes", "CMA-ES, restarted with large and small populations in turn, BIPOP (cma)"
+
+    def restarts(self, random: np.random.Generator) -> Restarts:
+        """Yield as IPOP does, and small starts while they have used less."""
+        first, n_large, large, small = float(self.n_candidates), float(self.n_candidates), 0, 0
+        last = yield first, self.initial_step, np.inf
+        while True:
+            if small < large:
+                n_small = first * max(0.5 * n_large / first, 1.0) ** (random.random() ** 2)
+                small += yield n_small, self.initial_step * 10.0 ** (-2.0 * random.random()), 0.5 * last
+            else:
+                n_large *= self.growth
+                last = yield n_large, self.initial_step, np.inf
+                large += last
 
 
 @dataclass(frozen=True)
@@ -139,3 +176,22 @@ class UniformSearch(DeclaredSearch):
         cube = task.cube
         while True:
             yield Ask(cube.candidates(task.random.random((self.n_candidates, cube.n))))
+
+
+@dataclass(frozen=True)
+class SobolSearch(UniformSearch):
+    """Draw scrambled Sobol points and learn nothing (Owen 1998, doi:10.1006/jcom.1998.0487).
+
+    n_candidates: drawn at a time, a power of 2 for even points.
+    """
+
+    name, note = "sobol", "scrambled Sobol points (scipy), to compare with"
+    n_candidates: int = 64
+
+    def search(self, task: SearchTask) -> Search:
+        """Draw for ever."""
+        from scipy.stats import qmc
+
+        points = qmc.Sobol(task.cube.n, rng=task.random)
+        while True:
+            yield Ask(task.cube.candidates(points.random(self.n_candidates)))

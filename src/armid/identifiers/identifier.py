@@ -1,4 +1,4 @@
-"""What an identifier is, how a user's own becomes one, and checks of options."""
+"""What an identifier is, and checks of options."""
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
@@ -35,6 +35,7 @@ class Identifier:
     any; note: what it is, in words.
     is_global: it searches the whole box; uses_gradient: it asks for derivatives; is_stochastic: a seed changes it;
     needs_residuals: it works on residual vectors, so the fitness has to be a sum of squares.
+    package: what it needs beside armid's own dependencies, "" for nothing.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Identifier:
     uses_gradient: bool = False
     is_stochastic: bool = True
     needs_residuals: bool = False
+    package: str = ""
 
     def with_options(self, options: Mapping[str, Any]) -> "Identifier":
         """Return the identifier with options of its own, such as `velocity_limit` of the swarm.
@@ -68,23 +70,6 @@ class Identifier:
             )
 
 
-def as_identifier(name: str, obj: Any) -> Identifier:
-    """Return an Identifier as it is, or make one of a subclass of pymoo's Algorithm or of a function of the budget.
-
-    Raises ArmidError for anything else, and for an algorithm that was built already: it keeps the state of its run.
-    """
-    if isinstance(obj, Identifier):
-        return obj
-    expected = "expected a subclass of pymoo's Algorithm or a function of the budget that returns one"
-    if isinstance(obj, Algorithm):
-        raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} built already, {expected}")
-    if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
-        return Identifier(name, partial(without_budget, obj), "a class of the user")
-    if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
-        return Identifier(name, partial(built, name, obj), "a function of the user")
-    raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
-
-
 def accepts(function: Callable[..., Any], *arguments: object, **named: object) -> bool:
     """Say whether a function can be called with such arguments."""
     try:
@@ -92,19 +77,6 @@ def accepts(function: Callable[..., Any], *arguments: object, **named: object) -
     except (TypeError, ValueError):
         return False
     return True
-
-
-def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
-    """Return a fresh algorithm of a class, which is not told its budget."""
-    return algorithm()
-
-
-def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:
-    """Return what a user's function makes; refuse with ArmidError anything but an algorithm."""
-    algorithm = factory(budget)
-    if not isinstance(algorithm, Algorithm):
-        raise ArmidError(f"identifier '{name}' returned a {type(algorithm).__name__}, expected an Algorithm of pymoo")
-    return algorithm
 
 
 def refuse_unknown(given: Iterable[str], known: Iterable[str], whose: str, unsaid: Iterable[str] = ()) -> None:

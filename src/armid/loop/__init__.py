@@ -6,12 +6,14 @@ close_loop       the whole way, and the verdict
 whitening        train records with their noise -> residuals whose noise is white
 candidates       the effects that may be missing, compiled together; the grid on which they are tried
 score_test       how far each candidate would bring the residual down, to first order
-fit              a model at its least-squares estimate
-search, select   refits, exchanges, models with one effect more; whether an effect earns its parameters
+fit              a model at its least-squares estimate; whether a larger one earns its parameters
+suspects         whether one record disagrees with the others, and how
+constants        whether constants within their tolerances would do what an effect is to do
+search           refits, exchanges, models with one effect more
 equivalence      effects that the records cannot tell apart
 diagnose         whether what remains is more than noise, and where
 
-Beside it: missing_signal and empirical (where no effect will do), advice (the record to make next), result
+Beside it: missing_signal and empirical (where no effect will do), result
 (report.json), document and figures (what is shown).
 
 `WhitenedData`  the train records with their noise

@@ -7,7 +7,6 @@ candidates and 1.5 s of motion with no effect in the model, 0.4 ms with 38.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, product
@@ -19,10 +18,12 @@ from numpy.typing import NDArray
 from armid.engine import STANDARD, Calibration, Schedule, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.errors import ArmidError
+from armid.estimation.least_squares import side_by_side
 from armid.loop.whitening import WhitenedData, WhiteRecords
 from armid.model import Effect, Manoeuvre, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
+from armid.problem.starts import fits_starts
 from armid.record import Override, Record
 
 Array = NDArray[np.float64]
@@ -30,6 +31,8 @@ S = TypeVar("S")
 T = TypeVar("T")
 # What the names of empirical terms begin with (no effect of a library may), and how reports show them.
 UNNAMED, SHOWN_AS = "unnamed_", "unnamed:"
+# What the names of constants that are known roughly begin with, which are looked for as effects are.
+ROUGHLY, CONSTANT = "error_of_", "constant:"
 # More than the library holds: a model that grew for ever would take for ever to compile.
 BUNDLE = 60
 
@@ -65,6 +68,8 @@ class EffectKey:
         >>> EffectKey("unnamed_torque").public, EffectKey("flux_saturation", "atan").public
         ('unnamed:torque', 'flux_saturation')
         """
+        if self.name.startswith(ROUGHLY):
+            return self.name.replace(ROUGHLY, CONSTANT, 1)
         return self.name.replace(UNNAMED, SHOWN_AS, 1) if self.is_empirical else self.name
 
     def owns(self, parameter: str) -> bool:
@@ -79,13 +84,32 @@ def declared_keys(active: Iterable[EffectKey]) -> set[EffectKey]:
     return {key.declared for key in active}
 
 
+def constant_effects(rough: Mapping[str, float]) -> dict[str, Effect]:
+    """Return an effect for each constant or parameter that is known roughly; rough: name -> relative half-range.
+
+    The plant has to know them roughly, too (`Plant.known_roughly`).
+    """
+    return {
+        f"{ROUGHLY}{name}": Effect(
+            f"{ROUGHLY}{name}", (Parameter("error", "1", -half, half, null=0.0, note="relative error"),),
+            {f"{name}_error": relative_error}, note=f"{name} is another than declared", source="[tolerances]",
+        )
+        for name, half in rough.items()
+    }  # fmt: skip
+
+
+def relative_error(error: float) -> float:
+    """Relative error of a constant."""
+    return error
+
+
 @dataclass(frozen=True, eq=False)
 class Library:
     """Hold the declared model, the candidates that apply to it, and what is known of the parameters.
 
     candidates: key -> effect under its compiled name; originals: key -> effect as registered. bundles: keys that are
     compiled together. overrides, bounds, fixed: as `space_of` takes them, of the declared model and of candidates
-    alike. say: called with a sentence before something that takes long.
+    alike. tolerances: of the constants, relative. say: called with a sentence before something that takes long.
     """
 
     declared: Model
@@ -98,6 +122,7 @@ class Library:
     fixed: Mapping[str, float]
     threads: int
     say: Callable[[str], None]
+    tolerances: Mapping[str, float] = field(default_factory=dict)
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
 
@@ -106,7 +131,8 @@ class Library:
 
     def owner(self, parameter: str) -> EffectKey | None:
         """Return the candidate to which a parameter of a compiled model belongs, None for the declared model's own."""
-        return self._by_compiled_name.get(parameter.partition(".")[0])
+        owner, dot, _ = parameter.partition(".")
+        return self._by_compiled_name.get(owner) if dot else None
 
     @cached_property
     def _by_compiled_name(self) -> dict[str, EffectKey]:
@@ -132,7 +158,9 @@ class Library:
                      for k in active]  # fmt: skip
             alone = [p.replays for p in known if p is not None and p.replays[0].model is model]
             if len(alone) < max(len(active), 2):
-                self._problems[key] = self.calibrated(model, space, near or {})
+                # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
+                replays = calibrated_replays(self.data.records, model, space, near or {}, on_one=bool(active))
+                self._problems[key] = WhiteRecords(replays, space, self.data)
             else:
                 joined = []
                 for same in zip(*alone, strict=True):
@@ -142,13 +170,17 @@ class Library:
                 self._problems[key] = WhiteRecords(tuple(joined), space, self.data)
         return self._problems[key]
 
-    def calibrated(self, model: Model, space: Space, near: Mapping[str, float]) -> WhiteRecords:
-        return WhiteRecords(calibrated_replays(self.data.records, model, space, near), space, self.data)
+    def about(self, replays: Sequence[Replay]) -> "Library":
+        """Return the library whose records in motion start as those of a fit, itself where no start is fitted."""
+        if not fits_starts(replays):
+            return self
+        return replace(self, data=replace(self.data, records=tuple(r.record for r in replays)), _problems={})
 
     def recalibrated(self, active: Active, values: Mapping[str, float]) -> WhiteRecords | None:
         """Return the problem with finer steps where those at hand are too coarse at some values, else None."""
         records = self.problem(active)
-        again = self.calibrated(records.model, records.space, values)
+        replays = calibrated_replays(self.data.records, records.model, records.space, values)
+        again = replace(records, replays=replays)
         pairs = zip(again.replays, records.replays, strict=True)
         calibrations = ((new, old) for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
         if not any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations):
@@ -208,6 +240,7 @@ def library_of(
     fixed: Mapping[str, float],
     threads: int = 1,
     say: Callable[[str], None] = lambda _: None,
+    tolerances: Mapping[str, float] | None = None,
 ) -> Library:
     """Return the candidates that are not part of a model yet and whose ports its plant offers.
 
@@ -221,7 +254,7 @@ def library_of(
     originals = {
         EffectKey(effect.name, "" if form is effect else form.form): form
         for effect in candidates.values() if effect.name not in present
-        for form in effect.every_form if applies(declared, form)
+        for form in effect.every_form if joined(declared, form) is not None
     }  # fmt: skip
     compiled = {key: replace(effect, name=key.compiled, forms=()) for key, effect in originals.items()}
 
@@ -231,7 +264,7 @@ def library_of(
         return dict(given) | {own: given[public] for own, public in names.items() if public in given}
 
     return Library(declared, compiled, originals, data, bundled(declared, compiled), for_each_form(overrides),
-                   for_each_form(bounds), for_each_form(fixed), threads, say)  # fmt: skip
+                   for_each_form(bounds), for_each_form(fixed), threads, say, tolerances or {})  # fmt: skip
 
 
 def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Active, ...]:
@@ -242,19 +275,21 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
     bundles: list[tuple[Model, list[EffectKey]]] = []
     for key, effect in sorted(effects.items(), key=lambda pair: (len(pair[1].states), pair[1].name)):
         for i, (model, keys) in enumerate(bundles):
-            if len(keys) < BUNDLE and applies(model, effect):
-                bundles[i] = (model + effect, [*keys, key])
+            extended = joined(model, effect) if len(keys) < BUNDLE else None
+            if extended is not None:
+                bundles[i] = (extended, [*keys, key])
                 break
         else:
             bundles.append((declared + effect, [key]))
     return tuple(tuple(keys) for _, keys in bundles)
 
 
-def applies(model: Model, effect: Effect) -> bool:
+def joined(model: Model, effect: Effect) -> Model | None:
+    """Return a model with an effect, None where they cannot be composed."""
     try:
-        return bool(model + effect)
+        return model + effect
     except ArmidError:
-        return False
+        return None
 
 
 def idle(parameter: Parameter) -> float:
@@ -264,15 +299,16 @@ def idle(parameter: Parameter) -> float:
 
 
 # Candidates of one calibration, the factor of a known value within which they lie, and the schedules that are tried.
-N_PROBES, NEAR, SUBSTEPS = 16, 2.0, (1, 2, 4, 8)
+N_PROBES, NEAR, SUBSTEPS = 8, 2.0, (1, 2, 4, 8)
 
 
 def calibrated_replays(
-    records: Sequence[Record], model: Model, space: Space, near: Mapping[str, float]
+    records: Sequence[Record], model: Model, space: Space, near: Mapping[str, float], on_one: bool = False
 ) -> tuple[Replay, ...]:
     """Make records ready to be simulated, on the engine's standard accuracy: the noise of the records hides its error.
 
-    near: values about which it is calibrated; the candidates lie within a factor of 2 of them.
+    near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
+    each sampling interval, which stands for the others.
     """
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
     for i, name in enumerate(space.free_names):
@@ -281,14 +317,15 @@ def calibrated_replays(
             low[i], high[i] = max(low[i], ends[0]), min(high[i], ends[1])
     spread = space.complete(probes(low, np.maximum(high, low), N_PROBES))
     known: dict[object, Calibration] = {}
-    ready = []
-    for record in records:
+    ready: list[Replay] = []
+    # of the records of one file the first holds the others
+    for record in reversed({r.file: r for r in reversed(records)}.values()):
         pieces = tuple(p.until_window_end() for p in record.pieces)
-        likenesses = [p.manoeuvre.likeness() for p in pieces]
+        likenesses = [p.manoeuvre.interval if on_one else p.manoeuvre.likeness() for p in pieces]
         for likeness, piece in zip(likenesses, pieces, strict=True):
             if likeness not in known:
                 known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread)
-        ready.append(Replay(record, model, pieces, tuple(known[likeness] for likeness in likenesses)))
+        ready += Replay(record, model, pieces, tuple(known[likeness] for likeness in likenesses)).each
     return tuple(ready)
 
 
@@ -298,11 +335,11 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array) -> Cal
     `calibrate` would go on to steps that a screening of candidates cannot pay (a ripple so fine that the motion is a
     matter of chance asks for 128 in a sample), and would look for steps over several samples.
     """
-    allowed = ALLOWED[STANDARD] * model.plant.scales.speed
+    allowed = ALLOWED[STANDARD] * model.plant.sizes[0]
     runs = {n: simulate(model, manoeuvre, spread, Schedule(n)) for n in SUBSTEPS[:2]}
     for n in SUBSTEPS:
         runs[2 * n] = runs.get(2 * n) or simulate(model, manoeuvre, spread, Schedule(2 * n))
-        error = difference(runs[n], runs[2 * n]) * 16 / 15
+        error = difference(runs[n], runs[2 * n], model) * 16 / 15
         if error <= MARGIN * allowed and not (runs[n].failed & ~runs[2 * n].failed).any():
             break
     return Calibration(Schedule(n, weights=switch_weights(spread, runs[n])), error, bool(error <= allowed))
@@ -355,17 +392,3 @@ def points_within(low: float, high: float, count: int) -> Array:
     if low > 0.0 and high > WIDE * low:
         return np.asarray(low * (high / low) ** shares)
     return np.asarray(low + (high - low) * shares)
-
-
-def side_by_side(work: Callable[[S], T], items: Iterable[S], threads: int) -> list[T]:
-    """Return the work of each item, in order; the same for any number of threads.
-
-    Fits of several candidates side by side keep two threads busier than the lanes of one fit do: measured on the arm,
-    1.7 of two against 1.3.
-    """
-    tasks = list(items)
-    if threads < 2 or len(tasks) < 2:
-        return [work(item) for item in tasks]
-    # A pool of its own: work that waited for the engine's lanes in the same pool would wait for itself.
-    with ThreadPoolExecutor(threads, thread_name_prefix="armid") as pool:
-        return list(pool.map(work, tasks))

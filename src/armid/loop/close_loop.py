@@ -1,18 +1,45 @@
 """Close the loop: residual, missing effect, extended model, error before and after."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
-from armid.estimation.identify import campaign_errors
-from armid.loop.advice import Advice, Rival, advise
-from armid.loop.candidates import SHOWN_AS, UNNAMED, EffectKey, Library, library_of
-from armid.loop.diagnose import diagnose, holdout_residuals, train_residuals
-from armid.loop.empirical import empirical_term
-from armid.loop.equivalence import EffectGroup, Likeness, RivalModel, group_of, rival_models
-from armid.loop.fit import Fit
+from armid.estimation.advice import Advice, Rival, advise
+from armid.estimation.constants import NAMED, moved_record
+from armid.estimation.identify import JointErrors, campaign_errors
+from armid.estimation.least_squares import with_fitted_starts
+from armid.estimation.screen import screen
+from armid.loop.candidates import (
+    CONSTANT,
+    SHOWN_AS,
+    UNNAMED,
+    EffectKey,
+    Library,
+    calibrated_replays,
+    constant_effects,
+    library_of,
+)
+from armid.loop.constants import (
+    ConstantModel,
+    answer_of_constants,
+    constant_models,
+    constants_beside,
+    group_beside,
+    measurements,
+)
+from armid.loop.diagnose import diagnose, diagnosed, holdout_residuals, is_significant, train_residuals
+from armid.loop.empirical import Term, empirical_term
+from armid.loop.equivalence import WITHIN, EffectGroup, Likeness, RivalModel, group_of, rival_models
+from armid.loop.fit import Fit, criterion, dwarfs_noise, predicted_alike, with_own_starts
+from armid.loop.missing_signal import Missing
 from armid.loop.result import (
+    CARRIES_NOT,
+    DISAGREES,
     EXPLAINED,
+    IMPLAUSIBLE,
     NO_DISCREPANCY,
     PARTLY,
     TOO_ALIKE,
@@ -21,27 +48,47 @@ from armid.loop.result import (
     ClosedLoop,
     Judgement,
     Step,
+    Withdrawn,
     estimates,
     unseen_biases_of,
 )
 from armid.loop.search import Search, SearchLevel
-from armid.loop.select import criterion
+from armid.loop.suspects import (
+    FREED,
+    LEFT_OUT,
+    Suspect,
+    broken_suspects,
+    disagreeing_record,
+    mended_records,
+    suspect_held_out,
+)
 from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Effect, Model
+from armid.model.effects.sensor import sensor_effects
+from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
 MOST_ADVICE, MOST_RIVALS = 5, 4
+# Models of each size whose predictions are compared before a name is claimed.
+MOST_COMPARED = 4
+# Held-out records deny an addition with which their error is so many times that before, and that of the noise.
+DENIED, OVER_NOISE = 1.02, 1.1
+# Mistakes of the screen of records that leave nothing to search for.
+GROSS = ("sign", "unit", "time", "exchanged", "input", "position")
 
 
+# Threads of the linear algebra inside our own threads would only wait for each other.
+@threadpool_limits.wrap(limits=1, user_api="blas")  # type: ignore[untyped-decorator]
 def close_loop(
     model: Model,
     campaign: Campaign,
-    candidates: Mapping[str, Effect] = EFFECTS,
+    candidates: Mapping[str, Effect] | None = None,
     rng: np.random.Generator | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     threads: int = 1,
     told: Callable[[str], None] = lambda _: None,
+    curve: bool = True,
 ) -> ClosedLoop:
     """Find what a declared model lacks on the train records of a campaign, and judge it on those held out.
 
@@ -56,7 +103,7 @@ def close_loop(
     campaign : Campaign
         Records of one machine.
     candidates : mapping of name to Effect
-        Those whose ports the plant does not offer are left out.
+        Those whose ports the plant does not offer are left out; None: the library, and those of the plant's sensors.
     rng : Generator, optional
         Not drawn from: searches start from evenly spread candidates, so that nothing is random.
     bounds, fixed : mapping of parameter to (low, high) or value, SI
@@ -65,6 +112,8 @@ def close_loop(
         Among which candidates are shared; the result does not depend on it.
     told : callable
         Called with a sentence before what takes long.
+    curve : bool
+        Whether an empirical curve is tried where no effect will do.
 
     Returns
     -------
@@ -75,47 +124,225 @@ def close_loop(
     ArmidError
         When every candidate of the declared model diverges, and for an unknown parameter.
     """
-    data = whitened(campaign.train, model.plant)
-    library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told)
-    search = Search(library)
-    levels = search.run()
-    declared, last = levels[0].best, levels[-1].best
-    named, groups, refused = largest_named(levels, search)
-    # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
-    answered = refused is not None and not diagnose(train_residuals(last)).significant
-    missing, term = (None, None) if answered else empirical_term(declared, named, search)
-    rivals = rival_models(named, search.of_size(len(named.active))) if term is None else ()
-    chosen = named
-    if term is not None:
-        chosen, search, library, refused = term.fit, term.search, term.search.library, None
-        names = dict.fromkeys(EffectKey(f"{UNNAMED}{d.port}").public for d in term.others)
-        kept = [g for g, key in zip(groups, named.active, strict=True) if key in chosen.active]
-        groups = [*kept, EffectGroup(chosen.active[-1].public, tuple(Likeness(n, 0.0, 1.0) for n in names), ())]
+    candidates = {**sensor_effects(model.plant), **EFFECTS} if candidates is None else candidates
+    within = {name: t for name, t in campaign.tolerances.items() if name not in campaign.rough}
+    if campaign.rough:
+        model = replace(model, plant=model.plant.known_roughly(campaign.rough))
+        candidates = {**candidates, **constant_effects(campaign.rough)}
+
+    def library_for(records: Sequence[Record]) -> Library:
+        return with_starts_fitted(
+            library_of(model, candidates, whitened(records, model.plant), campaign.parameters, bounds or {},
+                       fixed or {}, threads, told, within))  # fmt: skip
+
+    implausible = implausible_records(model, campaign, bounds or {}, fixed or {})
+    found, suspects, train = settled(library_for, campaign.train, curve, bool(implausible))
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
-    path = [declared, *(search.reduced(chosen, chosen.active[:n]) for n in range(1, len(chosen.active)))]
-    path += [chosen] if chosen.active else []
-    biases = unseen_biases_of(declared, search.scores_at(declared))
-    judged = [judge(fit, library, campaign.holdout, biases) for fit in path]
-    steps = tuple(
-        Step(key.public, ", ".join(library.originals[key.declared].adds), group.names[1:], key.is_empirical, after,
-             group)
-        for key, after, group in zip(chosen.active, judged[1:], groups, strict=True)
-    )  # fmt: skip
-    verdict = verdict_of(judged[0], judged[-1], steps, refused, rivals)
-    noise = float(np.mean([level.rms for level in data.levels]))
+    search, library = found.search, found.library
+    holdout, stranger = suspect_held_out(found.chosen, campaign.holdout, library)
+    suspects += [stranger] if stranger is not None else []
+    there = replace(campaign, records=(*train, *holdout))
+    biases = unseen_biases_of(found.declared, search.scores_at(found.declared))
+    judged = [judge(f, library, there, biases, found.members if f is found.chosen else ()) for f in found.path]
+    steps, before, after = steps_of(found, judged[1:]), judged[0], judged[-1]
+    if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
+        steps = tuple(replace(step, claimed=False) for step in steps)
+    withdrawn = Withdrawn(steps, after) if steps and is_denied(before, after) else None
+    verdicts = verdicts_of(before, after, steps, withdrawn, found.refused, found.rivals)
+    if any(s.role == "train" for s in suspects):
+        verdicts = (DISAGREES, *(v for v in verdicts if v not in (NO_DISCREPANCY, EXPLAINED)))
+    if implausible:
+        verdicts = (IMPLAUSIBLE, UNEXPLAINED)
+    advice = advice_for(found.contest, found.largest, campaign.gyro_range, threads, told)
+    first, data = model.plant.outputs[0].name, library.data
+    noise = float(np.mean([n.rms for n, r in zip(data.levels, data.records, strict=True) if r.output in ("", first)]))
+    every = {
+        name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
+        [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
+    }  # fmt: skip
+    suspects += broken_suspects(campaign.records)
+    steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
+    said = (*implausible, *next_steps_of(found, suspects))
+    return ClosedLoop(there, noise, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
+                      () if withdrawn else found.rivals, advice, said, tuple(suspects), every, library, search,
+                      found.missing, term)  # fmt: skip
+
+
+def implausible_records(
+    model: Model, campaign: Campaign, bounds: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
+) -> list[str]:
+    """Return the mistakes in the train records (sign, unit, clock, exchanged files) that explain a gross misfit."""
+    train, own = replace(campaign, records=campaign.train), model.parameters
+    space = space_of(model, campaign.parameters, {n: b for n, b in bounds.items() if n in own},
+                     {n: v for n, v in fixed.items() if n in own})  # fmt: skip
+    found = screen(train, model, space)
+    return [s.sentence for s in found if s.kind in GROSS]
+
+
+def settled(
+    library_for: Callable[[Sequence[Record]], Library], train: tuple[Record, ...], curve: bool, implausible: bool
+) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
+    """Suspect the records, then decide; return what was decided, who is suspected, and the train records as taken.
+
+    A fault of one record that leaves noise is undone, unless one effect or constants do clearly better on all records;
+    where several faults of it do as well, the record is left out.
+    Where nothing does and all but one record agree, that one is left out. Nothing is looked for in implausible records.
+    """
+    library = library_for(train)
+    search = Search(library)
+    declared = search.start()
+    if implausible:
+        return Decision(search, library, declared, declared, declared, ()), [], train
+    mended = mended_records(declared, library) if is_significant(declared) else []
+    if mended:
+        best, plant = mended[0], declared.model.plant
+        constants = constant_models(declared, declared.products(library.tolerances), library)
+        single = search.run(1)[-1].best
+        is_noise = bool(single.active) and not is_significant(single)
+        others = [*(m.chi2 for m in constants), *([single.chi2] if is_noise else [])]
+        if best.chi2 < min(others, default=np.inf) + WITHIN:
+            measured = library.data.records
+            faulty = measured[best.index]
+            alike = [m for m in mended if m.chi2 < best.chi2 + WITHIN and measured[m.index].file == faulty.file]
+            rest = tuple(r for r in train if r.file != faulty.file)
+            # Which of two faults it is makes parameters differ by more than their intervals.
+            if len(alike) > 1 and len(rest) > 1:
+                suspects = [m.suspect(measured[m.index], plant, LEFT_OUT) for m in alike]
+                return decide(Search(library_for(rest)), curve), suspects, rest
+            train = tuple(best.fault.trimmed(r, best.value, plant, faulty) if r.file == faulty.file else r
+                          for r in train)  # fmt: skip
+            return decide(Search(library_for(train)), curve), [best.suspect(faulty, plant, FREED)], train
+    found = decide(search, curve)
+    if found.constants is None and is_significant(found.largest):
+        apart = disagreeing_record([declared, found.largest])
+        if apart is not None:
+            train = tuple(r for r in train if r.file != apart.record)
+            return decide(Search(library_for(train)), curve), [apart], train
+    return found, [], train
+
+
+def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) -> JointErrors | None:
+    """Return the errors of a model on records as they were read."""
+    fit = judged.fit
+    moved = [moved_record(r, library.declared.plant, fit.constants) for r in records]
+    return campaign_errors(calibrated_replays(moved, fit.model, fit.records.space, fit.values), fit.candidate)
+
+
+def next_steps_of(found: "Decision", suspects: Sequence[Suspect]) -> tuple[str, ...]:
+    """Return what to do next, in words: records to repeat, then constants to measure."""
+    files = dict.fromkeys(s.record for s in suspects)
+    return (*(f"Record {file} once more, or look at how it was made." for file in files), *measurements(found.equal))
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """Hold what the train records decide.
+
+    chosen: the declared model with what it lacks. largest: the last model that earned its effects, named or not.
+    groups: of the effects of the chosen one. claimed: names of these. members: other models that cannot be told from
+    it. contest: models between which a record more would decide. constants: those that explain the records in the place
+    of effects; equal: those that do beside them.
+    """
+
+    search: Search
+    library: Library
+    declared: Fit
+    chosen: Fit
+    largest: Fit
+    groups: Sequence[EffectGroup]
+    claimed: frozenset[str] = frozenset()
+    refused: EffectGroup | None = None
+    rivals: tuple[RivalModel, ...] = ()
+    members: Sequence[Fit] = ()
+    contest: Sequence[Rival] = ()
+    missing: Missing | None = None
+    term: Term | None = None
+    constants: ConstantModel | None = None
+    equal: Sequence[ConstantModel] = ()
+
+    @property
+    def path(self) -> list[Fit]:
+        """The declared model, then with one effect more at a time."""
+        active = self.chosen.active
+        steps = [self.search.reduced(self.chosen, active[:n]) for n in range(1, len(active))]
+        return [self.declared, *steps, *([self.chosen] if active or self.constants is not None else [])]
+
+
+def decide(search: Search, curve: bool) -> Decision:
+    """Suspect the constants, then look for effects, then for a curve; all on the train records."""
+    library, declared = search.library, search.start()
+    within = declared.products(library.tolerances)
+    lacks = is_significant(declared)
+    beside = constant_models(declared, within, library) if lacks else []
+    # Sets of effects can imitate constants that are off, a single one hardly.
+    levels = search.run(1) if beside else search.run()
+    if len(levels) > 1 and not lacks:
+        beside = constant_models(declared, within, library)
+    last, library = levels[-1].best, search.library
+    constants = answer_of_constants(beside, last)
+    if constants is not None:
+        wider = {name: constants.scale * tolerance for name, tolerance in library.tolerances.items()}
+        return Decision(search, replace(library, tolerances=wider), declared, constants.fit, last,
+                        [group_beside(constants, search)], constants=constants, equal=[constants])  # fmt: skip
+    named, groups, refused = largest_named(predicting_best(levels), search)
+    # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
+    answered = refused is not None and not is_significant(last)
+    missing, term = (None, None) if answered or not curve else empirical_term(named, search)
+    if term is not None:
+        names = dict.fromkeys(EffectKey(f"{UNNAMED}{d.port}").public for d in term.others)
+        curves = EffectGroup(term.fit.active[-1].public, tuple(Likeness(n, 0.0, 1.0) for n in names), ())
+        contest = contest_of(groups, None, search, last)
+        return Decision(term.search, term.search.library, declared, term.fit, last, [*groups, curves], missing=missing,
+                        term=term, contest=contest)  # fmt: skip
+    rivals = rival_models(named, search.of_size(len(named.active)))
+    members = [f for g in groups for n in g.all_names[1:] if (f := search.model_with(n, named)) is not None]
     contest = contest_of(groups, refused, search, last) or contest_of_models(named, rivals)
-    advice = advice_for(contest, last, campaign.gyro_range, threads, told)
-    return ClosedLoop(campaign, noise, verdict, judged[0], judged[-1], steps, refused, rivals, advice, library, search,
-                      missing, term)  # fmt: skip
+    return Decision(search, library, declared, named, last, groups, claimed_names(named, search), refused, rivals,
+                    [*members, *(r.fit for r in rivals)], contest, missing, None, None,
+                    beside if len(named.active) == 1 else ())  # fmt: skip
+
+
+def steps_of(found: Decision, judged: Sequence[Judgement]) -> tuple[Step, ...]:
+    """Return one step for each effect of the chosen model, or one for the constants that take their place."""
+    if found.constants is not None:
+        name, group = found.constants.name, found.groups[0]
+        return (Step(name, "", group.names[1:], False, True, found.constants.moved, judged[0], group),)
+    originals, others = found.library.originals, constants_beside(found.equal)
+    steps = []
+    for key, after, group in zip(found.chosen.active, judged, found.groups, strict=True):
+        constants = tuple(n for n in group.names if n.startswith(CONSTANT))
+        effects = tuple(n for n in group.names[1:] if n not in constants)
+        steps.append(Step(key.public, ", ".join(originals[key.declared].adds), effects, key.is_empirical,
+                          key.public in found.claimed, (*constants, *others), after, group))  # fmt: skip
+    return tuple(steps)
+
+
+def predicting_best(levels: Sequence[SearchLevel]) -> list[SearchLevel]:
+    """Return the levels that count: where misfit dwarfs the noise, up to the smallest that predicts as the best does.
+
+    There significance is had for nothing, and what wins on train may lose on what was left out.
+    """
+    earned = [level for level in levels if level.earned]
+    if len(earned) < 2 or not dwarfs_noise(earned[-1].best):
+        return earned
+    alike = predicted_alike([level.best for level in earned])
+    smallest = next(i for i, level in enumerate(earned) if any(level.best is f for f in alike))
+    return earned[: smallest + 1]
+
+
+def with_starts_fitted(library: Library) -> Library:
+    """Return the library whose records in motion start where the declared model fits best, others as they are."""
+    records = library.problem(())
+    return library.about(with_fitted_starts(records.replays, records.space))
 
 
 def largest_named(levels: Sequence[SearchLevel], search: Search) -> tuple[Fit, list[EffectGroup], EffectGroup | None]:
     """Return the largest model none of whose effects could be one of too many, its groups, and what was refused."""
     refused = None
     for level in reversed(levels):
-        chosen = search.ordered(level.best)
-        groups = [group_of(chosen, key, level.fits[1:]) for key in chosen.active]
+        chosen = search.ordered(search.pruned(inside_its_ranges(level)))
+        groups = [group_of(chosen, key, search.of_size(len(chosen.active))) for key in chosen.active]
         big = [g for g in groups if g.too_big]
         if not big:
             return chosen, groups, refused
@@ -123,31 +350,77 @@ def largest_named(levels: Sequence[SearchLevel], search: Search) -> tuple[Fit, l
     return levels[0].best, [], refused
 
 
-def judge(fit: Fit, library: Library, holdout: tuple[Record, ...], biases: Biases) -> Judgement:
-    """Return errors, parameters and tests of a fit on train and holdout; biases: see `unseen_biases_of`."""
-    seen, unseen = train_residuals(fit), holdout_residuals(fit, holdout, library)
-    diagnosis, unseen_diagnosis = diagnose(seen), None if unseen is None else diagnose(unseen)
-    train_error = campaign_errors(seen.replays, fit.candidate)
+def inside_its_ranges(level: SearchLevel) -> Fit:
+    """Return the best model, or where a bound holds one of its effects the best without such unless it is far behind.
+
+    A strength or a shape that ends at its bound says that the effect is not what it was declared to be.
+    """
+    best = level.best
+    near = (f for f in level.fits if criterion(f, best.independent) - criterion(best, best.independent) < WITHIN)
+    return next((f for f in near if not f.is_at_a_bound), best)
+
+
+def claimed_names(named: Fit, search: Search) -> frozenset[str]:
+    """Return the effects of a model that are claimed, by the train records alone.
+
+    Those of a model that leaves noise; where the misfit dwarfs the noise, those that every model holds which predicts
+    the parts left out as well as the best does.
+    """
+    names = frozenset(key.public for key in named.active)
+    if not names or not is_significant(named):
+        return names
+    if not dwarfs_noise(named):
+        return frozenset()
+    sizes = range(len(named.active) + 1)
+    models = [named, *(f for n in sizes for f in search.of_size(n)[:MOST_COMPARED] if f is not named)]
+    return names.intersection(*({k.public for k in f.active} for f in predicted_alike(models)))
+
+
+def is_denied(before: Judgement, after: Judgement) -> bool:
+    """Tell whether held-out records are simulated clearly worse with what was added than without it."""
+    old, new = before.holdout_error, after.holdout_error
+    if old is None or new is None or after.holdout is None:
+        return False
+    return new.rmse > DENIED * old.rmse and new.rmse > OVER_NOISE * after.holdout.noise_rms
+
+
+def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, members: Sequence[Fit]) -> Judgement:
+    """Return errors, parameters and tests of a fit on train and holdout.
+
+    biases: see `unseen_biases_of`. members: models that cannot be told from it, over which intervals reach.
+    """
+    fit = with_own_starts(fit)
+    seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
+    diagnosis, unseen_diagnosis = diagnosed(fit), None if unseen is None else diagnose(unseen)
+    train_error = campaign_errors(seen.judged, fit.candidate)
     assert train_error is not None
     remains = diagnosis.significant or (unseen_diagnosis is not None and unseen_diagnosis.significant)
     return Judgement(
-        fit, library.public_model(fit.active), estimates(fit, library, remains, biases), seen, unseen, train_error,
-        None if unseen is None else campaign_errors(unseen.replays, fit.candidate), diagnosis, unseen_diagnosis,
+        fit, library.public_model(fit.active),
+        estimates(fit, library, remains, biases, members), seen, unseen, train_error,
+        None if unseen is None else campaign_errors(unseen.judged, fit.candidate), diagnosis, unseen_diagnosis,
     )  # fmt: skip
 
 
-def verdict_of(
-    before: Judgement, after: Judgement, steps: Sequence[Step], refused: EffectGroup | None,
-    rivals: Sequence[RivalModel],
-) -> str:  # fmt: skip
-    """Return the verdict in one word; a term without a name never explains, and a name in doubt is told first."""
-    if refused is not None or rivals:
-        return TOO_ALIKE
-    if not steps:
-        return UNEXPLAINED if before.diagnosis.significant else NO_DISCREPANCY
-    if after.significant or any(s.empirical for s in steps):
-        return PARTLY
-    return TOO_ALIKE if any(s.alternatives or s.group.unlike for s in steps) else EXPLAINED
+def verdicts_of(
+    before: Judgement, after: Judgement, steps: Sequence[Step], withdrawn: Withdrawn | None,
+    refused: EffectGroup | None, rivals: Sequence[RivalModel],
+) -> tuple[str, ...]:  # fmt: skip
+    """Return the verdicts that hold, each in one word, the one to be told first before the others.
+
+    A term without a name never explains; of what does not carry over nothing is explained.
+    """
+    denied = withdrawn is not None or after.fails_to_carry_over
+    found = [CARRIES_NOT] if denied else []
+    is_constant = any(s.effect.startswith(NAMED) for s in steps)
+    in_doubt = any(s.alternatives or s.group.unlike or (s.constants and not is_constant) for s in steps)
+    if refused is not None or rivals or in_doubt:
+        found.append(TOO_ALIKE)
+    if not steps or withdrawn is not None:
+        found += [UNEXPLAINED] if before.diagnosis.significant and refused is None else []
+    elif after.significant or any(s.empirical for s in steps):
+        found.append(PARTLY)
+    return tuple(found) or (EXPLAINED if steps else NO_DISCREPANCY,)
 
 
 def contest_of(groups: Sequence[EffectGroup], refused: EffectGroup | None, search: Search, best: Fit) -> list[Rival]:
@@ -168,7 +441,9 @@ def contest_of_models(named: Fit, rivals: Sequence[RivalModel]) -> list[Rival]:
 
 
 def rival(name: str, fit: Fit, best: Fit) -> Rival:
-    return Rival(name, fit.records, fit.z, criterion(fit, best.independent))
+    # What a sample counts, and one of a record like these will: less than 1 where more than noise is left.
+    trust = float(np.mean(best.records.data.trust(best.residual)))
+    return Rival(name, fit.records, fit.z, criterion(fit, best.independent), trust)
 
 
 def advice_for(
@@ -178,7 +453,15 @@ def advice_for(
     if len(rivals) < 2:
         return ()
     say(f"looking for a manoeuvre that tells {' and '.join(r.name for r in rivals)} apart")
-    level = best.records.data.levels[0]
-    found = advise(rivals, lambda signals: level.white(signals, [signals.shape[-1]]), None, speed_limit,
-                   threads=threads)  # fmt: skip
+    replays, levels = best.records.replays, best.records.data.levels
+    # of each output the first level, in the order in which `Motions.signals` gives them
+    known = dict(sorted(((r.place, level) for r, level in reversed([*zip(replays, levels, strict=True)])),
+                        key=lambda pair: pair[0]))  # fmt: skip
+
+    def white(signals: NDArray[np.float64]) -> NDArray[np.float64]:
+        pairs = zip(known.values(), signals, strict=True)
+        weight = float(np.sqrt(rivals[0].trust))
+        return weight * np.concatenate([level.white(y, [y.shape[-1]]) for level, y in pairs], axis=-1)
+
+    found = advise(rivals, white, None, speed_limit, threads=threads)
     return found[:MOST_ADVICE]

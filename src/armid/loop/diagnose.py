@@ -1,8 +1,8 @@
 """Is there a discrepancy, and where: tests of a whitened residual against noise."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -11,8 +11,10 @@ from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import f as f_distribution
 
 from armid.engine import along, simulate
+from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
+from armid.estimation.information import start_changes
 from armid.loop.candidates import Library, calibrated_replays
-from armid.loop.fit import Fit, beyond
+from armid.loop.fit import Fit, beyond, decomposed
 from armid.loop.whitening import WhitenedData, WhiteRecords, whitened
 from armid.model import Model
 from armid.problem.problem import Replay
@@ -21,12 +23,19 @@ from armid.record import Record
 Array = NDArray[np.float64]
 # Chance of a false alarm, all tests together.
 SIGNIFICANCE = 0.01
+# Below this no number of tests makes up for it.
+CERTAIN = 1e-7
 LAGS, N_BINS = 40, 12
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
 # Neighbouring ordinates of a tapered periodogram tell partly the same; a band needs so many of the rest.
 INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
+# Mains and their harmonics are looked for; a line of a rest has so many times the power beside it, which is so many
+# widths 1/T of the rest away.
+MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
 # Products of columns whose share of the largest is below this are rounding.
 DEPENDENT = 1e-11
+# Shares of the largest speed and of its largest change, up to which it is a rest and an even speed.
+STILL, EVEN = 0.02, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +43,8 @@ class Residuals:
     """Hold records as one candidate sees them.
 
     candidate: whole, SI. residual: whitened, measured minus simulated, (n_samples,). basis: what the fit has absorbed,
-    (n_samples, n_absorbed), with no columns on records that it has not seen.
+    (n_samples, n_absorbed), with no columns on records that it has not seen. doubted: whether the residual, and not the
+    raw one, tells of size: it is divided by the doubt of a prediction that tolerances of constants make large.
     """
 
     data: WhitenedData
@@ -42,6 +52,7 @@ class Residuals:
     candidate: Array
     residual: Array
     basis: Array
+    doubted: bool = False
 
     @property
     def model(self) -> Model:
@@ -52,9 +63,39 @@ class Residuals:
         """What tests of structure divide by: 1 for known noise, else the mean square of the residual itself."""
         return 1.0 if self.data.known else float(np.mean(self.residual**2))
 
+    @property
+    def noise_rms(self) -> float:
+        """Noise of all samples of the first output together, [its unit]."""
+        place = min(r.place for r in self.replays)
+        of = [(level.rms, len(r.measured)) for level, r in zip(self.data.levels, self.replays, strict=True)
+              if r.place == place]  # fmt: skip
+        return float(np.sqrt(sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)))
+
     @cached_property
     def raw(self) -> list[Array]:
-        return [r.measured - r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
+        raw = [r.measured - r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
+        return raw if self.data.sound is None else [x * m for x, m in zip(raw, self.sound, strict=True)]
+
+    @property
+    def sound(self) -> list[Array]:
+        """1 for each sample that is data, else 0, by record."""
+        sound = self.data.sound
+        return self.data.by_record(np.ones(self.data.edges[-1]) if sound is None else sound)
+
+    @property
+    def judged(self) -> tuple[Replay, ...]:
+        """The replays whose errors count: where a sample is no data, the simulated one stands for it."""
+        return self.replays if self.data.sound is None else tuple(map(self.mended, self.replays, self.sound))
+
+    def mended(self, replay: Replay, sound: Array) -> Replay:
+        simulated, first, pieces = replay.signal(self.candidate[np.newaxis])[0], 0, []
+        for piece in replay.pieces:
+            here = slice(first, first + piece.n_samples)
+            measured = piece.measured.copy()
+            measured[piece.window] = np.where(sound[here] > 0.0, measured[piece.window], simulated[here])
+            pieces.append(replace(piece, measured=measured))
+            first += piece.n_samples
+        return replace(replay, pieces=tuple(pieces))
 
     @cached_property
     def variables(self) -> dict[str, Array]:
@@ -82,6 +123,37 @@ class Residuals:
             found |= {f"before '{name}'": ~after, f"after '{name}'": after}
         return {n: samples for n, samples in found.items() if samples.any()}
 
+    @cached_property
+    def phases(self) -> dict[str, NDArray[np.bool_]]:
+        """Samples by what the simulated motion does, in words -> (n_samples,); empty where no state is a speed."""
+        speed = self.variables.get(self.model.plant.aliases.get("omega", "omega"))
+        return {} if speed is None else motion_phases([np.abs(v) for v in self.data.by_record(speed)])
+
+
+def motion_phases(speeds: Sequence[Array]) -> dict[str, NDArray[np.bool_]]:
+    """Return the samples of records at rest, speeding up, slowing down and at an even speed, in words -> (n_samples,).
+
+    speeds: of each record, without sign, (n_samples,).
+    """
+    speed, change = np.concatenate(speeds), np.concatenate([np.gradient(v) for v in speeds])
+    still = speed <= STILL * speed.max()
+    even = ~still & (np.abs(change) <= EVEN * np.abs(change).max())
+    return {"at rest": still, "at an even speed": even, "while it speeds up": ~still & ~even & (change > 0.0),
+            "while it slows down": ~still & ~even & (change < 0.0)}  # fmt: skip
+
+
+def time_in_words(seen: Residuals) -> str:
+    """Say when, in words of the motion, most of a residual is more than noise; "" where no state is a speed."""
+    excess = np.maximum(seen.residual**2 - float(seen.data.known), 0.0)
+    stages = seen.stages or {"": np.ones(len(excess), dtype=np.bool_)}
+    each = {", ".join(filter(None, (phase, stage))): a & b
+            for phase, a in seen.phases.items() for stage, b in stages.items()}  # fmt: skip
+    if not each:
+        return ""
+    words = max(each, key=lambda name: float(excess[each[name]].sum()))
+    share, time = float(excess[each[words]].sum() / excess.sum()), float(np.mean(each[words]))
+    return f"When it is: {share:.0%} of it {words}, in {time:.0%} of the samples."
+
 
 def variable_names(model: Model) -> list[str]:
     """Return the variables on which a residual may depend.
@@ -95,26 +167,53 @@ def variable_names(model: Model) -> list[str]:
     return [*first, *(n for n in states if n not in first), *(i.name for i in plant.inputs), *drive]
 
 
+@lru_cache(maxsize=4)  # asked for by one test after the other; what they share is found once
 def train_residuals(fit: Fit) -> Residuals:
-    return Residuals(fit.records.data, fit.records.replays, fit.candidate, fit.residual, fit.basis)
+    """Return what a fit leaves on its records, beyond the reach of their measured starts: these are known roughly."""
+    residual, basis = fit.residual, fit.basis
+    if fit.start_slopes.shape[1]:
+        basis = decomposed(np.hstack([fit.jacobian, fit.start_slopes]))[0]
+        residual = beyond(basis, residual)
+    return Residuals(fit.records.data, fit.records.replays, fit.candidate, residual, basis)
+
+
+@lru_cache(maxsize=16)  # many ask about the same few models
+def diagnosed(fit: Fit) -> "Diagnosis":
+    return diagnose(train_residuals(fit))
+
+
+def is_significant(fit: Fit) -> bool:
+    """Tell whether what a model leaves on train is more than noise; where its size alone says so, that is enough."""
+    whole = next(size_tests(train_residuals(fit)), None)
+    return (whole is not None and whole.p < CERTAIN) or diagnosed(fit).significant
 
 
 def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -> Residuals | None:
     """Return what a fit leaves on records that it has not seen, None where there are none.
 
     Divided by noise and doubt of the prediction together: the prediction scatters by U U^T with U = slopes x root of
-    the covariance of the estimate, so that r -> (1 + U U^T)^-1/2 r.
+    the covariance of the estimate, so that r -> (1 + U U^T)^-1/2 r. Constants within tolerances are unknowns as the
+    parameters are, with their tolerance as prior. The doubt of a measured start counts, too.
     """
     if not records:
         return None
-    data = whitened(records, library.declared.plant, library.data.records)
+    plant, tolerances = library.declared.plant, library.tolerances
+    records = tuple(moved_record(r, plant, fit.constants) for r in records)
+    data = whitened(records, plant, library.data.records)
     ready = calibrated_replays(records, fit.model, fit.records.space, fit.values)
-    residual, slopes = WhiteRecords(ready, fit.records.space, data).residual_and_slopes(fit.z)
-    _, values, right = np.linalg.svd(fit.jacobian, full_matrices=False)
+    posed = WhiteRecords(ready, fit.records.space, data)
+    residual, slopes = posed.residual_and_slopes(fit.z)
+    within = fit.products(tolerances)
+    known = columns_of(within, len(fit.residual))
+    unseen = slopes_of_constants(posed, fit.z, [p.names[0] for p in within]).T * [p.tolerance for p in within]
+    prior = np.hstack([np.zeros((len(within), fit.n_free)), np.eye(len(within))])
+    _, values, right = np.linalg.svd(np.vstack([np.hstack([fit.jacobian, known]), prior]), full_matrices=False)
     good = values > 1e-7 * values.max(initial=0.0)
-    base, sizes, _ = np.linalg.svd(slopes @ (right[good].T / values[good]), full_matrices=False)
+    spread = np.hstack([slopes, unseen.reshape(len(residual), len(within))]) @ (right[good].T / values[good])
+    spread = np.column_stack([spread, *start_changes(posed, fit.z)])
+    base, sizes, _ = np.linalg.svd(spread, full_matrices=False)
     left = residual - base @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (base.T @ residual))
-    return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)))
+    return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)), bool(within))
 
 
 @dataclass(frozen=True)
@@ -155,6 +254,13 @@ def diagnose(seen: Residuals) -> Diagnosis:
     return Diagnosis(tuple(f for test in tests for f in test(seen)), seen.data.known)
 
 
+def chance(ratio: float, free: float, known: float) -> float:
+    """Return the chance that noise shows a ratio of mean squares; known: samples that tell it, inf of a known one."""
+    return float(
+        f_distribution.sf(ratio, free, known) if np.isfinite(known) else chi2_distribution.sf(ratio * free, free)
+    )
+
+
 def size_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare mean squares with the noise: of all samples, of each record, before and after each switch.
 
@@ -165,23 +271,26 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
         return
     n, edges, levels = len(seen.residual), seen.data.edges, seen.data.levels
     rows, lengths = np.arange(n), np.diff(edges)
-    records = {r.file: (rows >= a) & (rows < b) for r, (a, b) in zip(seen.data.records, pairwise(edges), strict=True)}
+    records = {r.name: (rows >= a) & (rows < b) for r, (a, b) in zip(seen.replays, pairwise(edges), strict=True)}
     square = np.repeat([level.rms**-2.0 for level in levels], lengths) * np.concatenate(seen.raw) ** 2
+    square = seen.residual**2 if seen.doubted else square
+    sound = np.concatenate(seen.sound)
     counted = np.repeat([level.n_power / level.n_samples for level in levels], lengths)
     known, share = min(level.n_power for level in levels), 1.0 - seen.basis.shape[1] / n
     whole = {"all records": np.ones(n, dtype=np.bool_)}
-    for kind, parts in (("size", whole), ("record", records if len(records) > 1 else {}), ("stage", seen.stages)):
-        for where, samples in parts.items():
-            ratio = float(np.mean(square[samples])) / share
+    for kind in ("size", "record", "stage"):
+        parts = {"size": whole, "record": records if len(records) > 1 else {}}.get(kind)
+        for where, samples in (seen.stages if parts is None else parts).items():
+            ratio = float(np.sum(square[samples])) / max(float(sound[samples].sum()), 1.0) / share
             yield Finding(kind, where, ratio, float(f_distribution.sf(ratio, counted[samples].sum() * share, known)))
 
 
 def repeat_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare the mean of repeats with their scatter (pure-error lack of fit), which needs no other noise."""
-    groups: dict[str, list[Array]] = {}
+    groups: dict[tuple[str, str], list[Array]] = {}
     for record, part in zip(seen.data.records, seen.data.by_record(seen.residual), strict=True):
-        groups.setdefault(record.repeat_of or record.file, []).append(part)
-    for name, parts in groups.items():
+        groups.setdefault((record.repeat_of or record.file, record.output), []).append(part)
+    for (name, _), parts in groups.items():
         if len(parts) < 2 or len({len(p) for p in parts}) > 1:
             continue
         table = np.array(parts)
@@ -193,18 +302,22 @@ def repeat_tests(seen: Residuals) -> Iterator[Finding]:
 
 
 def time_tests(seen: Residuals) -> Iterator[Finding]:
-    """Test the autocorrelation of the residual (Ljung and Box, all records together).
+    """Test the autocorrelation of the residual, all records together (Ljung, Box 1978, doi:10.1093/biomet/65.2.297).
 
     Only where the noise is white: what an imperfect filter leaves of coloured noise would be taken for a discrepancy;
-    there the spectra of residual and rest are compared (`band_tests`).
+    there the spectra of residual and rest are compared (`band_tests`). Hum that the rests show is taken out before.
     """
-    from statsmodels.stats.diagnostic import acorr_ljungbox
-
     if not all(level.is_white for level in seen.data.levels):
         return
-    parts = seen.data.by_record(seen.residual)
+    parts, hum = seen.data.by_record(seen.residual), [sum(ends) / 2.0 for ends in mains_hum(seen)]
+    if hum:
+        parts = [without_lines(p, hum, r.manoeuvre.interval) for p, r in zip(parts, seen.data.records, strict=True)]
     lags = min(LAGS, *(len(p) // 4 for p in parts))
-    total = sum(float(acorr_ljungbox(p, lags=[lags])["lb_stat"].iloc[0]) for p in parts)
+    total = 0.0
+    for deviations in (p - np.mean(p) for p in parts):
+        n = len(deviations)
+        covariance = np.array([deviations[lag:] @ deviations[: n - lag] for lag in range(lags + 1)])
+        total += n * (n + 2.0) * float(np.sum((covariance[1:] / covariance[0]) ** 2 / (n - np.arange(1.0, lags + 1.0))))
     ratio = total / (lags * len(parts))
     yield Finding("autocorrelation", f"{lags} lags", ratio, float(chi2_distribution.sf(total, lags * len(parts))))
 
@@ -213,21 +326,32 @@ def dependence_tests(seen: Residuals) -> Iterator[Finding]:
     """Regress the residual on bins of each variable of the motion, and on twelve parts of each record's time.
 
     The bins hold about equally many samples; they are filtered as the residual is, and projected off what the fit has
-    absorbed.
+    absorbed. Each output is tested by itself.
     """
+    places = np.repeat([r.place for r in seen.replays], np.diff(seen.data.edges))
+    outputs = {seen.model.plant.outputs[i].name: places == i for i in sorted(set(places.tolist()))}
     for name, values in seen.variables.items():
         if np.ptp(values) > 0.0:
             edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, N_BINS + 1)))
             place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
-            yield structure(seen, "dependence", name, place)
+            for output, samples in outputs.items():
+                yield structure(seen, "dependence", f"{name} in {output}" if len(outputs) > 1 else name, place, samples)
     parts = [np.arange(n) * N_BINS // max(n, 1) for n in np.diff(seen.data.edges)]
-    places = np.concatenate([p + i * N_BINS for i, p in enumerate(parts)])
-    yield structure(seen, "dependence", "time in the record", places)
+    bins = np.concatenate([p + i * N_BINS for i, p in enumerate(parts)])
+    for output, samples in outputs.items():
+        where = f"time in the record of {output}" if len(outputs) > 1 else "time in the record"
+        yield structure(seen, "dependence", where, bins, samples)
 
 
-def structure(seen: Residuals, kind: str, where: str, place: NDArray[np.int64]) -> Finding:
-    """Test a residual for a part that is constant in each bin; place: the bin of each sample, (n_samples,)."""
-    indicators = np.asarray(place[:, np.newaxis] == np.unique(place), dtype=np.float64)
+def structure(
+    seen: Residuals, kind: str, where: str, place: NDArray[np.int64], samples: NDArray[np.bool_]
+) -> Finding:  # fmt: skip
+    """Test a residual for a part that is constant in each bin; place: the bin of each sample, (n_samples,).
+
+    samples: which of them are looked at, (n_samples,).
+    """
+    indicators = np.asarray(place[:, np.newaxis] == np.unique(place[samples]), dtype=np.float64)
+    indicators *= samples[:, np.newaxis]
     white = seen.data.white(seen.data.by_record(indicators.T)).T
     along, rank = square_along(beyond(seen.basis, white), seen.residual)
     square = along / seen.variance
@@ -235,7 +359,7 @@ def structure(seen: Residuals, kind: str, where: str, place: NDArray[np.int64]) 
         # Neighbours tell the same: of the residual's own scatter only the independent samples count.
         square *= seen.data.independent(seen.residual) / len(seen.residual)
     known = seen.data.n_noise(otherwise=np.inf)
-    return Finding(kind, where, square / rank, float(f_distribution.sf(square / rank, rank, known)))
+    return Finding(kind, where, square / rank, chance(square / rank, rank, known))
 
 
 def square_along(columns: Array, values: Array) -> tuple[float, int]:
@@ -254,9 +378,13 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare the power of the residual in bands of frequency with that of the rest, or with a flat one.
 
     White noise has a flat spectrum, whose level the rest tells; of coloured noise the rest itself shows the spectrum.
+    Where the rest hums, frequencies near by are left out: a line does not scatter as noise does.
     """
-    left, coloured = spectra(seen.raw, seen), not all(level.is_white for level in seen.data.levels)
-    rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.records], seen) if coloured else {}
+    coloured = not seen.doubted and not all(level.is_white for level in seen.data.levels)
+    hum = mains_hum(seen)
+    white = [level.rms * r for level, r in zip(seen.data.levels, seen.data.by_record(seen.residual), strict=True)]
+    left = spectra(seen.raw if coloured else white, seen, hum)
+    rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.records], seen, hum) if coloured else {}
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
         if coloured and len(other) < FEWEST_ORDINATES:
@@ -266,16 +394,48 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
         known = 2.0 * INDEPENDENT * len(other) if coloured else seen.data.n_noise(otherwise=np.inf)
         high = BANDS_HZ[band + 1]
         where = f"{BANDS_HZ[band]:g} to {high:g} Hz" if np.isfinite(high) else f"above {BANDS_HZ[band]:g} Hz"
-        yield Finding("frequency", where, ratio, float(f_distribution.sf(ratio, free, known)))
+        yield Finding("frequency", where, ratio, chance(ratio, free, known))
 
 
-def spectra(signals: Sequence[Array], seen: Residuals) -> dict[int, list[float]]:
-    """Return the ordinates of tapered periodograms of signals (one a record), band -> mean squares over the noise's."""
+def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
+    """Return the stretches of frequency, (low, high) [Hz], in which the rests show the mains or a harmonic of it."""
+    rests = [(r.rest - np.mean(r.rest), r.manoeuvre.interval) for r in seen.data.records if r.noise.source == "rest"]
+    if not rests:
+        return []
+    width = BESIDE / min(len(x) * step for x, step in rests)
+
+    def power(frequency: float) -> float:
+        waves = [
+            np.hanning(len(x)) * x * np.exp(-2j * np.pi * frequency * step * np.arange(len(x))) for x, step in rests
+        ]
+        return float(sum(abs(w.sum()) ** 2 for w in waves))
+
+    highest = min(0.5 / step for _, step in rests) - width
+    lines = (f * k for f in MAINS_HZ for k in range(1, HARMONICS + 1) if width < f * k < highest)
+    return [(f - width, f + width) for f in lines if 2.0 * power(f) > LINE * (power(f - width) + power(f + width))]
+
+
+def without_lines(signal: Array, frequencies: Sequence[float], interval: float) -> Array:
+    """Return a signal without the sines of some frequencies [Hz] that fit it best."""
+    angles = 2.0 * np.pi * interval * np.outer(np.arange(len(signal)), frequencies)
+    waves = np.hstack([np.cos(angles), np.sin(angles)])
+    return np.asarray(signal - waves @ np.linalg.lstsq(waves, signal, rcond=None)[0])
+
+
+def spectra(
+    signals: Sequence[Array], seen: Residuals, without: Sequence[tuple[float, float]]
+) -> dict[int, list[float]]:  # fmt: skip
+    """Return the ordinates of tapered periodograms of signals (one a record), band -> mean squares over the noise's.
+
+    without: stretches of frequency, (low, high) [Hz], that are left out.
+    """
     found: dict[int, list[float]] = {}
     for record, level, signal in zip(seen.data.records, seen.data.levels, signals, strict=True):
         taper = np.hanning(len(signal) + 2)[1:-1]
         power = np.abs(np.fft.rfft(signal * taper)[1:-1]) ** 2 / float(taper @ taper) / level.rms**2
         frequency = np.fft.rfftfreq(len(signal), record.manoeuvre.interval)[1:-1]
-        for band, value in zip(np.searchsorted(BANDS_HZ, frequency, side="right") - 1, power, strict=True):
+        kept = ~np.any([(low < frequency) & (frequency < high) for low, high in without] or [frequency < 0.0], axis=0)
+        bands = np.searchsorted(BANDS_HZ, frequency[kept], side="right") - 1
+        for band, value in zip(bands, power[kept], strict=True):
             found.setdefault(int(band), []).append(float(value))
     return found

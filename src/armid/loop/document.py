@@ -1,29 +1,35 @@
 """The document of a closed loop, and details.json: what of it is stored beside report.json."""
 
+import re
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from armid.estimation.identify import record_errors
-from armid.estimation.identify_document import versions
+from armid.estimation.constants import NAMED
+from armid.estimation.identify import versions_of
+from armid.estimation.identify_document import PACKAGES
 from armid.loop.candidates import SHOWN_AS
-from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, Residuals
-from armid.loop.figures import candidate_figure, record_figure
+from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, Residuals, time_in_words
+from armid.loop.figures import candidate_figure, figures_of, record_figure
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
+    CARRIES_NOT,
+    DISAGREES,
     EXPLAINED,
+    IMPLAUSIBLE,
     NO_DISCREPANCY,
     PARTLY,
     TOO_ALIKE,
     UNEXPLAINED,
     ClosedLoop,
     Judgement,
-    error_entry,
-    finite,
+    candidates_of,
+    record_entries,
+    report_of,
 )
-from armid.loop.score_test import projected, rest_of
+from armid.loop.suspects import suspect_sentence
 from armid.report.document import (
     ERROR_NOTE,
     MOST_RECORDS,
@@ -35,18 +41,21 @@ from armid.report.document import (
     Part,
     Section,
     Sentences,
+    Struck,
     Table,
     Text,
     changed,
-    curve_entry,
     error_table,
     listing,
     made_section,
+    others_text,
     records_note,
     rmse_text,
+    stored_figures,
     table,
     value_text,
 )
+from armid.report.result import Parts
 from armid.units import SHOWN, shown
 
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
@@ -57,8 +66,6 @@ MOST_TOLD, MOST_PORTS = 3, 5
 HOPELESS = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
-# Candidates whose predicted change of the residual is drawn.
-MOST_DRAWN = 4
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {
     "parameters": ("Parameters before and after", "Values with 95 % intervals; open marks are not to be trusted."),
@@ -74,6 +81,8 @@ FIGURES = {
 VERDICTS = {
     "no_discrepancy": "Only noise is left", "explained": "Explained", "partly_explained": "Partly explained",
     "unexplained": "Unexplained", "cannot_tell_apart": "Effects cannot be told apart",
+    "does_not_carry_over": "Does not carry over", "record_disagrees": "A record disagrees",
+    "implausible_records": "Records look wrong",
 }  # fmt: skip
 OLD = (
     "details.json is not in this folder: an earlier version of armid wrote it, so residuals, equations, candidates, "
@@ -94,25 +103,26 @@ def loop_document(
 
     report, details: report.json and details.json; for the others see `identify_document`.
     """
-    figures = {name: (Figure(name, *FIGURES[name], svg=svg),) for name, svg in svgs.items()}
+    figures = stored_figures(FIGURES, svgs)
     unit = report["unit"]
     both = [(which, model, report["error"][model][which]) for which in ("train", "holdout")
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
     parameters = parameter_table(report)
-    each = [(r["file"], r["role"], model, r["error"][model]) for r in details.get("records", ())
+    each = [(r.get("record", r["file"]), r["role"], model, r["error"][model]) for r in details.get("records", ())
             for model in ("before", "after")]  # fmt: skip
     note = records_note(len(each) // 2, details.get("n_records", 0))
     by_record = (error_table("Errors of each record", ["record", "role", "model"], each, unit, note),) if each else ()
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
-    shifts = tuple(details.get("shifts", ()))
+    shifts = (*details.get("suspects", ()), *details.get("shifts", ()))
     missing = tuple(details.get("missing", ()))
     words = details.get("advice") or [", ".join(f"{k} = {v}" for k, v in a["manoeuvre"].items())
                                       for a in report["advice"]]  # fmt: skip
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
+    advice += tuple(report.get("next_steps", ()))
     sections = [
-        Section("Error before and after", (errors, *by_record)),
-        *([residual_section(details, unit)] if details else []),
+        Section("Error before and after", (errors,)),
+        *([residual_section(details, unit, by_record)] if details else []),
         Section("Steps", steps or (Text("No effect was added."),)),
         Section("Parameters", (parameters, *([Sentences(shifts)] if shifts else []), *figures.get("parameters", ()))),
     ]
@@ -126,13 +136,16 @@ def loop_document(
         sections.append(Section("Is what remains noise?", (*tests, *unnamed, *drawn)))
     elif figures:
         sections.append(Section("Figures", tuple(f for several in figures.values() for f in several)))
-    if report["advice"]:
-        sections.append(Section("The next record", (Sentences(advice), advice_table(report["advice"], words))))
+    if report.get("log"):
+        sections.append(Section("How it was searched", (log_table(report["log"]),)))
+    if advice:
+        tables = (advice_table(report["advice"], words),) if report["advice"] else ()
+        sections.append(Section("The next record", (Sentences(advice), *tables)))
     if details:
         sections.append(equations_section(details["equations"]))
     sections.append(made_section(details.get("made_by", {}), details.get("versions", {}), again))
     noise, name = shown(report["noise_rms"], unit)
-    records = f", {details['n_records']} records" if details else ""
+    records = f", {details.get('n_files', details['n_records'])} records" if details else ""
     return Document(
         report["campaign"], "Closed loop", f"What does the declared model of {report['plant']} lack on these records?",
         answer(report, details), tuple(sections), warning="" if details else OLD,
@@ -151,6 +164,8 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     sure = [f"{name} = {value_text(p)}" for name, p in found.items() if p["trusted"]]
     unsure = [name for name, p in found.items() if p["low"] is not None and not p["trusted"]]
     said = [f"To be trusted: {', '.join(sure)}."] if sure else []
+    also = [VERDICTS.get(word, word).lower() for word in report.get("also", ())]
+    first += f" Also: {', '.join(also)}." if also else ""
     said += details.get("doubts") or ([f"Not to be trusted: {', '.join(unsure)}."] if unsure else [])
     return first, error_sentence(report), " ".join(said) or "No parameter was identified."
 
@@ -162,8 +177,10 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     noise, unit = shown(report["noise_rms"], report["unit"])
     alone = "" if which == "holdout" else "; no record was held out"
     if not report["effects"]:
-        return f"Error on {on}: {now} {unit} RMSE, the noise is {noise:.3g} {unit}{alone}."
-    return f"Error on {on}: {was} before, {now} {unit} RMSE after; the noise is {noise:.3g} {unit}{alone}."
+        others = others_text(after[which])
+        return f"Error on {on}: {now} {unit} RMSE, the noise is {noise:.3g} {unit}{alone}.{others}"
+    others = others_text(before[which], after[which])
+    return f"Error on {on}: {was} before, {now} {unit} RMSE after; the noise is {noise:.3g} {unit}{alone}.{others}"
 
 
 def step_table(report: Mapping[str, Any]) -> Table:
@@ -173,35 +190,57 @@ def step_table(report: Mapping[str, Any]) -> Table:
                if name.startswith(f"{step['effect']}.") and p["low"] is not None]  # fmt: skip
         errors = ["none" if step["error"][which] is None else
                   f"{rmse_text(last[which], unit)} -> {rmse_text(step['error'][which], unit)}"
-                  for which in ("train", "holdout")]  # fmt: skip
+                  for which in ("holdout", "train")]  # fmt: skip
         alternatives = ", ".join(step["alternatives"]) or "none"
-        rows.append((step["effect"], step["port"], alternatives, *errors, "; ".join(own)))
+        claimed = "" if step.get("claimed", True) or step["empirical"] else " (candidate)"
+        rows.append((step["effect"] + claimed, *errors, alternatives, "; ".join(own), step["port"]))
         last = step["error"]
-    name = SHOWN[unit][0]
-    return table("Steps", ["effect", "port", "cannot be told from", f"train RMSE, {name}", f"holdout RMSE, {name}",
-                           "parameters (95 % interval)"], rows)  # fmt: skip
+    name = shown(0.0, unit)[1]
+    return table("Steps", ["effect", f"holdout RMSE, {name}", f"train RMSE, {name}", "cannot be told from",
+                           "parameters (95 % interval)", "port"], rows)  # fmt: skip
+
+
+def log_table(log: list[Mapping[str, Any]]) -> Table:
+    """Return one line a round: what it reached, and the threshold that refused it."""
+    rows = []
+    for each in log:
+        leading = "; ".join(f"{' + '.join(m['effects'])} {m['chi2_per_sample']:.4g}" for m in each["leading"])
+        rows.append((each["n_effects"], each["n_tried"], leading, each["refused"] or "taken"))
+    columns = ["effects", Column("n_tried", "models fitted", ".0f"), "the best, with chi2 per sample", "outcome"]
+    return table("Rounds", columns, rows, "Train records; chi2 per sample of noise is 1.")
 
 
 def parameter_table(report: Mapping[str, Any]) -> Table:
     before, after = report["parameters"]["before"], report["parameters"]["after"]
-    rows = [(name, value_text(before[name]) if name in before else "", value_text(p),
-             "yes" if p["trusted"] else "fixed or not determined" if p["low"] is None else "no")
-            for name, p in after.items()]  # fmt: skip
-    return table("Parameters", ["parameter", "before", "after", "trusted"], rows, "Values with 95 % intervals.")
+    rows = [(name, held_text(p), "yes" if p["trusted"] else "fixed or not determined" if p["low"] is None else "no",
+             held_text(before[name]) if name in before else "") for name, p in after.items()]  # fmt: skip
+    note = (
+        "Values with 95 % intervals; struck (~ ~) where the interval does not hold: more than noise "
+        "remains, or a bound holds it."
+    )
+    return table("Parameters", ["parameter", "after", "trusted", "before"], rows, note)
 
 
-def residual_section(details: Mapping[str, Any], unit: str) -> Section:
+def held_text(p: Mapping[str, Any]) -> str:
+    """Return a stored parameter, struck where its interval does not hold."""
+    return value_text(p) if p.get("interval_holds", True) else Struck(value_text(p))
+
+
+def residual_section(details: Mapping[str, Any], unit: str, errors: tuple[Part, ...]) -> Section:
     figures = []
     for i, record in enumerate(details["records"]):
-        was, now = (rmse_text(record["error"][model], unit) for model in ("before", "after"))
-        title = f"{record['file']} ({record['role']}), RMSE {was} to {now} {SHOWN[unit][0]}"
-        figures.append(Figure(f"r{i}", title, "", partial(record_figure, record, unit)))
+        own = record.get("unit", unit)
+        was, now = (rmse_text(record["error"][model], own) for model in ("before", "after"))
+        title = f"{record['file']} ({record['role']}), RMSE {was} to {now} {shown(0.0, own)[1]}"
+        figures.append(Figure(f"r{i}", title, "", partial(record_figure, record, own)))
     text = (
         "Measured minus simulated speed; the grey band is two standard deviations of the noise. Slide to one end to "
         "see one model alone. Of long records the least and the largest sample of each short interval are drawn. "
     )
     gallery = Gallery(tuple(figures), "Measured minus simulated", "residuals")
-    return Section("Residual of each record", (gallery,), text + records_note(len(figures), details["n_records"]))
+    return Section(
+        "Residual of each record", (gallery, *errors), text + records_note(len(figures), details["n_records"])
+    )
 
 
 def candidates_section(candidates: Mapping[str, Any], ranking: tuple[Figure, ...]) -> Section:
@@ -249,6 +288,12 @@ def equations_section(equations: Mapping[str, str]) -> Section:
                                                   listing("After, alone", after, folded=True)))  # fmt: skip
 
 
+def parts_of(found: ClosedLoop) -> Parts:
+    """Return what is stored of a closed loop."""
+    report, details = report_of(found), details_of(found)
+    return Parts(report, details, figures_of(found, report, details))
+
+
 def details_of(found: ClosedLoop) -> dict[str, Any]:
     """Return details as JSON can hold them, SI; the command adds `made_by`, its line and options.
 
@@ -257,99 +302,118 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
     before, after = found.before, found.after
     records = [*record_entries(before.train, after.train), *record_entries(before.holdout, after.holdout)]
     diagnoses = {
-        name: {"train": diagnosis_sentences(judged.diagnosis), "holdout": None if judged.holdout_diagnosis is None else
-               diagnosis_sentences(judged.holdout_diagnosis)} for name, judged in (("before", before), ("after", after))
+        name: {role: None if seen is None or told is None else diagnosis_sentences(told, seen) for role, told, seen in
+               (("train", judged.diagnosis, judged.train), ("holdout", judged.holdout_diagnosis, judged.holdout))}
+        for name, judged in (("before", before), ("after", after))
     }  # fmt: skip
     return {
-        "versions": versions(),
+        "versions": versions_of(PACKAGES),
         "conclusion": conclusion(found),
         "shifts": shift_sentences(before, after) if found.steps else [],
         "doubts": doubt_sentences(after),
+        "suspects": [suspect_sentence(s, SHOWN) for s in found.suspects],
         "diagnosis": diagnoses if found.steps else diagnoses | {"after": None},
         "missing": missing_sentences(found.missing) if found.missing is not None else [],
         "equations": {"before": str(before.model), "after": str(after.model)},
         "records": records[:MOST_RECORDS],
         "n_records": len(records),
+        "n_files": len(found.campaign.records),
         "candidates": candidates_of(found),
         "advice": [a.words for a in found.advice],
     }
 
 
-def record_entries(before: Residuals | None, after: Residuals | None) -> list[dict[str, Any]]:
-    if before is None or after is None:
-        return []
-    return [
-        {
-            "file": old.record.file, "role": old.record.role, "n_samples": len(was),
-            "noise_rms": finite(old.record.noise.rms),
-            "error": {"before": error_entry(record_errors(old, before.candidate)),
-                      "after": error_entry(record_errors(new, after.candidate))},
-            "curves": {"before": curve_entry(old.times, was), "after": curve_entry(new.times, now)},
-        }
-        for old, was, new, now in zip(before.replays, before.raw, after.replays, after.raw, strict=True)
-    ]  # fmt: skip
-
-
-def candidates_of(found: ClosedLoop) -> dict[str, Any]:
-    """Return the candidates at the declared model, best first, with the projected sensitivities of the scores.
-
-    drop: predicted fall of chi2 as a share of it; reached: that of the full fit with the effect alone, null where there
-    was none. Curves are whitened, in standard deviations of the noise, against the number of the sample.
-    """
-    start = found.before.fit
-    reached: dict[str, float] = {}
-    for fit in found.search.of_size(1):
-        name = fit.active[0].public
-        reached[name] = max(reached.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
-    listed: list[dict[str, Any]] = []
-    for score in found.search.scores_at(start):
-        name = score.key.public
-        if any(entry["effect"] == name for entry in listed):
-            continue
-        behind = projected(start, score.key, found.library)
-        drawn = len(listed) < MOST_DRAWN
-        listed.append({
-            "effect": name, "drop": finite(score.drop / start.chi2), "p": finite(score.p),
-            "reached": finite(reached.get(name)), "share": finite(behind.share), "alignment": finite(behind.alignment),
-            "curve": curve_entry(np.arange(len(behind.change), dtype=float), behind.change) if drawn else None,
-        })  # fmt: skip
-    rest = rest_of(start)
-    edges = found.before.train.data.edges
-    return {
-        "listed": listed,
-        "residual": curve_entry(np.arange(len(rest), dtype=float), rest),
-        "edges": [int(e) for e in edges],
-        "files": [r.record.file for r in found.before.train.replays],
-    }
-
-
 def conclusion(found: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
-    if found.verdict == TOO_ALIKE:
-        return doubtful(found)
+    of_verdict = {IMPLAUSIBLE: implausible_sentence, DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence,
+                  TOO_ALIKE: doubtful}  # fmt: skip
+    if found.verdict in of_verdict:
+        return of_verdict[found.verdict](found)
     if found.term is not None:
         return partly_empirical(found)
+    if found.after.fit.constants:
+        return constants_sentence(found)
     names = " + ".join(found.effects)
+    unnamed = "" if all(s.claimed for s in found.steps) else " No name is claimed: others may predict as well."
+    where = "train and holdout" if found.campaign.holdout else "train; no record was held out to judge it"
     return {
         NO_DISCREPANCY: "What the declared model leaves is noise: nothing is missing that these records could show.",
-        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on train and holdout.",
-        PARTLY: f"The declared model lacks {names}, but a significant discrepancy remains: that is part of the story.",
-        UNEXPLAINED: "The declared model lacks something, but no effect of the library earns its parameters.",
+        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {where}.",
+        PARTLY: f"With {names} the declared model does better, but a significant discrepancy remains.{unnamed}",
+        UNEXPLAINED: f"The declared model lacks something, but no effect of the library earns its parameters: "
+        f"{tried(found)}.",
     }[found.verdict]
 
 
+def tried(found: ClosedLoop) -> str:
+    """Say how many sets of effects were tried: only of them it may be said that they do not explain the records."""
+    sizes = [len(f.active) for f in found.search.fits.values() if f.active and not f.active[-1].is_empirical]
+    return f"{len(sizes)} models of up to {max(sizes)} effects were tried" if sizes else "no candidate was worth a fit"
+
+
+def implausible_sentence(found: ClosedLoop) -> str:
+    return f"Nothing was searched for, as the records look wrong. {found.next_steps[0]}"
+
+
+def disagreeing_sentence(found: ClosedLoop) -> str:
+    said = [suspect_sentence(s, SHOWN) for s in found.suspects if s.role == "train"]
+    rest = "what remains is more than noise" if found.after.significant else "what remains is noise"
+    added = f"with {' + '.join(found.effects)} " if found.effects else ""
+    return f"{' '.join(said)} Apart from that {added}{rest}."
+
+
+def constants_sentence(found: ClosedLoop) -> str:
+    """Say by how much which constants are off."""
+    step, shares = found.steps[0], found.after.fit.constants
+    moved = sorted((n for n in step.constants), key=lambda n: -abs(shares[first_member(n)]))
+    told = ", ".join(f"{n.removeprefix(NAMED)} {shares[first_member(n)]:+.1%}" for n in moved[:MOST_PORTS])
+    others = f"; so would {' or '.join(step.alternatives)}" if step.alternatives else ""
+    remains = "what remains is more than noise" if found.after.significant else "what remains is noise"
+    where = "train and holdout" if found.campaign.holdout else "train; no record was held out to judge it"
+    return f"No effect is needed: with constants off within their tolerances ({told}) {remains} on {where}{others}."
+
+
+def first_member(name: str) -> str:
+    return re.split(r"[*/+]", name.removeprefix(NAMED))[0]
+
+
+def carried_sentence(found: ClosedLoop) -> str:
+    """Say which record held out denies what the train records showed, and by how much."""
+    judged = found.after if found.withdrawn is None else found.withdrawn.judged
+    unseen = judged.holdout
+    assert unseen is not None
+    factors = [float(np.sqrt(np.mean(raw**2))) / level.rms for raw, level in zip(unseen.raw, unseen.data.levels,
+                                                                                 strict=True)]  # fmt: skip
+    worst = int(np.argmax(factors))
+    missed = f"{unseen.data.records[worst].file} is missed by {factors[worst]:.3g} times its noise"
+    if found.withdrawn is None:
+        return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
+                "that the train records do not show.")  # fmt: skip
+    assert found.before.holdout_error is not None
+    assert judged.holdout_error is not None
+    worse = judged.holdout_error.rmse / found.before.holdout_error.rmse - 1.0
+    names = " + ".join(s.effect for s in found.withdrawn.steps)
+    return (f"The train records ask for {names}, but the records held out are simulated {worse:.0%} worse with it "
+            f"({missed}): it is withdrawn, and the declared model stands.")  # fmt: skip
+
+
 def doubtful(found: ClosedLoop) -> str:
+    if found.after.fit.constants:
+        return constants_sentence(found)
     if found.refused is not None:
         rivals = [r.name for r in (*found.refused.alike, *found.refused.unlike)]
         return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
                 f"as well ({found.refused.name}, {', '.join(rivals[:6])}): none is named.")  # fmt: skip
     said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
+    said += [f"{s.effect} cannot be told from {' or '.join(s.constants)} within tolerance"
+             for s in found.steps if s.constants]  # fmt: skip
     said += [f"{s.effect} fits hardly better than {' or '.join(r.name for r in s.group.unlike)}"
              for s in found.steps if s.group.unlike]  # fmt: skip
     names = " + ".join(found.effects)
     said += [f"{names} fits hardly better than {' + '.join(r.names)}" for r in found.rivals]
     remains = "a significant discrepancy remains, and" if found.after.significant else "what remains is noise, but"
-    return f"With {names} {remains} on these records {'; '.join(said)}."
+    judged = "" if found.campaign.holdout else " No record was held out to judge it."
+    return f"With {names} {remains} on these records {'; '.join(said)}.{judged}"
 
 
 def partly_empirical(found: ClosedLoop) -> str:
@@ -357,9 +421,9 @@ def partly_empirical(found: ClosedLoop) -> str:
     named = " + ".join(found.effects[:-1])
     lacking = f"The declared model lacks {named}, and beside it" if named else "The declared model lacks"
     dependence = found.term.dependence
-    return (f"{lacking} something that no effect of the library explains: {found.effects[-1]} is an empirical curve "
-            f"over {dependence.variable}{TIMES[dependence.factor]} at port {dependence.port}, which claims no physical "
-            "name.")  # fmt: skip
+    return (f"{lacking} something that no effect of the library explains ({tried(found)}): {found.effects[-1]} is an "
+            f"empirical curve over {dependence.variable}{TIMES[dependence.factor]} at port {dependence.port}, which "
+            "claims no physical name.")  # fmt: skip
 
 
 def missing_sentences(missing: Missing) -> list[str]:
@@ -371,7 +435,7 @@ def missing_sentences(missing: Missing) -> list[str]:
     return [*said, f"On what it depends, by the share that a curve predicts on parts left out of its fit: {curves}."]
 
 
-def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
+def diagnosis_sentences(diagnosis: Diagnosis, seen: Residuals) -> list[str]:
     if not diagnosis.significant:
         return [f"What remains cannot be told from noise (least chance of {len(diagnosis.findings)} tests together "
                 f"{diagnosis.p:.2g}, {SIGNIFICANCE:g} would be significant)."]  # fmt: skip
@@ -393,12 +457,9 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
                            "noise gives.",
     }  # fmt: skip
     said += [text.format(**vars(f)) for kind, text in wholes.items() for f in significant(kind)[:1]]
-    for kind, name in (
-        ("record", "record"),
-        ("stage", "stage"),
-        ("dependence", "variable"),
-        ("frequency", "frequency"),
-    ):
+    said += filter(None, (time_in_words(seen),))
+    kinds = (("record", "record"), ("stage", "stage"), ("dependence", "variable"), ("frequency", "frequency"))
+    for kind, name in kinds:
         places = ", ".join(f"{f.where} ({f.ratio:.3g} times the noise)" for f in significant(kind))
         said += [f"Where it is, by {name}: {places}."] if places else []
     return said
@@ -408,7 +469,8 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
     later, said = {e.name: e for e in after.estimates}, []
     for old in before.estimates:
         new = later[old.name]
-        if old.low is not None and old.value != new.value and abs(old.value - new.value) > SHIFTED * abs(new.value):
+        # A bias is told of what is trusted alone: the other may be as wrong as the one before.
+        if new.trusted and old.low is not None and abs(old.value - new.value) > SHIFTED * abs(new.value):
             share = (old.value - new.value) / abs(new.value) if new.value else np.inf
             said.append(f"{old.name} was biased by {share:+.2%}: {value_text(vars(old))} before, "
                         f"{value_text(vars(new))} after.")  # fmt: skip

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.loop.candidates import UNNAMED, EffectKey, Library, applies
-from armid.loop.diagnose import diagnose, train_residuals
+from armid.loop.candidates import UNNAMED, EffectKey, Library, joined
+from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import WITHIN
-from armid.loop.fit import Fit, fit_from
+from armid.loop.fit import Fit, compare, criterion, dwarfs_noise, fit_from, predicted_alike
 from armid.loop.missing_signal import (
     N_HEIGHTS,
     Dependence,
@@ -23,7 +23,6 @@ from armid.loop.missing_signal import (
     posed_in,
 )
 from armid.loop.search import Search, unless_diverged
-from armid.loop.select import compare, criterion
 from armid.model import Effect, Model, Parameter
 
 Array = NDArray[np.float64]
@@ -52,32 +51,27 @@ class Term:
     others: tuple[Dependence, ...]
 
 
-def empirical_term(declared: Fit, named: Fit, search: Search) -> tuple[Missing | None, Term | None]:
+def empirical_term(named: Fit, search: Search) -> tuple[Missing | None, Term | None]:
     """Recover what a model with named effects lacks, and add a term without a name where that earns its parameters.
 
-    The term is tried on the declared model as well, and each named effect is taken out again beside it: a name that a
-    curve makes superfluous was the wrong one. Of terms that do about as well as the best, the fewest names come first.
-    Returns (None, None) where nothing significant is left.
+    The term stands beside the names and takes none away. It is judged as an effect is: by what is left out of the fit,
+    and where the misfit dwarfs the noise by more than a standard error of that. Returns (None, None) where nothing
+    significant is left.
     """
-    if not diagnose(train_residuals(named)).significant:
+    if not is_significant(named):
         return None, None
-    found: list[Term] = []
-    missing = None
     library = with_terms(search.library)
-    for lacking in (named, declared) if named.active else (declared,):
-        library.say("recovering the missing signal without a form")
-        missing = missing_from(lacking, library)
-        found += terms(missing, replace(search, library=library))
-    # A curve must do better than the names that it would replace.
+    library.say("recovering the missing signal without a form")
+    missing = missing_from(named, library)
     n_eff = named.independent
-    ranked = sorted((t for t in found if criterion(t.fit, n_eff) < criterion(named, n_eff)),
-                    key=lambda t: criterion(t.fit, n_eff))  # fmt: skip
-    near = [t for t in ranked if criterion(t.fit, n_eff) < criterion(ranked[0].fit, n_eff) + WITHIN]
-    for term in sorted(near, key=lambda t: (len(t.fit.active), t.fit.chi2)) + ranked[len(near) :]:
-        smaller = declared if len(term.fit.active) == 1 else term.missing.lacking
-        judged = compare(smaller, term.fit, n_extra=max(term.fit.n_free - smaller.n_free, 1))
-        if judged.earned and judged.left_out[1] < judged.left_out[0]:
-            return term.missing, term
+    for term in terms(missing, replace(search, library=library)):
+        if criterion(term.fit, n_eff) >= criterion(named, n_eff):
+            break
+        judged = compare(named, term.fit, n_extra=max(term.fit.n_free - named.n_free, 1))
+        if not judged.earned or judged.left_out[1] >= judged.left_out[0] or not term.fit.needs(term.fit.active[-1]):
+            continue
+        if not dwarfs_noise(named) or not any(f is named for f in predicted_alike([named, term.fit])):
+            return missing, term
     return missing, None
 
 
@@ -101,7 +95,7 @@ def terms(missing: Missing, search: Search) -> list[Term]:
 
 
 def term_of(dependence: Dependence, missing: Missing, search: Search) -> Term:
-    """Fit one curve together with all other parameters, and take out the named effects that it makes superfluous."""
+    """Fit one curve together with all other parameters."""
     lacking = missing.lacking
     effect, heights = empirical_effect(search.library.declared, dependence)
     key = EffectKey(effect.name)
@@ -112,10 +106,6 @@ def term_of(dependence: Dependence, missing: Missing, search: Search) -> Term:
     starts = np.array([np.clip(records.shares(v), 1e-3, 1.0 - 1e-3) for v in (guess, flat)])
     fit = fit_from(records, (*lacking.active, key), [starts[int(np.argmin(records.chi2(starts)))]])
     extended = replace(search, library=library, fits=dict(search.fits), scores=dict(search.scores))
-    for name in fit.active[:-1]:
-        smaller = extended.reduced(fit, tuple(k for k in fit.active if k != name))
-        if criterion(smaller, fit.independent) <= criterion(fit, fit.independent):
-            fit = smaller
     return Term(fit, dependence, missing, extended, ())
 
 
@@ -130,8 +120,9 @@ def with_terms(library: Library) -> Library:
     wanted = [term_at(declared, port, variables, None) for port, variables in usable.items() if variables]
     added: dict[EffectKey, Effect] = {}
     for effect in (*wanted, *(bump_at(port) for port in declared.plant.ports)):
-        if applies(model, effect):
-            model, added[EffectKey(effect.name)] = model + effect, effect
+        extended = joined(model, effect)
+        if extended is not None:
+            model, added[EffectKey(effect.name)] = extended, effect
     return replace(
         library, candidates={**library.candidates, **added}, originals={**library.originals, **added},
         bundles=((*(library.bundles[0] if library.bundles else ()), *added), *library.bundles[1:]),
@@ -203,7 +194,7 @@ def usable_variables(model: Model, port: str) -> list[str]:
 def composes(model: Model, port: str, variable: str) -> bool:
     one = Parameter("one", "1", 0.0, 1.0, null=0.0)
     trial = Effect("trial", (one,), {port: product}, binds={"variable": variable})
-    return knows(model, variable) and applies(model, trial)
+    return knows(model, variable) and joined(model, trial) is not None
 
 
 def term_at(model: Model, port: str, variables: Sequence[str], found: Dependence | None) -> Effect:

@@ -7,10 +7,9 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.loop.candidates import EffectKey, Library, activation_grid, declared_keys
-from armid.loop.fit import Fit, beyond, decomposed
+from armid.loop.candidates import CONSTANT, EffectKey, Library, activation_grid, declared_keys
+from armid.loop.fit import Fit, beyond, criterion, decomposed
 from armid.loop.score_test import at_null, responses, square_beyond
-from armid.loop.select import criterion
 
 Array = NDArray[np.float64]
 # Rivals whose refits differ by less than this in the criterion and whose responses correlate above that are one group.
@@ -44,9 +43,13 @@ class EffectGroup:
         return (self.name, *(r.name for r in self.alike))
 
     @property
+    def all_names(self) -> tuple[str, ...]:
+        return (*self.names, *(r.name for r in self.unlike))
+
+    @property
     def too_big(self) -> bool:
         """Whether so many effects would do that naming them says nothing."""
-        return len(self.alike) + len(self.unlike) >= MOST
+        return sum(not r.name.startswith(CONSTANT) for r in (*self.alike, *self.unlike)) >= MOST
 
 
 def group_of(fit: Fit, key: EffectKey, others: Sequence[Fit]) -> EffectGroup:
@@ -56,7 +59,7 @@ def group_of(fit: Fit, key: EffectKey, others: Sequence[Fit]) -> EffectGroup:
     best: dict[str, Likeness] = {}
     for other in others:
         new = [k for k in other.active if k.declared not in kept]
-        if len(new) != 1 or len(other.active) != len(fit.active) or new[0].public == key.public:
+        if other is fit or len(new) != 1 or len(other.active) != len(fit.active) or new[0].public == key.public:
             continue
         gap = criterion(other, fit.independent) - criterion(fit, fit.independent)
         name = new[0].public

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,15 @@ from armid.loop.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
 from armid.report.document import points, record_axes, small_axes
 from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, pyplot
-from armid.units import SHOWN, shown
+from armid.units import shown
 
 Array = NDArray[np.float64]
 LOOKS = (("before", OKABE_ITO["vermilion"], -0.12), ("after", OKABE_ITO["blue"], 0.12))
 AFTER = OKABE_ITO["blue"]
 KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}
 MOST_RECORDS, MOST_CANDIDATES, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
+# Of a title in medium letters.
+LETTERS_PER_INCH = 9.0
 
 
 def figures_of(
@@ -43,16 +46,17 @@ def residual_figure(found: ClosedLoop) -> Any:
     views = ((found.before.train, found.after.train), (found.before.holdout, found.after.holdout))
     rows = [row for old, new in views if old is not None and new is not None
             for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS:]  # fmt: skip
-    figure, axes = record_axes(len(rows), 2.9, 0.9)
-    unit, factor = SHOWN[found.campaign.unit]
+    figure, axes = record_axes(len(rows), 2.9)
     for (axis,), (replay, before, after) in zip(axes, rows, strict=True):
         curves = {"before": (replay.times, before), "after": (replay.times, after)}
-        draw_residuals(axis, curves, found.noise_rms, found.campaign.unit)
+        factor, unit = shown(1.0, replay.record.unit)
+        noise = found.outputs.get(replay.record.output, {"noise_rms": found.noise_rms})["noise_rms"]
+        draw_residuals(axis, curves, noise, replay.record.unit)
         errors = [factor * float(np.sqrt(np.mean(x**2))) for x in (before, after)]
         record = replay.record
-        title = f"{record.file} ({record.role}), RMSE {errors[0]:.3g} to {errors[1]:.3g} {unit}"
+        title = f"{replay.name} ({record.role}), RMSE {errors[0]:.3g} to {errors[1]:.3g} {unit}"
         axis.set_title(title, fontsize="medium")
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
     names = " + ".join(found.effects) or "no effect added"
     figure.suptitle(f"{found.campaign.name}: residual before and after ({names})", fontsize="large")
     return figure
@@ -67,7 +71,7 @@ def record_figure(record: Mapping[str, Any], unit: str) -> Any:
 
 
 def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si_unit: str) -> None:
-    unit, factor = SHOWN[si_unit]
+    factor, unit = shown(1.0, si_unit)
     if noise is not None:
         band = 2.0 * noise * factor
         axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="noise, 2 sigma")
@@ -144,7 +148,8 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]])
         (name, p, after[name]) for name, p in before.items() if p["low"] is not None or after[name]["low"] is not None
     ]
     n = max(len(both), 1)
-    figure, axes = pyplot().subplots(1, n, figsize=(2.6 * n + 1.2, 3.4), squeeze=False, layout="constrained")
+    width = 2.6 * n + 1.2
+    figure, axes = pyplot().subplots(1, n, figsize=(width, 3.4), squeeze=False, layout="constrained")
     for axis, (name, *pair) in zip(axes.flat, both, strict=False):
         factor, unit = shown(1.0, pair[0]["unit"])
         for place, (p, (_, colour, _)) in enumerate(zip(pair, LOOKS, strict=True)):
@@ -157,7 +162,8 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]])
     if not both:
         axes[0, 0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
         axes[0, 0].set_axis_off()
-    figure.suptitle(f"{campaign}: parameters, 95 % intervals (open: not to be trusted)", fontsize="medium")
+    title = f"{campaign}: parameters, 95 % intervals (open: not to be trusted)"
+    figure.suptitle(fill(title, int(LETTERS_PER_INCH * width)), fontsize="medium")
     return figure
 
 

@@ -1,23 +1,38 @@
-"""A model fitted to the train records: its estimate, residual and sensitivities."""
+"""A model fitted to the train records, and whether a larger one earns its parameters.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+That is judged by significance, by a criterion, and by the prediction of what was left out of the fit.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import f as f_distribution
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import descend, spread_starts
+from armid.estimation.constants import Product, products
+from armid.estimation.design import BOX
+from armid.estimation.information import start_changes
+from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, spread_starts
 from armid.loop.candidates import Active, EffectKey
 from armid.loop.whitening import WhiteRecords
 from armid.model import Model
+from armid.problem.starts import fits_starts, with_starts
 
 Array = NDArray[np.float64]
+Part = NDArray[np.int64]
 # Relative change of the sum of squares at which a fit stops: far below the 1 that means anything in 10,000 samples.
-TOLERANCE = 1e-7
+TOLERANCE, ROUGHLY = 1e-7, 1e-3
 ONLY_NOISE = 0.01
+# An effect is dropped whose strengths would be so far from their nulls by chance.
+OPEN = 0.05
+# Chance at which noise alone gets an effect added, all candidates together.
+FAMILYWISE = 1e-3
+# A residual of so many times the noise is the model's: then prediction decides and not significance.
+DWARFED = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +41,8 @@ class Fit:
 
     active: the effects that were added. records: the least-squares problem. z: free parameters as shares of their
     range, (n_free,). residual: whitened, measured minus simulated, (n_samples,). jacobian: whitened derivatives of the
-    signal by z, (n_samples, n_free).
+    signal by z, (n_samples, n_free). constants: by how much each differs from its declared value, as a share of it; the
+    records hold them so. rough: whether z is near the estimate only.
     """
 
     active: Active
@@ -34,8 +50,11 @@ class Fit:
     z: Array
     residual: Array
     jacobian: Array
+    constants: Mapping[str, float] = field(default_factory=dict)
+    rough: bool = False
+    _products: dict[tuple[tuple[str, float], ...], tuple[Product, ...]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def chi2(self) -> float:
         return float(self.residual @ self.residual)
 
@@ -84,6 +103,45 @@ class Fit:
     def _decomposed(self) -> tuple[Array, Array]:
         return decomposed(self.jacobian)
 
+    @cached_property
+    def start_slopes(self) -> Array:
+        """What one standard deviation of each measured start does to the whitened signal, (n_samples, n_starts).
+
+        Without columns where records start at rest, or where their starts are fitted.
+        """
+        changes = list(start_changes(self.records.with_all_samples(), self.z))
+        return np.column_stack(changes) if changes else np.empty((len(self.residual), 0))
+
+    @property
+    def is_at_a_bound(self) -> bool:
+        """Whether a bound holds a strength or a shape of one of its effects."""
+        held = held_by_bound(self.records.space, self.x)
+        return any(bool(held[self.owned_by(key)].any()) for key in self.active)
+
+    def needs(self, key: EffectKey) -> bool:
+        """Whether the strengths of one of its effects, all together, are away from their nulls by more than is open.
+
+        A Wald test; a residual that is no noise scatters with its correlation in time, see `WhitenedData.trust`, and
+        the estimate with the measured starts.
+        """
+        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
+        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
+        null = np.array([nulls[i] for i in places], dtype=np.float64)
+        free = np.flatnonzero(space.free)[places]
+        away = self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
+        weighed = self.jacobian * np.sqrt(self.records.data.trust(self.residual))[:, np.newaxis]
+        covariance = np.linalg.inv(weighed.T @ weighed + BOX * np.eye(self.n_free))
+        moved = self.answer @ self.start_slopes
+        covariance = (covariance + moved @ moved.T)[np.ix_(places, places)]
+        return not places or bool(away @ np.linalg.solve(covariance, away) > chi2_distribution.isf(OPEN, len(places)))
+
+    def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
+        """Return the constants within tolerances that the records see at the fit, see `products`."""
+        known = tuple(tolerances.items())
+        if known not in self._products:
+            self._products[known] = products(self.records, self.z, tolerances)
+        return self._products[known]
+
     def owned_by(self, key: EffectKey) -> NDArray[np.bool_]:
         return np.array([key.owns(name) for name in self.values], dtype=np.bool_)
 
@@ -109,9 +167,10 @@ def decomposed(columns: Array) -> tuple[Array, Array]:
     return np.asarray(left[:, good]), inverse
 
 
-def fit_from(records: WhiteRecords, active: Active, starts: Sequence[Array]) -> Fit:
+def fit_from(records: WhiteRecords, active: Active, starts: Sequence[Array], rough: bool = False) -> Fit:
     """Return the best of the least-squares estimates from some starts (shares of the range).
 
+    rough: stop where a step lowers chi2 by less than a thousandth.
     Residual and slopes are those of all samples, whatever the fit saw.
     Raises ArmidError when every start diverges.
     """
@@ -120,8 +179,20 @@ def fit_from(records: WhiteRecords, active: Active, starts: Sequence[Array]) -> 
         good = [z for z, chi2 in zip(starts, records.chi2(np.array(starts)), strict=True) if np.isfinite(chi2)]
         if not good:
             raise ArmidError("each start of a fit diverged: other bounds are expected")
-        z = descend(records, good, TOLERANCE)
-    return Fit(tuple(active), records, z, *records.with_all_samples().residual_and_slopes(z))
+        z = descend(records, good, ROUGHLY if rough else TOLERANCE)
+    return Fit(tuple(active), records, z, *records.with_all_samples().residual_and_slopes(z), rough=rough)
+
+
+def with_own_starts(fit: Fit) -> Fit:
+    """Return a fit about the starts that fit it best, where starts of records are fitted (see problem/starts.py)."""
+    if not fits_starts(fit.records.replays):
+        return fit
+    for _ in range(MOST_ROUNDS):
+        last, records = fit, replace(fit.records, replays=with_starts(fit.records.replays, fit.candidate))
+        fit = fit_from(records, fit.active, [fit.z])
+        if np.all(np.abs(fit.z - last.z) <= SETTLED) or abs(last.chi2 - fit.chi2) <= SETTLED * fit.chi2:
+            break
+    return fit
 
 
 def fit_globally(records: WhiteRecords, active: Active) -> Fit:
@@ -130,3 +201,140 @@ def fit_globally(records: WhiteRecords, active: Active) -> Fit:
     Raises ArmidError when every candidate diverges.
     """
     return fit_from(records, active, spread_starts(records) if records.space.free.any() else ())
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Say why a model is preferred to a smaller one, or not.
+
+    gain: fall of the criterion. p: chance of the fall of chi2 from noise alone, corrected for the number of candidates
+    and of shapes. left_out: sums of squares on left-out parts, before and after; NaN where gain or p decided already.
+    """
+
+    gain: float
+    p: float
+    left_out: tuple[float, float]
+
+    @property
+    def earned(self) -> bool:
+        """Whether the larger model is significant, cheaper by the criterion, and no worse on what was left out."""
+        return self.p < FAMILYWISE and self.gain > 0.0 and self.left_out[1] <= self.left_out[0]
+
+    @property
+    def why(self) -> str:
+        """Which threshold was not reached, in words; "" where all were."""
+        if self.p >= FAMILYWISE:
+            return f"noise alone would do as much with a chance of {self.p:.2g}; less than {FAMILYWISE:g} is asked for"
+        if self.gain <= 0.0:
+            return f"the criterion rises by {-self.gain:.3g}; it has to fall"
+        if self.left_out[1] > self.left_out[0]:
+            share = self.left_out[1] / self.left_out[0] - 1.0
+            return f"what was left out of the fit is predicted worse, by {share:.2%} of the sum of squares"
+        return ""
+
+
+def dwarfs_noise(fit: Fit) -> bool:
+    """Tell whether what a model leaves is more than ten times the noise."""
+    return fit.chi2 > DWARFED**2 * len(fit.residual)
+
+
+def criterion(fit: Fit, independent: float) -> float:
+    """Return n_eff ln(chi2) + k ln(n_eff), the Bayesian criterion with effective samples; smaller is better.
+
+    independent: n_eff, the independent samples of the residual of the best model compared. Where that is noise, n_eff
+    is n and differences are those of chi2 + k ln n; where structure remains, few samples are independent and
+    chi2 counts in proportion to what remains: no term is added for ever to a residual that the library cannot explain.
+    """
+    return float(independent * np.log(fit.chi2) + fit.n_free * np.log(independent))
+
+
+def compare(smaller: Fit, larger: Fit, n_candidates: int = 1, n_shapes: int = 1, n_extra: int = 1) -> Comparison:
+    """Judge an addition; the left-out parts are fitted again only where the first two conditions hold.
+
+    n_extra: parameters that the addition costs. Shape parameters mean nothing at the null, so they count as a grid of
+    n_shapes that was searched, not as degrees of freedom.
+    """
+    # What an effect yet to be found leaves is slow in the one model and may be fast in the other: the faster counts.
+    n_eff = max(smaller.independent, larger.independent)
+    ratio = n_eff * np.log(smaller.chi2 / larger.chi2)
+    gain = float(criterion(smaller, n_eff) - criterion(larger, n_eff))
+    # The noise of slow signals is known from a rest of so many independent samples, hence F and not chi-square.
+    known = larger.records.data.n_noise(otherwise=n_eff)
+    p = min(1.0, n_candidates * n_shapes * float(f_distribution.sf(max(ratio, 0.0) / n_extra, n_extra, known)))
+    return Comparison(gain, p, (np.nan, np.nan) if p >= FAMILYWISE or gain <= 0.0 else left_out(smaller, larger))
+
+
+def left_out(smaller: Fit, larger: Fit) -> tuple[float, float]:
+    """Return the sums of squares of two models on each manoeuvre (or block of time), left out of the fits in turn.
+
+    Where the misfit dwarfs the noise, records that are alike are left out together, and the worse grouping counts.
+    Infinite where a fit without a part diverges on it.
+    """
+    groupings = larger.records.data.groupings()[1:] if dwarfs_noise(smaller) else []
+    found = []
+    for parts in (parts_to_judge(smaller, larger), *groupings):
+        before, after = (float(sum(left_out_part(fit, part) for part in parts)) for fit in (smaller, larger))
+        found.append((before, after))
+    return max(found, key=lambda pair: pair[1] / pair[0] if np.isfinite(pair[1]) else np.inf)
+
+
+def predicted_alike(fits: Sequence[Fit]) -> list[Fit]:
+    """Return those models that predict what is left out as well as the best, within a standard error, in any grouping.
+
+    Of each group of records: the difference of the sums of squares of two models; its standard error over the groups.
+    """
+    kept: list[Fit] = []
+    first, *others = fits[0].records.data.groupings()
+    if len(first) == 2:  # the rest of two may leave parameters undetermined
+        first = [block for part in first for block in fits[0].records.data.blocks(part)]
+    for parts in (first, *others):
+        table = np.array([[left_out_part(fit, part) for part in parts] for fit in fits])
+        behind = table - table[int(np.argmin(table.sum(axis=1)))]
+        with np.errstate(invalid="ignore"):
+            error = np.sqrt(len(parts)) * np.std(behind, axis=1, ddof=1)
+        near = (behind.sum(axis=1) <= error) & np.isfinite(table).all(axis=1)
+        kept += [f for f, is_near in zip(fits, near, strict=True) if is_near and not any(f is k for k in kept)]
+    return kept
+
+
+def parts_to_judge(smaller: Fit, larger: Fit) -> list[Part]:
+    """Return what is left out in turn: whole manoeuvres, of two that do not determine each other blocks of time.
+
+    What one manoeuvre predicts of another says nothing of an effect where the parameters that it leaves undetermined
+    may change that prediction by more than the effect is to explain.
+    """
+    whole = larger.records.data.parts()
+    if len(whole) != 2:
+        return whole
+    data = larger.records.data
+    judged = [data.blocks(part) if is_undetermined(smaller, larger, part) else [part] for part in whole]
+    return [part for parts in judged for part in parts]
+
+
+def is_undetermined(smaller: Fit, larger: Fit, part: Part) -> bool:
+    """Tell whether the rest predicts a part with a larger variance than the mean square that it is to explain there."""
+    rest = np.delete(larger.jacobian, part, axis=0)
+    information = rest.T @ rest + BOX * np.eye(larger.n_free)
+    slopes = larger.jacobian[part]
+    spread = float(np.mean(np.einsum("ij,ij->i", slopes, np.linalg.solve(information, slopes.T).T)))
+    return spread > float(np.mean(smaller.residual[part] ** 2))
+
+
+def left_out_part(fit: Fit, part: Part) -> float:
+    """Return the sum of squares on one part of a fit to the others.
+
+    Shapes that were set free are held where they are: what is asked of the part is the strength. A shape such as the
+    period of a sampled control may rest on one record alone, where the time of its switch jumps.
+    """
+    space, kept = fit.records.space, []
+    for name, value in fit.values.items():
+        is_freed = any(k.free_shape and k.owns(name) for k in fit.active)
+        kept.append(not is_freed or fit.model.parameters[name].fixed is None)
+        space = space if kept[-1] else space.with_fixed(name, value)
+    records = replace(fit.records, space=space, data=fit.records.data.without(part))
+    try:
+        again = fit_from(records, fit.active, [fit.z[np.array(kept, dtype=np.bool_)]])
+    except ArmidError:
+        return float("inf")
+    square = float(np.sum(again.residual[part] ** 2))
+    return square if np.isfinite(square) else float("inf")

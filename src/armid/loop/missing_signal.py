@@ -34,19 +34,27 @@ SAME_PORT, SAME_VARIABLE = 0.9999, 0.999
 class Segment:
     """Hold one piece of a train record, ready for linear algebra; all signals are divided by the record's level.
 
-    knots: times at which a missing signal is sought [s], (n_knots,). residual: measured minus simulated, (n_samples,).
-    jacobian: of the free parameters, (n_samples, n_free). gains: port -> change of the signal per unit of the missing
-    signal at each knot (straight lines between knots), (n_samples, n_knots). group: number of its record.
+    replays: of each output of the file; their signals stand one behind the other. levels: of the replays. index: which
+    piece of theirs. knots: times at which a missing signal is sought [s], (n_knots,). residual: measured minus
+    simulated, (n_samples,). jacobian: of the free parameters, (n_samples, n_free). gains: port -> change of the signal
+    per unit of the missing signal at each knot (straight lines between knots), (n_samples, n_knots). group: number of
+    its file.
     """
 
-    replay: Replay
-    piece: Piece
+    replays: tuple[Replay, ...]
+    levels: tuple[float, ...]
+    index: int
     schedule: Schedule
     knots: Array
     residual: Array
     jacobian: Array
     gains: dict[str, Array]
     group: int
+
+    @property
+    def piece(self) -> Piece:
+        """The piece of the first output."""
+        return self.replays[0].pieces[self.index]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +152,11 @@ def segments(
     A port at which no signal moves the output has no gain, nor has one whose signals do what those of an earlier port
     do, a factor aside. All ports together cost one compiled model, none where the model holds the test signals already.
     """
-    whole = [segment_of(r, level, i, k, space, x) for i, (r, level) in enumerate(zip(replays, levels, strict=True))
-             for k in range(len(r.pieces))]  # fmt: skip
+    files: dict[tuple[int, ...], list[tuple[Replay, float]]] = {}
+    for replay, level in zip(replays, levels, strict=True):
+        files.setdefault(replay.simulated, []).append((replay, level))
+    whole = [segment_of(outputs, i, k, space, x) for i, outputs in enumerate(files.values())
+             for k in range(len(outputs[0][0].pieces))]  # fmt: skip
     known = dict(zip(space.names, space.complete(x[np.newaxis])[0], strict=True))
     held = {e.name for e in model.effects}
     probes = [p for p in map(bump_at, ports) if p.name not in held]
@@ -156,7 +167,7 @@ def segments(
         size = probe.fitting_size(whole[0])
         if size is None:
             continue
-        gains = [probe.gain(segment, size) / levels[segment.group] for segment in whole]
+        gains = [probe.gain(segment, size) for segment in whole]
         every = np.concatenate([gain.ravel() for gain in gains])
         unit = every / (np.linalg.norm(every) or 1.0)
         if not any(abs(float(unit @ other)) > SAME_PORT for other in kept):
@@ -166,17 +177,18 @@ def segments(
     return whole
 
 
-def segment_of(replay: Replay, level: float, group: int, index: int, space: Space, x: Array) -> Segment:
-    one = slice(index, index + 1)
-    alone = replace(replay, pieces=replay.pieces[one], calibrations=replay.calibrations[one])
-    records = WeightedRecords((alone,), space, (1.0,))
+def segment_of(outputs: Sequence[tuple[Replay, float]], group: int, index: int, space: Space, x: Array) -> Segment:
+    one, (replays, levels) = slice(index, index + 1), zip(*outputs, strict=True)
+    alone = tuple(replace(r, pieces=r.pieces[one], calibrations=r.calibrations[one]) for r in replays)
+    records, replay = WeightedRecords(alone, space, (1.0,) * len(alone)), replays[0]
     residual, jacobian = records.residual_and_slopes(records.shares(x))
+    level = np.repeat(levels, [len(r.measured) for r in alone])
     times = replay.pieces[index].manoeuvre.times()
     n_knots = int(np.clip((times[-1] - times[0]) / KNOT_S, 4, MOST_KNOTS_OF_A_PIECE)) + 1
     # Steps over several samples would jump across a narrow triangle; the weights belong to another set of parameters.
     schedule = replace(replay.calibrations[index].schedule, plan=None, weights=None)
-    return Segment(replay, replay.pieces[index], schedule, np.linspace(times[0], times[-1], n_knots), residual / level,
-                   jacobian / level, {}, group)  # fmt: skip
+    return Segment(replays, levels, index, schedule, np.linspace(times[0], times[-1], n_knots), residual / level,
+                   jacobian / level[:, np.newaxis], {}, group)  # fmt: skip
 
 
 def bump(time, size, centre, width):  # type: ignore[no-untyped-def]
@@ -215,17 +227,20 @@ class Probe:
         knots = segment.knots
         rows = self.rows(np.append(0.0, SIZES), float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
         run = simulate(self.model, segment.piece.manoeuvre, rows, segment.schedule)
-        moved = np.abs(run.output[1:] - run.output[0]).max(axis=1)
-        small = np.isfinite(moved) & (moved <= MOVES * self.model.plant.scales.speed) & (moved > 0.0)
+        signals, size = run.joint(self.model.plant.sizes), self.model.plant.sizes[0]
+        moved = np.abs(signals[1:] - signals[0]).max(axis=1)
+        small = np.isfinite(moved) & (moved <= MOVES * size) & (moved > 0.0)
         return float(SIZES[small][-1]) if small.any() else None
 
     def gain(self, segment: Segment, size: float) -> Array:
-        """Return d signal / d missing signal at each knot, (n_samples, n_knots), forward differences."""
+        """Return d signal / d missing signal at each knot, over the levels, (n_samples, n_knots)."""
         width = float(segment.knots[1] - segment.knots[0])
         rows = self.rows(np.append(0.0, np.full(len(segment.knots), size)), np.append(0.0, segment.knots), width)
         run = simulate(self.model, segment.piece.manoeuvre, rows, segment.schedule)
-        output = run.output[:, segment.piece.window]
-        return np.asarray((output[1:] - output[0]).T / size)
+        pairs, correction = zip(segment.replays, segment.levels, strict=True), segment.piece.correction
+        outputs = run.outputs if correction is None else correction.corrected(run.outputs)
+        seen = ((outputs[r.place][:, r.pieces[segment.index].window], level) for r, level in pairs)
+        return np.concatenate([(output[1:] - output[0]).T / size / level for output, level in seen])
 
 
 STRENGTHS = 10.0 ** np.arange(-8.0, 6.0, 0.5)

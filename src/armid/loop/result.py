@@ -2,31 +2,47 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from armid.estimation.identify import Errors
-from armid.estimation.information import information_of
+from armid.estimation.advice import Advice
+from armid.estimation.constants import columns_of
+from armid.estimation.identify import JointErrors, errors_by_file, errors_entry, record_errors
+from armid.estimation.information import Information, information_of
 from armid.estimation.least_squares import held_by_bound
-from armid.loop.advice import Advice
 from armid.loop.candidates import Library
 from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.empirical import Term
 from armid.loop.equivalence import EffectGroup, RivalModel
 from armid.loop.fit import Fit
 from armid.loop.missing_signal import Missing
-from armid.loop.score_test import Score
+from armid.loop.score_test import Score, projected, rest_of
 from armid.loop.search import Search
+from armid.loop.suspects import Suspect
 from armid.model import Model
+from armid.problem.problem import Replay
 from armid.record import Campaign
+from armid.report.document import curve_entry, finite
+from armid.report.result import LOOP, Kind, Result
 
-NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
-    "no_discrepancy", "explained", "partly_explained", "unexplained", "cannot_tell_apart",
+Array = NDArray[np.float64]
+IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
+    "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
+    "partly_explained", "unexplained", "cannot_tell_apart",
 )  # fmt: skip
+# Where train is noise, held-out records may be simulated worse than their noise by this factor.
+CARRIED = 1.1
 # An effect of the library that could bias a parameter by more than this share without being noticed is a doubt: on one
 # stroke 2-7 %, on four different ones at most 0.6 % (measured on the arm).
 BIASED = 0.01
+# An interval that the tolerances of constants widen by more than this factor, and beyond BIASED, rests on them.
+RESTS_ON = 2.0
+# Doubts for which an interval does not hold.
+REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
+# Candidates whose predicted change of the residual is drawn.
+MOST_DRAWN = 4
 # Half of the 95 % interval may be this share of the value; correlations may be this strong.
 WIDEST, STRONGEST = 0.05, 0.99
 
@@ -35,7 +51,8 @@ WIDEST, STRONGEST = 0.05, 0.99
 class Estimate:
     """Hold one parameter.
 
-    value, low, high: SI, the 95 % interval, None where it is fixed or not determined. trusted: False where a
+    value, low, high: SI, the 95 % interval, which counts the tolerances of the constants; None where it is fixed or not
+    determined. given_low, given_high: were the constants as declared. trusted: False where a
     significant discrepancy remains, the bound holds it, the half width exceeds 5 % of the value, a correlation exceeds
     0.99, an effect could bias it unseen, or it was not identified at all; doubts: these reasons in words.
     """
@@ -46,11 +63,19 @@ class Estimate:
     low: float | None
     high: float | None
     doubts: tuple[str, ...]
+    given_low: float | None = None
+    given_high: float | None = None
+    given_doubts: tuple[str, ...] = ()
 
     @property
     def trusted(self) -> bool:
         """Whether nothing speaks against the value and its interval."""
         return not self.doubts
+
+    @property
+    def trusted_given_constants(self) -> bool:
+        """Whether nothing would, were the constants as declared."""
+        return not self.given_doubts
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +91,8 @@ class Judgement:
     estimates: tuple[Estimate, ...]
     train: Residuals
     holdout: Residuals | None
-    train_error: Errors
-    holdout_error: Errors | None
+    train_error: JointErrors
+    holdout_error: JointErrors | None
     diagnosis: Diagnosis
     holdout_diagnosis: Diagnosis | None
 
@@ -75,42 +100,72 @@ class Judgement:
     def significant(self) -> bool:
         return self.diagnosis.significant or (self.holdout_diagnosis is not None and self.holdout_diagnosis.significant)
 
+    @property
+    def fails_to_carry_over(self) -> bool:
+        """Whether train is noise and held-out records are not, by more than the doubt of the prediction."""
+        if self.holdout is None or self.holdout_error is None or self.holdout_diagnosis is None:
+            return False
+        is_larger = self.holdout_error.rmse > CARRIED * self.holdout.noise_rms
+        return not self.diagnosis.significant and self.holdout_diagnosis.significant and is_larger
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """Hold one turn of the loop: the effect that was added and what became of errors and parameters.
 
     alternatives: names of the effects that it cannot be told from. empirical: whether it is a term without a name.
+    claimed: whether its name is claimed, or only a candidate, as where it does not carry over. constants: names of
+    constants that would do as well within their tolerances; where the step is such constants, those that it moves.
     """
 
     effect: str
     port: str
     alternatives: tuple[str, ...]
     empirical: bool
+    claimed: bool
+    constants: tuple[str, ...]
     after: Judgement
     group: EffectGroup
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedLoop:
-    """Hold the result of the closed loop.
+class Withdrawn:
+    """Hold an addition that the records held out denied: its steps, and the model that it was."""
 
-    verdict: "no_discrepancy", "explained", "partly_explained", "unexplained" or "cannot_tell_apart". before, after: the
-    declared model, and the model with the effects that earned their place. refused: a group too big to be a finding,
-    None where there is none. rivals: other models that fit nearly as well and differ in more effects than one. library,
-    search: everything that was tried. missing: the signal that the named effects leave unexplained, None where they
-    leave nothing; term: the empirical term for it, None where none earned its place.
+    steps: tuple[Step, ...]
+    judged: Judgement
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ClosedLoop(Result):
+    """Hold the result of the closed loop; it prints itself, and has a table, figures and files.
+
+    verdict: "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
+    "partly_explained", "unexplained" or "cannot_tell_apart"; also: the others that hold. before, after: the declared
+    model, and the model in force, with the effects that earned their place. withdrawn: what the held-out records
+    denied, None where nothing. refused: a group too big to be a finding, None where there is none. rivals: other models
+    that fit nearly as well and differ in more effects than one. next_steps: what to do beside the record that is
+    advised, in words. suspects: records that differ, and samples that are no data; error_all_records: "before" and
+    "after" -> errors on train and holdout with nothing left out. library, search: everything that was tried. missing:
+    the signal that the named effects leave unexplained, None where they leave nothing; term: the empirical term for it,
+    None where none earned its place.
     """
 
+    kind: ClassVar[Kind] = LOOP
     campaign: Campaign
     noise_rms: float
     verdict: str
+    also: tuple[str, ...]
     before: Judgement
     after: Judgement
     steps: tuple[Step, ...]
+    withdrawn: Withdrawn | None
     refused: EffectGroup | None
     rivals: tuple[RivalModel, ...]
     advice: tuple[Advice, ...]
+    next_steps: tuple[str, ...]
+    suspects: tuple[Suspect, ...]
+    error_all_records: Mapping[str, Sequence[JointErrors | None]]
     library: Library
     search: Search
     missing: Missing | None
@@ -125,6 +180,17 @@ class ClosedLoop:
     def model(self) -> Model:
         """The declared model with the effects."""
         return self.after.model
+
+    @property
+    def outputs(self) -> dict[str, dict[str, Any]]:
+        """Output -> its unit and the noise of its train records."""
+        data = self.before.train.data
+        found: dict[str, list[float]] = {}
+        for replay, level in zip(self.before.train.replays, data.levels, strict=True):
+            found.setdefault(self.campaign.plant.outputs[replay.place].name, []).append(level.rms)
+        units = {o.name: o.unit for o in self.campaign.plant.outputs}
+        return {name: {"unit": unit, "noise_rms": float(np.mean(found[name]))} for name, unit in units.items()
+                if name in found}  # fmt: skip
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -143,17 +209,19 @@ def unseen_biases_of(declared: Fit, found: Sequence[Score]) -> Biases:
     }
 
 
-def estimates(fit: Fit, library: Library, discrepancy: bool, biases: Biases) -> tuple[Estimate, ...]:
+def estimates(
+    fit: Fit, library: Library, discrepancy: bool, biases: Biases, members: Sequence[Fit]
+) -> tuple[Estimate, ...]:
     """Return the parameters of the declared model and of the effects added, under their public names.
 
-    discrepancy: whether a significant one remains. biases: see `unseen_biases_of`.
+    discrepancy: whether a significant one remains. biases: see `unseen_biases_of`. members: other models over which the
+    intervals of the declared model's own parameters reach.
     """
+    views = [interval_view(fit, members, {})]
+    views.append(interval_view(fit, members, library.tolerances) if library.tolerances else views[0])
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
-    information = information_of(fit.records, fit.z, fit.records.data.trust(fit.residual))
     active = {key.declared for key in fit.active}
     present = {key.public for key in fit.active}
-    others = np.abs(information.correlation - np.diag(np.diag(information.correlation)))
-    strongest = np.nan_to_num(others, nan=1.0).max(axis=1, initial=0.0)
     found = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
@@ -161,42 +229,94 @@ def estimates(fit: Fit, library: Library, discrepancy: bool, biases: Biases) -> 
             continue
         public = name if owner is None else f"{owner.public}.{name.partition('.')[2]}"
         if name not in space.free_names:
-            found.append(Estimate(public, value, unit, None, None, ("it was not identified: its value is declared",)))
+            why = ("it was not identified: its value is declared",)
+            found.append(Estimate(public, value, unit, None, None, why, given_doubts=why))
             continue
         i = space.free_names.index(name)
-        half = float(information.half_width[i])
-        doubts = ["a significant discrepancy remains"] if discrepancy else []
-        doubts += ["its bound holds it"] if held[i] else []
-        if not half <= WIDEST * abs(value):
-            doubts.append(f"half of its interval exceeds {WIDEST:.0%} of the value")
-        if strongest[i] > STRONGEST:
-            doubts.append(f"it is correlated with another by more than {STRONGEST}")
         share, effect = next((b for b in biases.get(name, ()) if b[1] not in present), (0.0, ""))
-        if share > BIASED:
-            doubts.append(f"{effect} could bias it by {share:.1%} without being seen on these records")
-        low, high = (value - half, value + half) if np.isfinite(half) else (None, None)
-        found.append(Estimate(public, value, unit, low, high, tuple(doubts)))
+        told = []
+        for intervals, strongest in views:
+            low, high = intervals[name]
+            given = 0.5 * (views[0][0][name][1] - views[0][0][name][0])
+            doubts_of = [REMAINS] if discrepancy else []
+            doubts_of += [HELD] if held[i] else []
+            if not max(value - low, high - value) <= WIDEST * abs(value):
+                doubts_of.append(f"half of its interval exceeds {WIDEST:.0%} of the value")
+            if strongest[i] > STRONGEST:
+                doubts_of.append(f"it is correlated with another by more than {STRONGEST}")
+            if share > BIASED:
+                doubts_of.append(f"{effect} could bias it by {share:.1%} without being seen on these records")
+            if 0.5 * (high - low) > max(BIASED * abs(value), RESTS_ON * given):
+                doubts_of.append("it rests on constants that are known within tolerances alone")
+            ends = (low, high) if np.isfinite(high - low) else (None, None)
+            told.append((*ends, tuple(doubts_of)))
+        (given_low, given_high, given_doubts), (low, high, doubts) = told
+        doubts = tuple(d if d in given_doubts else f"{d}, the tolerances of the constants counted" for d in doubts)
+        found.append(Estimate(public, value, unit, low, high, doubts, given_low, given_high, given_doubts))
     return tuple(found)
 
 
+def interval_view(
+    fit: Fit, members: Sequence[Fit], tolerances: Mapping[str, float]
+) -> tuple[dict[str, tuple[float, float]], Array]:
+    """Return the interval of each free parameter over a model and others, and its strongest correlation."""
+    information = information_at_fit(fit, tolerances)
+    others = np.abs(information.correlation - np.diag(np.diag(information.correlation)))
+    intervals = interval_of(fit, information)
+    for member in members:
+        for name, (low, high) in interval_of(member, information_at_fit(member, tolerances)).items():
+            if name in intervals and "." not in name:
+                intervals[name] = min(low, intervals[name][0]), max(high, intervals[name][1])
+    return intervals, np.nan_to_num(others, nan=1.0).max(axis=1, initial=0.0)
+
+
+def information_at_fit(fit: Fit, tolerances: Mapping[str, float]) -> Information:
+    columns = columns_of(fit.products(tolerances), len(fit.residual))
+    return information_of(fit.records, fit.z, fit.records.data.trust(fit.residual), columns)
+
+
+def interval_of(fit: Fit, information: Information) -> dict[str, tuple[float, float]]:
+    """Return the 95 % interval of each free parameter of a model, SI."""
+    return {n: (v - float(h), v + float(h))
+            for (n, v), h in zip(fit.values.items(), information.half_width, strict=True)}  # fmt: skip
+
+
 def report_of(found: ClosedLoop) -> dict[str, Any]:
-    """Return the result as JSON can hold it, SI throughout, always with these keys."""
+    """Return the result as JSON can hold it, SI throughout, always with these keys.
+
+    Parameters
+    ----------
+    found : ClosedLoop
+        What `close_loop` returns.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
+    """
     return {
         "campaign": found.campaign.name,
         "plant": found.campaign.plant.name,
         "unit": found.campaign.unit,
         "noise_rms": found.noise_rms,
+        "outputs": found.outputs,
         "verdict": found.verdict,
+        "also": list(found.also),
         "effects": list(found.effects),
         "error": {"before": errors_of(found.before), "after": errors_of(found.after)},
+        "error_all_records": {
+            when: dict(zip(("train", "holdout"), map(errors_entry, told), strict=True))
+            for when, told in found.error_all_records.items()
+        },
+        "suspects": [asdict(s) for s in found.suspects],
         "parameters": {"before": entries(found.before), "after": entries(found.after)},
-        "steps": [
-            {
-                "effect": s.effect, "port": s.port, "alternatives": list(s.alternatives), "empirical": s.empirical,
-                "error": errors_of(s.after), "parameters": entries(s.after),
-            }
-            for s in found.steps
-        ],
+        "steps": [step_entry(s) for s in found.steps],
+        "withdrawn": None if found.withdrawn is None else {
+            "effects": [s.effect for s in found.withdrawn.steps],
+            "error": {"before": errors_of(found.before), "after": errors_of(found.withdrawn.judged)},
+            "parameters": entries(found.withdrawn.judged),
+            "steps": [step_entry(s) for s in found.withdrawn.steps],
+        },
         "advice": [
             {
                 "manoeuvre": {k: v.item() if isinstance(v, np.generic) else v for k, v in a.manoeuvre.items()},
@@ -204,24 +324,99 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
             }
             for a in found.advice
         ],
+        "next_steps": list(found.next_steps),
+        "log": [
+            {
+                "n_effects": r.n_effects, "n_tried": r.n_tried, "refused": r.refused,
+                "leading": [{"effects": list(names), "chi2_per_sample": finite(value)} for names, value in r.leading],
+            }
+            for r in found.search.rounds
+        ],
     }  # fmt: skip
 
 
-def errors_of(judged: Judgement) -> dict[str, dict[str, float | None] | None]:
-    return {"train": error_entry(judged.train_error), "holdout": error_entry(judged.holdout_error)}
+def step_entry(step: Step) -> dict[str, Any]:
+    return {
+        "effect": step.effect, "port": step.port, "alternatives": list(step.alternatives), "empirical": step.empirical,
+        "claimed": step.claimed, "constants": list(step.constants), "error": errors_of(step.after),
+        "parameters": entries(step.after),
+    }  # fmt: skip
 
 
-def error_entry(errors: Errors | None) -> dict[str, float | None] | None:
-    return None if errors is None else {k: finite(v) for k, v in asdict(errors).items()}
+def errors_of(judged: Judgement) -> dict[str, Any]:
+    """Return the errors on train, on holdout (None where there is none) and on each record."""
+    replays = (*judged.train.judged, *(judged.holdout.judged if judged.holdout is not None else ()))
+    records = {file: errors_entry(e) for file, e in errors_by_file(replays, judged.train.candidate).items()}
+    return {"train": errors_entry(judged.train_error), "holdout": errors_entry(judged.holdout_error),
+            "records": records}  # fmt: skip
 
 
 def entries(judged: Judgement) -> dict[str, dict[str, Any]]:
     return {
-        e.name: {"value": e.value, "unit": e.unit, "low": finite(e.low), "high": finite(e.high), "trusted": e.trusted}
+        e.name: {
+            "value": e.value,
+            "unit": e.unit,
+            "low": finite(e.low),
+            "high": finite(e.high),
+            "trusted": e.trusted,
+            "interval_holds": e.low is not None and not {REMAINS, HELD} & set(e.doubts),
+            "given_low": finite(e.given_low),
+            "given_high": finite(e.given_high),
+            "trusted_given_constants": e.trusted_given_constants,
+        }
         for e in judged.estimates
     }
 
 
-def finite(value: float | None) -> float | None:
-    """Return a float that JSON can hold, None for NaN and infinity."""
-    return None if value is None or not np.isfinite(value) else float(value)
+def record_entries(before: Residuals | None, after: Residuals | None) -> list[dict[str, Any]]:
+    if before is None or after is None:
+        return []
+    return [
+        {
+            "file": old.name, "record": old.record.file, "role": old.record.role, "n_samples": len(was),
+            "noise_rms": finite(old.record.noise.rms), "unit": old.record.unit,
+            "error": {"before": of_output(old, before.candidate), "after": of_output(new, after.candidate)},
+            "curves": {"before": curve_entry(old.times, was), "after": curve_entry(new.times, now)},
+        }
+        for old, was, new, now in zip(before.replays, before.raw, after.replays, after.raw, strict=True)
+    ]  # fmt: skip
+
+
+def of_output(replay: Replay, candidate: Array) -> dict[str, Any]:
+    """Return the errors on one output of one record, for JSON."""
+    errors = record_errors(replay, candidate)
+    outputs = {replay.record.output: errors}
+    return errors_entry(JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)) or {}
+
+
+def candidates_of(found: ClosedLoop) -> dict[str, Any]:
+    """Return the candidates at the declared model, best first, with the projected sensitivities of the scores.
+
+    drop: predicted fall of chi2 as a share of it; reached: that of the full fit with the effect alone, null where there
+    was none. Curves are whitened, in standard deviations of the noise, against the number of the sample.
+    """
+    start = found.before.fit
+    reached: dict[str, float] = {}
+    for fit in found.search.of_size(1):
+        name = fit.active[0].public
+        reached[name] = max(reached.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
+    listed: list[dict[str, Any]] = []
+    for score in found.search.scores_at(start):
+        name = score.key.public
+        if any(entry["effect"] == name for entry in listed):
+            continue
+        behind = projected(start, score.key, found.library)
+        drawn = len(listed) < MOST_DRAWN
+        listed.append({
+            "effect": name, "drop": finite(score.drop / start.chi2), "p": finite(score.p),
+            "reached": finite(reached.get(name)), "share": finite(behind.share), "alignment": finite(behind.alignment),
+            "curve": curve_entry(np.arange(len(behind.change), dtype=float), behind.change) if drawn else None,
+        })  # fmt: skip
+    rest = rest_of(start)
+    edges = found.before.train.data.edges
+    return {
+        "listed": listed,
+        "residual": curve_entry(np.arange(len(rest), dtype=float), rest),
+        "edges": [int(e) for e in edges],
+        "files": [r.name for r in found.before.train.replays],
+    }

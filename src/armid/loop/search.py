@@ -10,20 +10,23 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
-from armid.loop.diagnose import diagnose, train_residuals
+from armid.loop.diagnose import diagnosed, is_significant
 from armid.loop.equivalence import substitutes
-from armid.loop.fit import Fit, fit_from, fit_globally
+from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, fit_globally, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, scores
-from armid.loop.select import Comparison, compare, criterion
 from armid.loop.whitening import WhiteRecords
 
 Array = NDArray[np.float64]
 Trial = Callable[[], Fit]
 T = TypeVar("T")
 MOST_EFFECTS = 6
+# Up to so many effects are tried together where fewer earn nothing and more than noise is left.
+LOOK_AHEAD = 3
 # Of one size so many models are extended: a strong second effect can mislead the choice of the first.
 BEAM = 3
 N_EXCHANGES = 3
+# Models of a round that the log tells.
+N_LOGGED = 5
 # Where no test of what remains is more striking than this, all together, no second effect is looked for: it would need
 # more of the residual than the tests would overlook, and looking costs more than everything before.
 QUIET = 0.1
@@ -39,6 +42,8 @@ REACH = 10.0
 WORTH = 8.0
 # An addition whose statistic stays below this is not looked at further; one in ten thousand asks for 15.
 PROMISING = 12.0
+# Refits stop early; those are finished whose n ln(chi2) is within this of the best of their size, and so many anyhow.
+FAR, N_FINISHED = 50.0, 4
 # Models within this factor of the least chi2 are told apart by the criterion; what they leave has about one character.
 COMPARABLE = 1.5
 
@@ -47,7 +52,7 @@ COMPARABLE = 1.5
 class SearchLevel:
     """Hold the models with one number of effects, best first.
 
-    comparison: of the best with the best of the level before, None for the first.
+    comparison: of the best with the best of the last level that earned its effects, None for the declared model.
     """
 
     fits: tuple[Fit, ...]
@@ -57,37 +62,75 @@ class SearchLevel:
     def best(self) -> Fit:
         return self.fits[0]
 
+    @property
+    def earned(self) -> bool:
+        """Whether its best is preferred to the smaller ones."""
+        return self.comparison is None or self.comparison.earned
+
+
+@dataclass(frozen=True)
+class Round:
+    """Say what one round of the search tried, what it reached, and why it was taken or refused.
+
+    n_tried: models that were fitted. leading: names and chi2 per sample of the best, best first. refused: the threshold
+    in words, "" where the best was taken.
+    """
+
+    n_effects: int
+    n_tried: int
+    leading: tuple[tuple[tuple[str, ...], float], ...]
+    refused: str
+
 
 @dataclass(eq=False)
 class Search:
     """Extend models until nothing earns its parameters.
 
-    fits: every model that was fitted, by its effects. scores: of the candidates at each of them.
+    fits: every model that was fitted, by its effects. scores: of the candidates at each of them. rounds: the log.
     """
 
     library: Library
     fits: dict[frozenset[EffectKey], Fit] = field(default_factory=dict)
     scores: dict[frozenset[EffectKey], list[Score]] = field(default_factory=dict)
+    rounds: list[Round] = field(default_factory=list)
 
-    def run(self) -> list[SearchLevel]:
-        """Return the levels: the declared model, then those whose best earned its place."""
-        declared = accurate(fit_globally(self.library.problem(()), ()), self.library)
-        self.fits[frozenset()] = declared
-        levels = [SearchLevel((declared,))]
-        while len(levels) <= MOST_EFFECTS:
-            level = self.next_level(levels[-1])
-            if level is None or level.comparison is None or not level.comparison.earned:
+    def start(self) -> Fit:
+        """Return the declared model at its estimate."""
+        if frozenset() not in self.fits:
+            self.fits[frozenset()] = accurate(fit_globally(self.library.problem(()), ()), self.library)
+        return self.fits[frozenset()]
+
+    def run(self, most: int = MOST_EFFECTS) -> list[SearchLevel]:
+        """Return the levels: the declared model, and all up to the last whose best earned its effects, at most so many.
+
+        An effect may show only beside another one: where more than noise is left, sets of up to three are tried before
+        the search ends.
+        """
+        levels, earned = [SearchLevel((self.start(),))], 1
+        while len(levels) <= most:
+            level = self.next_level(levels[-1], levels[earned - 1].best)
+            if level is None:
                 break
             levels.append(level)
-        return levels
+            self.library = self.library.about(level.best.records.replays)
+            if level.earned:
+                earned = len(levels)
+            elif len(levels) > LOOK_AHEAD or not is_significant(level.best):
+                break
+        return levels[:earned]
 
-    def next_level(self, last: SearchLevel) -> SearchLevel | None:
-        """Return the best models with one effect more, None where no candidate is worth a fit."""
+    def next_level(self, last: SearchLevel, smaller: Fit) -> SearchLevel | None:
+        """Return the best models with one effect more, None where no candidate is worth a fit.
+
+        smaller: the model with which they are compared.
+        """
         size = len(last.best.active) + 1
-        if last.best.active and diagnose(train_residuals(last.best)).p > QUIET:
+        if last.best.active and (p := diagnosed(last.best).p) > QUIET:
+            self.note_round(size, f"what is left is noise (chance {p:.2g}; below {QUIET:g} the search goes on)")
             return None
         self.extend(last.best)
         if last.best.is_noise and not (self.of_size(size) and promising(last.best, self.of_size(size)[0])):
+            self.note_round(size, "the size of what is left is that of the noise, and no candidate lowers it clearly")
             return None
         distinct: dict[frozenset[EffectKey], Fit] = {}
         for fit in last.fits:  # a model with a shape set free is no other
@@ -95,6 +138,7 @@ class Search:
         for parent in list(distinct.values())[1:BEAM]:
             self.extend(parent)
         if not self.of_size(size) or not promising(self.of_size(size - 1)[0], self.of_size(size)[0]):
+            self.note_round(size, f"no candidate lowers n ln(chi2) by more than {PROMISING:g}")
             return None
         for _ in range(N_EXCHANGES):
             best = self.of_size(size)[0]
@@ -105,10 +149,20 @@ class Search:
             self.free_shapes(f for f in self.of_size(size)[:N_FREED] if f.chi2 <= FREED_WITHIN * best.chi2)
             if self.of_size(size)[0] is best:
                 break
-        smaller, fits = self.of_size(size - 1)[0], self.of_size(size)
+        fits, n_more = self.of_size(size), size - len(smaller.active)
+        # An exchange may have found a better model of the size before.
+        smaller = self.of_size(size - 1)[0] if n_more == 1 else smaller
         self.library.say(f"judging {shown(fits[0].active)}")
         new = [s.n_shapes for s in self.scores_at(smaller) if s.key in fits[0].active and s.key not in smaller.active]
-        return SearchLevel(tuple(fits), compare(smaller, fits[0], len(self.library.candidates), max(new, default=1)))
+        compared = compare(smaller, fits[0], len(self.library.candidates) ** n_more, max(new, default=1), n_more)
+        self.note_round(size, compared.why)
+        return SearchLevel(tuple(fits), compared)
+
+    def note_round(self, size: int, refused: str) -> None:
+        """Note how a round ended."""
+        fits = self.of_size(size)
+        best = {tuple(k.public for k in f.active): f.chi2 / len(f.residual) for f in reversed(fits[: 2 * N_LOGGED])}
+        self.rounds.append(Round(size, len(fits), tuple(reversed(best.items()))[:N_LOGGED], refused))
 
     def scores_at(self, fit: Fit) -> list[Score]:
         active = frozenset(fit.active)
@@ -154,6 +208,19 @@ class Search:
             self.library.say(f"fitting {shown(sorted(active))}")
         found = self.library.each(unless_diverged, new.values())
         self.fits |= {active: fit for active, fit in zip(new, found, strict=True) if fit and np.isfinite(fit.chi2)}
+        for size in {len(active) for active in new}:
+            self.finish(size)
+
+    def finish(self, size: int) -> None:
+        """Bring the models near the best of a size to their estimates; the others stay where a few steps led."""
+        while True:
+            fits = self.of_size(size)
+            near = [f for i, f in enumerate(fits) if f.rough and (i < N_FINISHED or far_behind(f, fits[0]) < FAR)]
+            if not near:
+                break
+            found = self.library.each(unless_diverged, [partial(finished, f, self.library) for f in near])
+            done = ((f, fit or replace(f, rough=False)) for f, fit in zip(near, found, strict=True))
+            self.fits |= {frozenset(f.active): fit for f, fit in done}
 
     def reduced(self, fit: Fit, rest: Active) -> Fit:
         if frozenset(rest) not in self.fits:
@@ -164,6 +231,18 @@ class Search:
                 start = start_of(records, self.fits[frozenset()].values)
             self.fits[frozenset(rest)] = accurate(fit_from(records, rest, [start]), self.library)
         return self.fits[frozenset(rest)]
+
+    def pruned(self, fit: Fit) -> Fit:
+        """Return the fit without the effects that may as well be at their nulls, the others fitted again from there."""
+        for key in fit.active:
+            if not fit.needs(key):
+                rest = tuple(k for k in fit.active if k != key)
+                again = unless_diverged(partial(finished_near, rest, fit.values, self.library))
+                known = self.fits.get(frozenset(rest))
+                if again is not None and (known is None or again.chi2 < known.chi2):
+                    self.fits[frozenset(rest)] = again
+                return self.pruned(self.reduced(fit, rest))
+        return fit
 
     def ordered(self, fit: Fit) -> Fit:
         """Return the fit with its effects in the order in which they would be added, the most telling first."""
@@ -195,9 +274,12 @@ def shown(active: Iterable[EffectKey]) -> str:
     return " + ".join(key.public for key in active)
 
 
+def far_behind(fit: Fit, best: Fit) -> float:
+    return float(max(fit.independent, best.independent) * np.log(fit.chi2 / best.chi2))
+
+
 def promising(smaller: Fit, larger: Fit) -> bool:
-    n_eff = max(smaller.independent, larger.independent)
-    return bool(n_eff * np.log(smaller.chi2 / larger.chi2) > PROMISING)
+    return far_behind(smaller, larger) > PROMISING
 
 
 def refitted(current: Fit, found: Score, library: Library) -> Fit:
@@ -207,12 +289,20 @@ def refitted(current: Fit, found: Score, library: Library) -> Fit:
     chi2 = records.chi2(np.array(found.starts[:N_TRIED]))
     first, second = (found.starts[i] for i in np.resize(np.argsort(chi2, kind="stable")[:2], 2))
     starts = [first, second] if np.max(np.abs(second - first)) > 0.02 else [first]
-    return accurate(fit_from(records, active, starts), library)
+    return fit_from(records, active, starts, rough=True)
 
 
 def fit_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
     records = library.problem(active, values)
-    return accurate(fit_from(records, active, [start_of(records, values)]), library)
+    return fit_from(records, active, [start_of(records, values)], rough=True)
+
+
+def finished(fit: Fit, library: Library) -> Fit:
+    return accurate(fit_from(fit.records, fit.active, [fit.z]), library)
+
+
+def finished_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
+    return finished(fit_near(active, values, library), library)
 
 
 def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
@@ -220,13 +310,13 @@ def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
 
 
 def accurate(fit: Fit, library: Library) -> Fit:
-    """Return the fit, made again with finer steps where it ended where the engine's are too coarse."""
+    """Return the fit about its own starts, with finer steps where it ended where the engine's are too coarse."""
     finer = library.recalibrated(fit.active, fit.values)
-    return fit if finer is None else fit_from(finer, fit.active, [fit.z])
+    return with_own_starts(fit if finer is None else fit_from(finer, fit.active, [fit.z]))
 
 
 # Shares of their range from which all shapes begin; then each alone from the best of so many places along its range:
-# the best period of a sampled control is a narrow one.
+# the best period of a sampled control is a narrow one; of what is no time an eighth of them will do.
 STARTS, N_PLACES = (0.03, 0.5), 384
 
 
@@ -247,14 +337,16 @@ def with_free_shapes(fit: Fit, key: EffectKey, library: Library) -> Fit:
     starts = [np.where(free, share, z) for share in STARTS]
     # The strength has taken up what it could of the shape's part, so that each shape is tried without it too.
     rest = records.shares(at_null(records, fit.candidate, key)[records.space.free])
-    starts += [best_along(records, at, place) for place in map(int, np.flatnonzero(free)) for at in (z, rest)]
+    units = [records.model.parameters[n].unit for n in records.space.free_names]
+    starts += [best_along(records, at, place, N_PLACES if units[place] == "s" else N_PLACES // 8)
+               for place in map(int, np.flatnonzero(free)) for at in (z, rest)]  # fmt: skip
     return fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts])
 
 
-def best_along(records: WhiteRecords, z: Array, place: int) -> Array:
+def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -> Array:
     """Return a candidate with one of its free parameters where it does best, the others as they are, (n_free,)."""
-    tried = np.tile(z, (N_PLACES, 1))
-    tried[:, place] = (np.arange(N_PLACES) + 0.5) / N_PLACES
+    tried = np.tile(z, (n, 1))
+    tried[:, place] = (np.arange(n) + 0.5) / n
     return np.asarray(tried[np.argmin(records.chi2(tried))])
 
 

@@ -18,7 +18,9 @@ from scipy.signal import lfilter
 from armid.estimation.information import MISFIT
 from armid.estimation.least_squares import LeastSquaresProblem
 from armid.model import Plant
+from armid.problem.problem import signals_of
 from armid.record import Record
+from armid.record.broken import broken_samples
 from armid.record.noise import correlation_sum
 
 Array = NDArray[np.float64]
@@ -27,6 +29,8 @@ LEAST_NOISE = 5e-5
 MOST_TERMS, FEWEST_FOR_COLOUR, LAGS = 8, 50, 500
 # A single manoeuvre is left out of fits in so many blocks of time.
 BLOCKS = 5
+# Motions that correlate above this are one trajectory.
+ALIKE = 0.98
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,16 +78,18 @@ class NoiseLevel:
 
 
 def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> tuple[NoiseLevel, ...]:
-    """Return the noise of each record: pooled over the rests of all records that were sampled at one interval.
+    """Return the noise of each record: pooled over the rests of all records of one output and sampling interval.
 
-    plant: its speed scale gives the floor below which the engine's error would count as a discrepancy. others: records
-    of the same sensor whose rests count too.
+    plant: the sizes of its outputs give the floor below which the engine's error would count as a discrepancy. others:
+    records of the same sensors whose rests count too.
     """
-    floor = LEAST_NOISE * plant.scales.speed
-    intervals = [r.manoeuvre.interval for r in records]
-    pooled = {t: pooled_level([r for r in (*records, *others) if r.manoeuvre.interval == t], floor)
-              for t in set(intervals)}  # fmt: skip
-    return tuple(pooled[t] for t in intervals)
+    sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
+    sensors = [(r.output, r.manoeuvre.interval) for r in records]
+    pooled = {
+        (output, t): pooled_level([r for r in (*records, *others) if (r.output, r.manoeuvre.interval) == (output, t)],
+                                  LEAST_NOISE * sizes[output]) for output, t in set(sensors)
+    }  # fmt: skip
+    return tuple(pooled[sensor] for sensor in sensors)
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseLevel:
@@ -142,14 +148,16 @@ def yule_walker(covariance: Array, order: int) -> tuple[Array, float]:
 
 @dataclass(frozen=True, eq=False)
 class WhitenedData:
-    """Hold records with their noise.
+    """Hold records with their noise, the outputs of one file as a record each.
 
-    levels: noise of each record. kept: which of all samples enter fits, (n_samples,).
+    levels: noise of each record. kept: which of all samples enter fits, (n_samples,). sound: 0 where a sample is no
+    data, else 1, (n_samples,); None where all are data.
     """
 
     records: tuple[Record, ...]
     levels: tuple[NoiseLevel, ...]
     kept: NDArray[np.bool_]
+    sound: Array | None = None
 
     @cached_property
     def lengths(self) -> tuple[tuple[int, ...], ...]:
@@ -175,7 +183,9 @@ class WhitenedData:
     def white(self, signals: Sequence[Array]) -> Array:
         """Return signals of all records, each (n_candidates, n_samples of the record), whitened and end to end."""
         triples = zip(self.levels, signals, self.lengths, strict=True)
-        return np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
+        white = np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
+        # What is no data weighs nothing, whoever asks.
+        return white if self.sound is None else white * self.sound
 
     def parts(self) -> list[NDArray[np.int64]]:
         """Return what is left out in turn, as numbers of samples: one manoeuvre with its repeats, or blocks of time.
@@ -185,7 +195,31 @@ class WhitenedData:
         names = [r.repeat_of or r.file for r in self.records]
         pairs = list(zip(self.by_record(np.arange(self.edges[-1])), names, strict=True))
         whole = [np.concatenate([x for x, n in pairs if n == name]) for name in dict.fromkeys(names)]
-        return whole if len(whole) > 1 else list(np.array_split(whole[0], BLOCKS))
+        return whole if len(whole) > 1 else self.blocks(whole[0])
+
+    def blocks(self, part: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+        """Return a part in blocks of time, each with all outputs there."""
+        outputs = np.repeat([r.output for r in self.records], np.diff(self.edges))[part]
+        each = [np.array_split(part[outputs == name], BLOCKS) for name in dict.fromkeys(outputs.tolist())]
+        return [np.concatenate(block) for block in zip(*each, strict=True)]
+
+    def groupings(self) -> list[list[NDArray[np.int64]]]:
+        """Return what may be left out in turn: by manoeuvre, by motions that are alike, by the constants of a record.
+
+        Each grouping is a list of parts, as numbers of samples. One that joins nothing, or everything, is none.
+        """
+        places = self.by_record(np.arange(self.edges[-1]))
+        found = [self.parts()]
+        # of each file the first output
+        files = dict(reversed({r.file: r for r in reversed(self.records)}.items()))
+        alike = dict(zip(files, alike_motions(list(files.values())), strict=True))
+        set_for = [str(sorted(set_constants(r).items())) for r in self.records]
+        for labels in ([str(alike[r.file]) for r in self.records], set_for):
+            names = list(dict.fromkeys(labels))
+            if 1 < len(names) < len(found[0]):
+                found.append([np.concatenate([x for x, n in zip(places, labels, strict=True) if n == name])
+                              for name in names])  # fmt: skip
+        return found
 
     def without(self, part: NDArray[np.int64]) -> "WhitenedData":
         kept = self.kept.copy()
@@ -216,10 +250,46 @@ class WhitenedData:
         return np.concatenate(found)
 
 
+def alike_motions(records: Sequence[Record]) -> list[int]:
+    """Return the number of the first record whose measured motion each is like."""
+    labels: list[int] = []
+    for i, record in enumerate(records):
+        earlier = (k for k in range(i) if labels[k] == k and records[k].output == record.output)
+        like = (k for k in earlier if correlated(records[k].measured, record.measured) > ALIKE)
+        labels.append(next(like, i))
+    return labels
+
+
+def correlated(a: Array, b: Array) -> float:
+    n = min(len(a), len(b))
+    if n < 2 or max(len(a), len(b)) > 1.05 * n or min(np.ptp(a[:n]), np.ptp(b[:n])) == 0.0:
+        return 0.0
+    return float(np.corrcoef(a[:n], b[:n])[0, 1])
+
+
+def set_constants(record: Record) -> dict[str, float]:
+    """Return the constants of a record but for those of its own start."""
+    return {name: value for name, value in record.constants.items() if not name.startswith("start_")}
+
+
 def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
-    """Return records with their noise; others: records of the same sensor whose rests tell of its noise too."""
-    n = sum(r.n_samples for r in records)
-    return WhitenedData(tuple(records), noise_levels(records, plant, others), np.ones(n, dtype=np.bool_))
+    """Return records with their noise; others: records of the same sensors whose rests tell of their noise too."""
+    each = tuple(one for r in records for one in r.each)
+    levels = noise_levels(each, plant, others)
+    sound = np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
+    every = np.ones(len(sound), dtype=np.bool_)
+    return WhitenedData(each, levels, every, None if sound.all() else sound)
+
+
+def soundness(record: Record, reach: int) -> Array:
+    """Return 0 for each sample in the windows of a record that is no data, and for as many behind it, else 1."""
+    broken = np.zeros(record.measured.size, dtype=np.bool_)
+    for found in broken_samples(record):
+        broken |= found.samples
+    for _ in range(reach):
+        broken[1:] |= broken[:-1]
+    places = [np.arange(p.window.start, p.window.stop) + p.start_index for p in record.pieces]
+    return np.where(broken[np.concatenate(places)], 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +302,7 @@ class WhiteRecords(LeastSquaresProblem):
         return self.data.white(signals)[..., self.data.kept]
 
     def whole_signals(self, candidates: Array) -> Array:
-        return self.data.white([r.signal(candidates) for r in self.replays])
+        return self.data.white(signals_of(self.replays, candidates))
 
     def with_all_samples(self) -> "WhiteRecords":
         if self.data.kept.all():

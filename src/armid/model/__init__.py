@@ -8,9 +8,9 @@ from armid.model.catalogue import EFFECTS, PLANTS
 from armid.model.effect import Effect, Guard, State
 from armid.model.model import Model, applicable, refusal_of
 from armid.model.parameter import Parameter, Scales
-from armid.model.plant import Constant, Input, Manoeuvre, ManoeuvreKey, Plant
+from armid.model.plant import Constant, Input, Manoeuvre, ManoeuvreKey, Output, Plant
 
 __all__ = [
     "EFFECTS", "PLANTS", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
-    "Parameter", "Plant", "Scales", "State", "applicable", "refusal_of",
+    "Output", "Parameter", "Plant", "Scales", "State", "applicable", "refusal_of",
 ]  # fmt: skip

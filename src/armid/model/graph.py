@@ -5,8 +5,11 @@ import copy
 import inspect
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import FunctionType, LambdaType
+from typing import Any
+
+import numpy as np
 
 from armid.errors import ArmidError, nearest
 from armid.model.effect import Effect, Equation
@@ -36,6 +39,12 @@ class Node:
         """Keys that must be known before."""
         return self.terms or tuple(key for _, key in self.arguments)
 
+    def value(self, known: Mapping[str, Any]) -> Any:
+        """Return the value of the node by its plain function; known: key -> value of what it needs."""
+        if self.function is None:
+            return sum((known[t] for t in self.terms), 0.0)
+        return self.function(**{a: known[k] for a, k in self.arguments})
+
 
 @dataclass
 class Graph:
@@ -50,7 +59,6 @@ class Graph:
         self.nodes[node.key] = node
 
     def of_kind(self, *kinds: str) -> list[Node]:
-        """Return the nodes of some kinds."""
         return [n for n in self.nodes.values() if n.kind in kinds]
 
     def order(self, wanted: Iterable[str]) -> list[Node]:
@@ -74,6 +82,16 @@ class Graph:
             visit(key, ())
         return [n for n in done.values() if n.kind not in LEAVES]
 
+    def values(self, wanted: Iterable[str], known: Mapping[str, Any]) -> dict[str, Any]:
+        """Return key -> value of what is known and of all that leads to the wanted nodes, by their plain functions.
+
+        known: key -> number or array of every leaf that they need.
+        """
+        found = dict(known)
+        for node in self.order(wanted):
+            found[node.key] = node.value(found)
+        return found
+
     def is_static(self, key: str) -> bool:
         """Tell whether a node depends on parameters and constants alone."""
         node = self.nodes[key]
@@ -90,18 +108,45 @@ def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:
     graph = Graph()
     for key, kind in leaves(plant, effects):
         graph.add(Node(key, kind))
+    for name in plant.rough:
+        arguments = (("value", name), ("error", f"{name}_error"))
+        graph.add(Node(f"{name}__corrected", "quantity", function=corrected, arguments=arguments))
     for owner in (None, *effects):
         add_equations(graph, plant, owner)
     for port in plant.ports:
         terms = tuple(f"{e.name}__{port}" for e in effects if port in e.adds)
         graph.add(Node(port, "port", terms=terms))
-    graph.order(graph.nodes)
+    graph.order(graph.nodes)  # a circle is refused here, and again below one that begins at the start
     for node in graph.of_kind("initial"):
-        if not all(graph.is_static(k) or graph.nodes[k].kind == "initial" for k in node.needs):
-            state = node.key.removeprefix("initial__").replace("__", ".")
-            raise ArmidError(f"the initial value of '{state}' depends on what moves: parameters, constants and initial "
-                             "states are expected")  # fmt: skip
+        graph.nodes[node.key] = replace(node, arguments=tuple((a, at_start(graph, k)) for a, k in node.arguments))
+    graph.order(graph.nodes)
     return graph
+
+
+def at_start(graph: Graph, key: str) -> str:
+    """Return the key of what a node is at the start; quantities that move are evaluated there, at the first inputs."""
+    node, started = graph.nodes[key], f"initial__{key}"
+    if started in graph.nodes:
+        return started
+    if node.kind in ("input", "time", "initial") or graph.is_static(key):
+        return key
+    graph.nodes[started] = replace(node, key=started, kind="initial")  # before its needs: a circle ends
+    if node.kind == "latch":
+        node = replace(node, function=switched_at_start, arguments=(("guard", f"guard__{key}"),))
+    arguments = tuple((a, at_start(graph, k)) for a, k in node.arguments)
+    terms = tuple(at_start(graph, k) for k in node.terms)
+    graph.nodes[started] = replace(node, key=started, kind="initial", arguments=arguments, terms=terms)
+    return started
+
+
+def corrected(value: float, error: float) -> float:
+    """Return a value that is known roughly, error its relative error."""
+    return value * (1.0 + error)
+
+
+def switched_at_start(guard: float) -> Any:
+    """Return 1 where a one-way switch has switched before the start, else 0."""
+    return np.where(guard <= 0.0, 1.0, 0.0)
 
 
 def leaves(plant: Plant, effects: tuple[Effect, ...]) -> list[tuple[str, str]]:
@@ -161,7 +206,7 @@ def bind(function: Equation, label: str, names: Mapping[str, str]) -> tuple[tupl
 def names_for(plant: Plant, effect: Effect | None, initial: bool) -> dict[str, str]:
     """Return name -> key of what equations of one owner may ask for; initial: in an initial value."""
     shared = [*(p.name for p in plant.parameters), *(c.name for c in plant.constants), *plant.quantities, *plant.ports]
-    names = {n: n for n in shared}
+    names = {n: n for n in shared} | {n: f"{n}__corrected" for n in plant.rough}
     names |= {s.name: f"initial__{s.name}" if initial else s.name for s in plant.states}
     if not initial:
         names |= {n: n for n in [*(i.name for i in plant.inputs), *(g.name for g in plant.guards if g.latch), "time"]}
@@ -185,10 +230,8 @@ def spelled(key: str) -> str:
 
 def right_hand_side(node: Node) -> str:
     """Return the text right of the equals sign."""
-    if node.kind == "port":
-        return " + ".join(spelled(t) for t in node.terms) or "0"
     if node.function is None:
-        return ""
+        return " + ".join(spelled(t) for t in node.terms) or "0"
     expression = returned_expression(node.function)
     if expression is None:
         return f"{node.function.__name__}({', '.join(spelled(k) for _, k in node.arguments)})"
@@ -205,7 +248,7 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
     rates = graph.of_kind("rate")
     lines += [f"  d {spelled(r.key.removeprefix('rate__'))}/dt = {right_hand_side(r)}" for r in rates]
     guards = graph.of_kind("guard")
-    needed = graph.order([n.key for n in (*rates, *guards)] + [plant.output])
+    needed = graph.order([n.key for n in (*rates, *guards)] + [o.signal for o in plant.outputs])
     inner = [n for n in needed if n.kind in ("quantity", "port", "term")]
     lines += ["  where"] + [f"    {spelled(n.key)} = {right_hand_side(n)}{unit_of(n)}" for n in inner]
     lines += ["  start"] + [
@@ -219,7 +262,9 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
         what = "switches once to 1 when" if name in latches else "kink where"
         sign = "<= 0" if name in latches else "= 0"
         lines.append(f"  {spelled(name)}: {what} {right_hand_side(guard)} {sign}")
-    lines.append(f"  recorded [{plant.output_unit}]: {plant.output}")
+    for o in plant.outputs:
+        name = "" if plant.records_one_speed else f" {o.name}"
+        lines.append(f"  recorded{name} [{o.unit}]: {o.signal}")
     return "\n".join(lines)
 
 

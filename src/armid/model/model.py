@@ -11,7 +11,7 @@ from armid.model.parameter import Parameter, resolve
 from armid.model.plant import Plant
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """Compose a plant with effects: `model + effect`, `model - "effect"`; `print(model)` shows the equations.
 
@@ -37,6 +37,10 @@ class Model:
         if name not in names:
             raise ArmidError(f"effect '{name}' is not in the model: {nearest(name, names)}")
         return replace(self, effects=tuple(e for e in self.effects if e.name != name))
+
+    def __repr__(self) -> str:
+        named = " + ".join([self.plant.name, *(e.name for e in self.effects)])
+        return f"<Model {named}: parameters {', '.join(self.parameters)}>"
 
     def __str__(self) -> str:
         return equations_text(self.plant, self.effects, self.graph)
@@ -69,6 +73,11 @@ class Model:
     def constants(self) -> dict[str, float]:
         """Name -> default value, SI."""
         return {c.name: c.value for c in self.plant.constants}
+
+    @cached_property
+    def starts(self) -> list[str]:
+        """Constants in which candidates that are simulated together may differ: the starts that a fit may estimate."""
+        return [] if self.plant.records_one_speed else list(dict.fromkeys(self.plant.start_constants.values()))
 
     def constant_values(self, given: Mapping[str, float]) -> list[float]:
         """Return all constants in order, the given ones replacing defaults.

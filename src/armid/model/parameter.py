@@ -3,6 +3,8 @@
 import keyword
 import math
 import re
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -47,6 +49,18 @@ class Parameter:
         check_name(self.name, "parameter")
         if not self.low < self.high:
             raise ArmidError(f"parameter '{self.name}' has low {self.low} and high {self.high}: low < high is expected")
+
+
+# By such a factor a value misses its declared range that was told in another unit: degrees, percent, MPa.
+FAR = 20.0
+
+
+def warn_if_far(parameter: Parameter, values: Sequence[float], where: str) -> None:
+    """Warn where every value is far outside the declared range (SI), as a forgotten factor of the unit gives."""
+    low, high = parameter.low, parameter.high
+    if all(abs(v) > FAR * max(abs(low), abs(high)) or (low > 0.0 and FAR * v < low) for v in values):
+        declared = f"{low:g} to {high:g} {parameter.unit}"
+        warnings.warn(f"{where} is far outside the declared range, {declared}; it is taken as it is", stacklevel=3)
 
 
 WORDS = ("effort", "speed", "inertia", "s", "1")

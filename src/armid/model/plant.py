@@ -1,7 +1,9 @@
 """What the machine was told to do, on the time grid of its record."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from inspect import signature
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError, nearest
 from armid.model.effect import Equation, Guard, State
 from armid.model.parameter import Parameter, Scales, check_name
+from armid.units import SUFFIXES
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,14 @@ class Manoeuvre:
         """Return the manoeuvre cut after its first samples."""
         return replace(self, n_samples=n_samples, inputs={k: v[:n_samples] for k, v in self.inputs.items()})
 
+    def part(self, start: int, n_samples: int, state: Mapping[str, float]) -> "Manoeuvre":
+        """Return the part from one sample on, with the constants that give the state there."""
+        return replace(
+            self, n_samples=n_samples, start_time=self.start_time + start * self.interval,
+            constants={**self.constants, **state},
+            inputs={name: values[start : start + n_samples] for name, values in self.inputs.items()},
+        )  # fmt: skip
+
     def likeness(self) -> tuple[object, ...]:
         """Return what two manoeuvres have in common when a machine answers both alike, hashable; not the start time."""
         inputs = tuple((name, values.tobytes()) for name, values in sorted(self.inputs.items()))
@@ -47,12 +58,19 @@ HOLDS = ("", "linear", "zero")
 
 @dataclass(frozen=True)
 class Constant:
-    """Declare a known quantity with its default value, SI."""
+    """Declare a known quantity with its default value, SI.
+
+    tolerance: relative half-range within which the value is known: 0 for an exact one, None where that is not said,
+    which counts as exact until a campaign says otherwise. low, high: what is physically possible, ends included.
+    """
 
     name: str
     value: float
     unit: str
     note: str = ""
+    tolerance: float | None = None
+    low: float = -math.inf
+    high: float = math.inf
 
     def __post_init__(self) -> None:
         check_name(self.name, "constant")
@@ -108,6 +126,56 @@ class ManoeuvreKey:
 
 
 @dataclass(frozen=True)
+class Output:
+    """Declare a signal that is recorded.
+
+    name: as campaigns, reports and fitnesses name it. signal: the state or quantity that is recorded. unit: SI, one of
+    rad, rad/s, m, m/s, A, N, N m, V.
+    columns: headers of a record that bring it, each with the end of a unit (`hub_angle_deg`); none: the name with each.
+    port: where effects of its sensor (bias, scale, lag) are added, a port that stands in the equation of the signal
+        (recorded = angle + port); "" for none.
+
+    Raises ArmidError for another unit, and for a column without the end of the unit.
+    """
+
+    name: str
+    signal: str
+    unit: str
+    columns: tuple[str, ...] = ()
+    port: str = ""
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "output")
+        if self.unit not in SUFFIXES:
+            raise ArmidError(f"output '{self.name}' has the unit '{self.unit}': {nearest(self.unit, SUFFIXES)}")
+        for column in self.columns:
+            if not any(column.endswith(f"_{end}") for end in SUFFIXES[self.unit]):
+                ends = " or ".join(f"_{end}" for end in SUFFIXES[self.unit])
+                raise ArmidError(f"output '{self.name}' has the column '{column}': a name that ends in {ends} is "
+                                 "expected")  # fmt: skip
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """Header of a column that brings the output -> factor that turns it into SI."""
+        ends = SUFFIXES[self.unit]
+        columns = self.columns or tuple(f"{self.name}_{end}" for end in ends)
+        return {c: next(factor for end, factor in ends.items() if c.endswith(f"_{end}")) for c in columns}
+
+
+# Unit of the one speed that a plant records which declares no outputs -> its name and the columns that bring it.
+SPEEDS = {
+    "rad/s": ("angular_velocity", ("angular_velocity_deg_s", "angular_velocity_rad_s")),
+    "m/s": ("velocity", ("velocity_m_s",)),
+}
+
+
+def speed_output(signal: str, unit: str) -> Output:
+    """Return the output that `output` and `output_unit` of a plant declare."""
+    name, columns = SPEEDS.get(unit, (signal, ()))
+    return Output(name, signal, unit, columns)
+
+
+@dataclass(frozen=True, repr=False)
 class Plant:
     """Declare a machine: equations are plain scalar functions bound by argument name.
 
@@ -126,7 +194,8 @@ class Plant:
     guards: where the equations have a kink or switch; without one at a limit or a step of theirs the engine is slower
         and less accurate there.
     keys: further keys of a record in campaign.toml that set constants.
-    output: the state or quantity that is recorded; output_unit: "rad/s" or "m/s".
+    outputs: the signals that are recorded; a record brings any of them. Where it is one speed, `output` (the state or
+        quantity) and `output_unit` ("rad/s" or "m/s") say it as well; else these are those of the first output.
     aliases: further names for states and quantities, so that effects can be written once for many plants: ours ask for
         `omega` (speed), `theta` (position), `drive_effort` and `load_effort` (what drives, what it works against).
     from_rest: True when a record starts at t = 0 from the declared initial state; False when it starts at its first
@@ -135,7 +204,8 @@ class Plant:
     scales: typical largest effort and speed; the engine's accuracy is a share of the speed, and effects give their
         bounds as multiples of both. scales_from_records: a campaign sets them instead, from its train records:
         effort = max |`gain` x first input|, speed = max |measured|.
-    variants: sibling plants for another unit of the recorded signal.
+    variants: of a plant with one speed for its output, sibling plants for another unit of it.
+    rough: parameters and constants that are known roughly: the equations take NAME (1 + NAME_error), that one a port.
 
     Raises ArmidError for a name that is declared twice or that nobody declares.
     """
@@ -143,32 +213,78 @@ class Plant:
     name: str
     parameters: tuple[Parameter, ...]
     states: tuple[State, ...]
-    output: str
-    output_unit: str
     scales: Scales
+    output: str = ""
+    output_unit: str = ""
     quantities: Mapping[str, Equation] = field(default_factory=dict)
     constants: tuple[Constant, ...] = ()
     inputs: tuple[Input, ...] = ()
     ports: Mapping[str, str] = field(default_factory=dict)
     guards: tuple[Guard, ...] = ()
     keys: tuple[ManoeuvreKey, ...] = ()
+    outputs: tuple[Output, ...] = ()
     aliases: Mapping[str, str] = field(default_factory=dict)
     from_rest: bool = True
     scales_from_records: bool = False
     variants: tuple["Plant", ...] = ()
     note: str = ""
+    rough: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        names = ", ".join(p.name for p in self.parameters)
+        return f"<Plant {self.name} [{self.output_unit}]: parameters {names}; ports {', '.join(self.ports) or 'none'}>"
 
     def __post_init__(self) -> None:
         check_name(self.name, "plant")
+        self._fill_outputs()
         for name in (*self.quantities, *self.ports, *self.aliases):
             check_name(name, "quantity, port or alias")
         twice = sorted({n for n in self.declared if self.declared.count(n) > 1})
         if twice:
             raise ArmidError(f"plant '{self.name}' declares '{twice[0]}' twice: each name once is expected")
-        uses = [("records", self.output), *((f"has the alias '{a}' for", n) for a, n in self.aliases.items())]
+        uses = [("records", o.signal) for o in self.outputs]
+        uses += [(f"records '{o.name}' through the port", o.port) for o in self.outputs if o.port]
+        uses += [(f"has the alias '{a}' for", n) for a, n in self.aliases.items()]
         for use, name in uses:
             if name not in self.declared:
                 raise ArmidError(f"plant '{self.name}' {use} '{name}': {nearest(name, self.declared)}")
+
+    def _fill_outputs(self) -> None:
+        """Bring `outputs`, `output` and `output_unit` together, whichever of them was given."""
+        first = self.outputs[0] if self.outputs else None
+        if self.output and (first is None or self.records_one_speed):
+            # a copy with another unit brings the outputs of the plant that it was made from
+            first = speed_output(self.output, self.output_unit)
+            object.__setattr__(self, "outputs", (first,))
+        names = [o.name for o in self.outputs]
+        if first is None or len(set(names)) < len(names):
+            raise ArmidError(f"plant '{self.name}' records {', '.join(names) or 'nothing'}: at least one output, each "
+                             "name once, is expected")  # fmt: skip
+        given = (self.output or first.signal, self.output_unit or first.unit)
+        if given != (first.signal, first.unit):
+            raise ArmidError(f"plant '{self.name}' declares outputs and the output '{given[0]}' in {given[1]}: one of "
+                             f"them, or the first output '{first.signal}' in {first.unit}, is expected")  # fmt: skip
+        object.__setattr__(self, "output", first.signal)
+        object.__setattr__(self, "output_unit", first.unit)
+
+    @property
+    def records_one_speed(self) -> bool:
+        """Tell whether `output` and `output_unit` alone would declare the same."""
+        return len(self.outputs) == 1 and self.outputs[0] == speed_output(self.outputs[0].signal, self.outputs[0].unit)
+
+    @property
+    def start_constants(self) -> dict[str, str]:
+        """State -> the constant that is its initial value, none where the plant starts from rest."""
+        names = {c.name for c in self.constants}
+        asked = {s: list(signature(s.initial).parameters) for s in self.states if not self.from_rest}
+        return {s.name: a[0] for s, a in asked.items() if len(a) == 1 and a[0] in names and s.initial(1.25) == 1.25}
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """What is large for each output, SI: a speed as the scale says, the way of a second, an effort, else 1."""
+        size = dict.fromkeys(("rad/s", "m/s", "rad", "m"), self.scales.speed)
+        size |= dict.fromkeys(("N", "N m"), self.scales.effort)
+        return tuple(size.get(o.unit, 1.0) for o in self.outputs)
 
     @property
     def declared(self) -> list[str]:
@@ -178,6 +294,16 @@ class Plant:
             *(i.name for i in self.inputs), *self.quantities, *self.ports, *(g.name for g in self.guards if g.latch),
             *self.aliases,
         ]  # fmt: skip
+
+    def recording(self, names: Collection[str]) -> "Plant":
+        """Return the plant with some of its outputs alone."""
+        kept = tuple(o for o in self.outputs if o.name in names)
+        return self if kept == self.outputs else replace(self, output="", output_unit="", outputs=kept)
+
+    def known_roughly(self, names: Iterable[str]) -> "Plant":
+        """Return the plant with a port `NAME_error` for the relative error of some parameters and constants."""
+        rough = tuple(names)
+        return replace(self, rough=rough, ports={**self.ports, **{f"{name}_error": "1" for name in rough}})
 
     def for_unit(self, unit: str) -> "Plant":
         """Return the sibling whose recorded signal has the unit.

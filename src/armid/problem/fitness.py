@@ -1,21 +1,20 @@
 """What a fitness is: a number per candidate to minimise, and how the records of a campaign join.
 
-No temporary of the population's size is made. A candidate that holds a NaN or an infinity gets +inf.
+No temporary of the population's size is made. A candidate that holds a NaN or an infinity gets +inf. What is compiled
+stands in similarity.py and is imported at the first comparison: fitnesses are named and listed without the compiler.
 """
 
 import inspect
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from armid.errors import ArmidError, nearest
-from armid.problem.similarity import as_series, has_failed, numerical_similarity, scored
 
 Array = NDArray[np.float64]
 SERIES = ("measured", "simulated")
@@ -34,7 +33,8 @@ class Fitness:
     finish: applied to the joined values, such as a square root; None: nothing.
     weigh: noise rms of a record [signal's unit] -> weight w of its residual, where the finished value is a rising
         function of sum w^2 (x - x')^2 over all samples of all records; None: it has no such form.
-    unit: of the finished value; note: what it is, in words.
+    unit: of the finished value; note: what it is, in words. output: the one that it looks at, "" for all, each divided
+    by its noise.
     Raises ArmidError for a function that is none or asks for something unknown, and for an unknown join.
     """
 
@@ -45,6 +45,7 @@ class Fitness:
     unit: str = "1"
     note: str = ""
     weigh: Callable[[float], float] | None = None
+    output: str = ""
     asks: tuple[str, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -61,6 +62,8 @@ class Fitness:
         interval: [s]; noise: [signal's unit]; needed when the function asks for them.
         Raises ArmidError when one is missing and when the function returns anything but one number per candidate.
         """
+        from armid.problem.similarity import as_series, has_failed
+
         x, rows = as_series(measured, simulated)
         given = {"measured": x, "simulated": rows, "interval": interval, "noise": noise}
         for name in self.asks:
@@ -83,6 +86,17 @@ class Fitness:
         if self.weigh is None:
             raise ArmidError(f"fitness '{self.name}' is no sum of squares, least squares expects rmse or likelihood")
         return self.weigh(noise)
+
+
+def fitness_of_name(name: str, known: Mapping[str, Fitness]) -> Fitness:
+    """Return the fitness of a name, or of a name and an output: `rmse:hub_angle`.
+
+    Raises ArmidError for an unknown fitness.
+    """
+    first, _, output = name.partition(":")
+    if first not in known:
+        raise ArmidError(f"fitness '{first}' is not known: {nearest(first, known)}")
+    return replace(known[first], name=name, output=output) if output else known[first]
 
 
 def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
@@ -157,8 +171,10 @@ def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
 
     measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
     """
+    from armid.problem.similarity import as_series, sums_of_squares
+
     x, rows = as_series(measured, simulated)
-    return np.asarray(_sums_of_squares(x, rows)) / x.size
+    return np.asarray(sums_of_squares(x, rows)) / x.size
 
 
 def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
@@ -166,11 +182,13 @@ def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
 
     Raises ArmidError for a measured series that is zero throughout.
     """
+    from armid.problem.similarity import as_series, sums_of_squares
+
     x, rows = as_series(measured, simulated)
     whole = float(np.square(x).sum())
     if whole == 0.0:
         raise ArmidError("the measured series is zero throughout, expected an rms above 0 to divide by")
-    return np.asarray(_sums_of_squares(x, rows)) / whole
+    return np.asarray(sums_of_squares(x, rows)) / whole
 
 
 def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array:
@@ -178,9 +196,11 @@ def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array
 
     noise: rms of the measuring noise [signal's unit]. Raises ArmidError unless it is a number above 0.
     """
+    from armid.problem.similarity import as_series, sums_of_squares
+
     weight = inverse_noise(noise)
     x, rows = as_series(measured, simulated)
-    return weight**2 * np.asarray(_sums_of_squares(x, rows))
+    return weight**2 * np.asarray(sums_of_squares(x, rows))
 
 
 def inverse_noise(noise: float) -> float:
@@ -194,24 +214,6 @@ def unity(noise: float) -> float:
     return 1.0
 
 
-# Neither nnan nor ninf may be added: a NaN in y has to reach the sum.
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def _sum_of_squares(x, y):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for i in range(x.size):
-        total += (x[i] - y[i]) ** 2
-    return total
-
-
-@njit(cache=True, nogil=True)
-def _sums_of_squares(x, rows):  # type: ignore[no-untyped-def]
-    sums = np.empty(rows.shape[0])
-    for c in range(rows.shape[0]):
-        total = _sum_of_squares(x, rows[c])
-        sums[c] = np.inf if np.isnan(total) else total
-    return sums
-
-
 def dissimilarity(
     measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
     slope_threshold: float = 0.2, degree: int = 0,
@@ -220,6 +222,8 @@ def dissimilarity(
 
     Other arguments and errors as of `similarity`.
     """
+    from armid.problem.similarity import scored
+
     values: Array = 1.0 - scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)[degree]
     return values
 
@@ -229,6 +233,8 @@ shape_dissimilarity = partial(dissimilarity, degree=2)
 
 def numerical_dissimilarity(measured: ArrayLike, simulated: ArrayLike) -> Array:
     """Return 1 - S1 of Eq 13 per candidate, +inf for one that is not finite; errors as `numerical_similarity`."""
+    from armid.problem.similarity import numerical_similarity
+
     return 1.0 - numerical_similarity(measured, simulated, failed=-np.inf)
 
 

@@ -13,6 +13,8 @@ from armid.errors import ArmidError
 Array = NDArray[np.float64]
 
 FIRST_CHUNK = 1024
+# Candidates that may be asked for after the budget at least: an algorithm ends with its generation.
+LEAST_GRACE = 100
 # What is asked for has to end within a lifetime.
 LARGEST_BUDGET = 10**15
 # Finite, for identifiers that cannot live with infinity, and worse than any fitness (a sum of squares over the square
@@ -20,6 +22,10 @@ LARGEST_BUDGET = 10**15
 PENALTY = 1e100
 # What an evaluator asks for by this name in `evaluate_values_of`: the weighted residual vector of each candidate.
 RESIDUALS = "residuals"
+
+
+class BudgetIgnoredError(ArmidError):
+    """Say that a search asked on after its budget was used; what it has found stands in the meter."""
 
 
 class Log(NamedTuple):
@@ -56,6 +62,8 @@ class Meter:
             raise ArmidError(f"the budget is {budget!r}, expected a whole number of simulations above 0")
         if budget > LARGEST_BUDGET:
             raise ArmidError(f"the budget is {budget:.6g}, expected at most {LARGEST_BUDGET:,} simulations")
+        if target is not None and not isinstance(target, int | float | np.number):
+            raise ArmidError(f"the target is {target!r}, expected a fitness")
         if target is not None and np.isnan(target):
             raise ArmidError("the target is NaN, expected a fitness")
         self.budget = int(budget)
@@ -65,6 +73,7 @@ class Meter:
         self.best_x: Array | None = None
         self.best_f = float("inf")
         self.recalled = 0
+        self._largest, self._refused = LEAST_GRACE, 0
         self._earlier = resume_from
         self._improvements: list[tuple[int, float]] = []
         self._X = np.empty((0, 0))
@@ -88,7 +97,17 @@ class Meter:
 
     def grant(self, n: int) -> int:
         """Return how many of n candidates may still be simulated."""
+        self._largest = max(self._largest, int(n)) if self.left else self._largest
         return max(0, min(int(n), self.left))
+
+    def refuse(self, n: int) -> None:
+        """Count candidates that were asked for after the budget was used.
+
+        Raises BudgetIgnoredError after a generation, which is the largest number asked for at once, at least 100.
+        """
+        self._refused += n
+        if self._refused > self._largest:
+            raise BudgetIgnoredError(f"the search goes on after its budget of {self.budget} simulations: it is stopped")
 
     def recall(self, X: Array) -> Array:
         """Return the fitness of the leading candidates that stand next in the log resumed from, (n_known,).
@@ -189,7 +208,8 @@ class Metered(Problem):  # type: ignore[misc]
     """Minimise what `evaluated` returns, within the budget of a meter; without one there is no limit.
 
     A candidate that fails gets PENALTY and is counted; so does one asked for beyond the budget, but it is neither
-    simulated nor counted. Candidates that the meter remembers from an earlier run are counted, not simulated.
+    simulated nor counted, and after a generation of these a search is stopped. Candidates that the meter remembers from
+    an earlier run are counted, not simulated.
     """
 
     def __init__(self, meter: Meter | None, **of_pymoo: Any) -> None:
@@ -213,6 +233,8 @@ class Metered(Problem):  # type: ignore[misc]
         """
         granted = len(X) if self.meter is None else self.meter.grant(len(X))
         if not granted:
+            if self.meter is not None:
+                self.meter.refuse(len(X))
             return np.full(len(X), PENALTY), None
         asked = X[:granted]
         # residuals are in no log: candidates with them are simulated again

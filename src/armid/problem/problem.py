@@ -1,15 +1,15 @@
 """Identification as a problem on which any algorithm of pymoo can work."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armid.engine import Calibration, Prepared, accuracy_against, calibrate, prepare, probes
-from armid.errors import ArmidError
+from armid.engine import Calibration, Prepared, Simulation, accuracy_against, calibrate, prepare, probes
+from armid.errors import ArmidError, nearest
 from armid.model import Model
 from armid.problem.fitness import Fitness, joined, record_weights
 from armid.problem.meter import Meter, Metered
@@ -21,7 +21,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """Simulate the pieces of one record, each on its own calibrated schedule."""
+    """Simulate the pieces of one record, each on its own calibrated schedule.
+
+    The outputs of one file are a replay each: `signals_of` simulates them together.
+    """
 
     record: Record
     model: Model
@@ -29,16 +32,49 @@ class Replay:
     calibrations: tuple[Calibration, ...]
     threads: int = 1
 
-    def outputs(self, candidates: Array) -> Iterator[tuple[Piece, Array]]:
-        """Yield each piece with the recorded signal of whole candidates in its window, (n_candidates, n_samples)."""
-        for piece, prepared in zip(self.pieces, self.prepared, strict=True):
-            run = prepared.run(candidates, self.threads)
-            yield piece, run.output[:, piece.window] if piece.window.start else run.output
+    def runs(self, candidates: Array) -> list[Simulation]:
+        """Return the simulation of each piece with whole candidates, its start corrected where it is fitted."""
+        runs = [prepared.run(candidates, self.threads) for prepared in self.prepared]
+        pairs = [(run, piece.correction) for run, piece in zip(runs, self.pieces, strict=True)]
+        return [run if c is None else replace(run, outputs=c.corrected(run.outputs)) for run, c in pairs]
+
+    def seen(self, runs: Sequence[Simulation]) -> Array:
+        """Return the signal in the windows of all pieces from their simulations, as `signal` does."""
+        pairs = ((piece.window, run.outputs[self.place]) for piece, run in zip(self.pieces, runs, strict=True))
+        parts = [signal[:, window] if window.start else signal for window, signal in pairs]
+        return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def signal(self, candidates: Array) -> Array:
         """Return the signal in the windows of all pieces, end to end, shape (n_candidates, n_samples)."""
-        parts = [output for _, output in self.outputs(candidates)]
-        return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
+        return self.seen(self.runs(candidates))
+
+    @cached_property
+    def place(self) -> int:
+        """Which output of the plant the record holds."""
+        names = [o.name for o in self.model.plant.outputs]
+        return names.index(self.record.output) if self.record.output else 0
+
+    @property
+    def name(self) -> str:
+        """File of the record, with the output where the plant has several."""
+        several = len(self.model.plant.outputs) > 1
+        return f"{self.record.file}, {self.record.output}" if several else self.record.file
+
+    @property
+    def each(self) -> tuple["Replay", ...]:
+        """The replays of all outputs of the record's file."""
+        others = [
+            replace(self, record=one, pieces=tuple(
+                replace(other.until_window_end(), manoeuvre=mine.manoeuvre)
+                for other, mine in zip(one.pieces, self.pieces, strict=True)
+            )) for one in self.record.others
+        ]  # fmt: skip
+        return (self, *others)
+
+    @cached_property
+    def simulated(self) -> tuple[int, ...]:
+        """What replays have in common whose signals come from one simulation."""
+        return tuple(map(id, (self.model, *(p.manoeuvre for p in self.pieces), *self.calibrations)))
 
     @cached_property
     def prepared(self) -> tuple[Prepared, ...]:
@@ -59,22 +95,23 @@ class Replay:
     @property
     def engine_error(self) -> float:
         """Largest error of the engine that was measured on the probes [unit of the record]."""
-        return max(c.error for c in self.calibrations)
+        sizes = self.model.plant.sizes
+        return max(c.error for c in self.calibrations) * (sizes[self.place] / sizes[0])
 
 
 def accuracy_for(record: Record, model: Model) -> str:
     """Return "fine" for a record whose noise would not hide the engine's standard error, else "standard"."""
-    return accuracy_against(record.noise.rms, model)
+    return accuracy_against(record.noises, model)
 
 
 def replay_of(
     record: Record, model: Model, space: Space, accuracy: str | None = None, threads: int = 1,
-    known: dict[object, Calibration] | None = None,
+    known: dict[object, Calibration] | None = None, spans: bool = True,
 ) -> Replay:  # fmt: skip
     """Calibrate the engine on candidates spread over the space and make a record ready to be simulated.
 
     accuracy: "standard", "fine", or None: as the record's noise asks for. known: calibrations of the same model and
-    space by manoeuvre, so that none is calibrated twice; those that are made are added.
+    space by manoeuvre, so that none is calibrated twice; those that are made are added. spans: see `calibrate`.
     Raises ArmidError for an unknown accuracy.
     """
     spread = space.complete(probes(space.low[space.free], space.high[space.free]))
@@ -85,28 +122,63 @@ def replay_of(
     for piece in pieces:
         key = (wanted, *piece.manoeuvre.likeness())
         if key not in known:
-            known[key] = calibrate(model, piece.manoeuvre, spread, wanted)
+            known[key] = calibrate(model, piece.manoeuvre, spread, wanted, spans)
         calibrations.append(known[key])
     return Replay(record, model, pieces, tuple(calibrations), threads)
 
 
 def replays(
-    records: Sequence[Record], model: Model, space: Space, accuracy: str | None = None, threads: int = 1
-) -> tuple[Replay, ...]:
-    """Make several records ready to be simulated; a manoeuvre that several repeat is calibrated once."""
+    records: Sequence[Record], model: Model, space: Space, accuracy: str | None = None, threads: int = 1,
+    spans: bool = True,
+) -> tuple[Replay, ...]:  # fmt: skip
+    """Make several records ready to be simulated, each output by itself; what is repeated is calibrated once.
+
+    Parameters
+    ----------
+    records, model, space
+        What was measured, what is simulated, and the box over which the engine is calibrated.
+    accuracy : {"standard", "fine"}
+        Of the engine; None: as the noise of each record asks for.
+    threads : int
+        Of each simulation.
+    spans : bool
+        As of `armid.calibrate`.
+
+    Returns
+    -------
+    tuple of Replay
+    """
     known: dict[object, Calibration] = {}
-    return tuple(replay_of(r, model, space, accuracy, threads, known) for r in records)
+    return tuple(one for r in records for one in replay_of(r, model, space, accuracy, threads, known, spans).each)
+
+
+def signals_of(replays: Sequence[Replay], candidates: Array) -> list[Array]:
+    """Return the signal of each replay, as `Replay.signal` does; the outputs of one file share their simulation."""
+    runs: dict[tuple[int, ...], list[Simulation]] = {}
+    for replay in replays:
+        if replay.simulated not in runs:
+            runs[replay.simulated] = replay.runs(candidates)
+    return [replay.seen(runs[replay.simulated]) for replay in replays]
 
 
 def residuals(replays: Sequence[Replay], space: Space, X: ArrayLike, weights: ArrayLike) -> Array:
-    """Return w_i (x' - x) over all samples of all records, (n_candidates, n_total); NaN in a row that diverged.
+    """Return w_i (x' - x) over all samples of all records; NaN in a row that diverged.
 
-    replays: n_records of them; X: free parameters, SI, (n_candidates, n_free) or (n_free,).
-    weights: of the records, (n_records,), such as 1/noise [1/signal's unit].
+    Parameters
+    ----------
+    replays, space
+        The records ready to be simulated, each output of a file one, and the box of their parameters.
+    X : array, SI, (n_candidates, n_free) or (n_free,)
+        Free parameters.
+    weights : array, (n_records,)
+        Of the records, such as 1/noise [1/signal's unit].
+
+    Returns
+    -------
+    array, (n_candidates, n_total)
     """
     candidates = space.complete(np.atleast_2d(np.asarray(X, dtype=np.float64)))
-    signals = [replay.signal(candidates) for replay in replays]
-    return weighted(signals, [replay.measured for replay in replays], weights)
+    return weighted(signals_of(replays, candidates), [replay.measured for replay in replays], weights)
 
 
 def weighted(signals: Sequence[Array], measured: Sequence[Array], weights: ArrayLike) -> Array:
@@ -134,14 +206,15 @@ class IdentificationProblem(Metered):
     replays : tuple of Replay
         Records made ready to be simulated.
     fitness : Fitness
-        How far a candidate is from them.
+        How far a candidate is from them; one that names an output sees the records of that output alone.
     meter : Meter or None
         The budget, counted in candidates, each simulated through all records; without one there is no limit.
 
     Raises
     ------
     ArmidError
-        No parameter is free, no record is given, or residuals are asked of a fitness that has none.
+        No parameter is free, no record is given, or residuals are asked of a fitness that has none, or no record holds
+        the output that the fitness names.
     """
 
     def __init__(self, space: Space, replays: tuple[Replay, ...], fitness: Fitness, meter: Meter | None = None) -> None:
@@ -149,7 +222,8 @@ class IdentificationProblem(Metered):
             raise ArmidError("no parameter is free: at least one is expected to be identified")
         if not replays:
             raise ArmidError("no record is given: at least one is expected to identify from")
-        self.space, self.replays, self.fitness = space, replays, fitness
+        self.space, self.fitness = space, fitness
+        self.replays = replays = judged_by(fitness, replays)
         self.names = space.free_names
         self.units = tuple(u for u, f in zip(space.units, space.free, strict=True) if f)
         self.measured = [r.measured for r in replays]
@@ -165,14 +239,16 @@ class IdentificationProblem(Metered):
             parts = [self._fitness(X[part])[0] for part in self._parts(len(X))]
             return parts[0] if len(parts) == 1 else np.concatenate(parts), None
         values, signals = self._fitness(X)
-        weights = [self.fitness.weight_of(r.record.noise.rms) for r in self.replays]
+        pairs = [(r.record.noise.rms, size) for r, size in zip(self.replays, self.sizes, strict=True)]
+        weights = [self.fitness.weight_of(noise / size) / size for noise, size in pairs]
         return values, weighted(signals, self.measured, weights)
 
     def _fitness(self, X: Array) -> tuple[Array, list[Array]]:
         """Return the fitness of candidates, (n_candidates,), and their signals in each record."""
         candidates = self.space.complete(X)
-        signals = [replay.signal(candidates) for replay in self.replays]
-        return fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights), signals
+        signals = signals_of(self.replays, candidates)
+        values = fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights, self.sizes)
+        return values, signals
 
     def _parts(self, n_candidates: int) -> list[slice]:
         """Return the parts of a population whose signals are in memory at a time; no result depends on them."""
@@ -184,20 +260,59 @@ class IdentificationProblem(Metered):
         """What each record weighs in the fitness, (n_records,)."""
         return weights_of(self.fitness, self.replays)
 
+    @cached_property
+    def sizes(self) -> Array:
+        """What the signals of each record are divided by, (n_records,)."""
+        return output_sizes(self.replays)
+
     def __deepcopy__(self, memo: dict[int, Any]) -> "IdentificationProblem":
         """Share the records and the meter: pymoo copies its problem, the measurement is one."""
         return self
 
 
 def fitness_of(
-    fitness: Fitness, replays: tuple[Replay, ...], measured: list[Array], signals: list[Array], weights: Array
-) -> Array:
-    """Return the joined fitness of the signals of each record, (n_candidates,); weights: of the records."""
-    table = [
-        fitness(x, signal, replay.pieces[0].manoeuvre.interval, replay.record.noise.rms)
-        for replay, x, signal in zip(replays, measured, signals, strict=True)
-    ]
+    fitness: Fitness, replays: tuple[Replay, ...], measured: list[Array], signals: list[Array], weights: Array,
+    sizes: Array,
+) -> Array:  # fmt: skip
+    """Return the joined fitness of the signals of each record, (n_candidates,).
+
+    weights: of the records, (n_records,); sizes: what their signals are divided by, see `output_sizes`.
+    """
+    table = []
+    for replay, x, signal, size in zip(replays, measured, signals, sizes, strict=True):
+        interval, noise = replay.pieces[0].manoeuvre.interval, replay.record.noise.rms
+        pair = (x, signal) if size == 1.0 else (x / size, signal / size)
+        table.append(fitness(pair[0], pair[1], interval, noise / size))
     return joined(fitness, np.array(table), weights)
+
+
+def judged_by(fitness: Fitness, replays: tuple[Replay, ...]) -> tuple[Replay, ...]:
+    """Return the records that a fitness sees: those of the output that it names, else all.
+
+    Raises ArmidError for an output that no record holds.
+    """
+    kept = tuple(r for r in replays if fitness.output in ("", r.record.output))
+    if replays and not kept:
+        known = dict.fromkeys(r.record.output for r in replays)
+        raise ArmidError(f"fitness '{fitness.name}': no record holds the output '{fitness.output}', "
+                         f"{nearest(fitness.output, known)}")  # fmt: skip
+    return kept
+
+
+def output_sizes(replays: Sequence[Replay]) -> Array:
+    """Return what the signals of each record are divided by before they are compared, (n_records,).
+
+    1 where all records hold one output. Else the noise of each output, the root of the mean square over its records, so
+    that each is weighed by its own noise; where one has no noise, the largest value of each output.
+    """
+    outputs = [r.record.output for r in replays]
+    if len(set(outputs)) < 2:
+        return np.ones(len(replays))
+    groups = {name: [r for r in replays if r.record.output == name] for name in outputs}
+    noise = {n: float(np.sqrt(np.mean([r.record.noise.rms**2 for r in group]))) for n, group in groups.items()}
+    if min(noise.values()) == 0.0:
+        noise = {n: max(float(np.abs(r.measured).max()) for r in group) for n, group in groups.items()}
+    return np.array([noise[name] for name in outputs])
 
 
 def weights_of(fitness: Fitness, replays: tuple[Replay, ...]) -> Array:

@@ -1,17 +1,19 @@
-"""The paper's similarity degree S of two series, its numerical part S1 and its shape part S2 (Eqs 10-14)."""
+"""The paper's similarity degree S of two series with its parts S1 and S2 (Eqs 10-14); sums of squares."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from armid.engine.cache import kept
 from armid.errors import ArmidError
 
 Array = NDArray[np.float64]
+# A lone extremum is noise nearer to an end than this share of the length, and lower than so many times the noise.
+NEAR_END, LEAST_HEIGHT = 0.03, 3.0
 
 
 def similarity(
     measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
-    slope_threshold: float = 0.2,
+    slope_threshold: float = 0.2, noise: float = 0.0,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Compare a population with the measurement: S = sqrt(S1 S2), each in [0, 1].
 
@@ -29,6 +31,9 @@ def similarity(
         Sample interval [s].
     epsilon, xi, slope_threshold : float
         Of the normalised series: level [1], duration [s], slope [1/s].
+    noise : float
+        Rms [signal's unit]. A lone extremum within 3 % of the series' length from its end is no landmark when its
+        height is below three times that; 0, as in the paper: every one is.
 
     Returns
     -------
@@ -47,14 +52,23 @@ def similarity(
     >>> S1.round(6)
     array([1. , 0.9])
     """
-    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold)
+    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, noise=noise)
     return scores[0], scores[1], scores[2]
 
 
 def numerical_similarity(measured: ArrayLike, simulated: ArrayLike, failed: float = 0.0) -> Array:
-    """Return S1 = sum max(0, |x| - |x - x'|) / sum |x| alone, (n_candidates,).
+    """Return the numerical part of the similarity degree alone, S1 = sum max(0, |x| - |x - x'|) / sum |x| (Eq 13).
 
-    failed: what a candidate that holds a NaN or an infinity gets; the rest and errors as of `similarity`.
+    Parameters
+    ----------
+    measured, simulated
+        As of `similarity`, and so are the errors.
+    failed : float
+        What a candidate that holds a NaN or an infinity gets.
+
+    Returns
+    -------
+    array, (n_candidates,)
     """
     x, rows = as_series(measured, simulated)
     scores, whole = score_numerically(x, rows, float(failed))
@@ -64,17 +78,18 @@ def numerical_similarity(measured: ArrayLike, simulated: ArrayLike, failed: floa
 
 def scored(
     measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
-    slope_threshold: float = 0.2, failed: float = 0.0,
+    slope_threshold: float = 0.2, failed: float = 0.0, noise: float = 0.0,
 ) -> Array:  # fmt: skip
     """Return S, S1, S2 of `similarity` as rows, (3, n_candidates), with `failed` for candidates that are not finite."""
     x, rows = as_series(measured, simulated)
     if not (0.0 < interval < np.inf and 0.0 < slope_threshold < np.inf):
         raise ArmidError(f"interval is {interval} and slope_threshold {slope_threshold}, expected numbers above 0")
-    if not (0.0 <= epsilon < np.inf and 0.0 <= xi < np.inf):
-        raise ArmidError(f"epsilon is {epsilon} and xi {xi}, expected numbers of at least 0")
+    if not (0.0 <= epsilon < np.inf and 0.0 <= xi < np.inf and 0.0 <= noise < np.inf):
+        raise ArmidError(f"epsilon is {epsilon}, xi {xi} and noise {noise}, expected numbers of at least 0")
     scores, whole, n_intervals = score(
-        x, rows, float(interval), float(epsilon), float(xi), float(slope_threshold), float(failed)
-    )
+        x, rows, float(interval), float(epsilon), float(xi), float(slope_threshold), float(failed),
+        LEAST_HEIGHT * noise,
+    )  # fmt: skip
     refuse_zero(whole)
     if n_intervals == 0:
         raise ArmidError(f"the measured series is constant ({x[0]:g}) and has no shape to compare")
@@ -104,7 +119,7 @@ def as_series(measured: ArrayLike, simulated: ArrayLike) -> tuple[Array, Array]:
     return x, rows
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def has_failed(simulated):  # type: ignore[no-untyped-def]
     """Say whether a candidate's series holds a NaN or an infinity: (n_candidates, n_samples) -> (n_candidates,)."""
     failed = np.empty(simulated.shape[0], np.bool_)
@@ -117,28 +132,47 @@ def has_failed(simulated):  # type: ignore[no-untyped-def]
     return failed
 
 
+# Neither nnan nor ninf may be added: a NaN in y has to reach the sum.
+@kept(nogil=True, fastmath={"reassoc", "contract", "nsz"})
+def _sum_of_squares(x, y):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(x.size):
+        total += (x[i] - y[i]) ** 2
+    return total
+
+
+@kept(nogil=True)
+def sums_of_squares(x, rows):  # type: ignore[no-untyped-def]
+    """Return sum (x - y)^2 of every row, (n_candidates,), +inf where one is NaN."""
+    sums = np.empty(rows.shape[0])
+    for c in range(rows.shape[0]):
+        total = _sum_of_squares(x, rows[c])
+        sums[c] = np.inf if np.isnan(total) else total
+    return sums
+
+
 # The compiled loop over a population. All of it stands in this one file: numba's cache does not see that a function of
 # another file has changed.
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def score(x, rows, interval, epsilon, xi, threshold, failed):  # type: ignore[no-untyped-def]
+@kept(nogil=True, error_model="numpy")
+def score(x, rows, interval, epsilon, xi, threshold, failed, height):  # type: ignore[no-untyped-def]
     """Return S, S1, S2 of every row, (3, n_candidates), `failed` where one is not finite; sum |x|; intervals of x."""
     scores = np.full((3, rows.shape[0]), failed)
     room = x.size + 1
     at, level, at2, level2 = np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64), np.empty(room)
-    n = _landmarks(x, interval, epsilon, xi, at, level)
+    n = _landmarks(x, interval, epsilon, xi, height, at, level)
     whole = _common(x, x)
     for c in range(rows.shape[0]):
         s1 = _common(x, rows[c]) / whole
         if np.isfinite(s1):
-            n2 = _landmarks(rows[c], interval, epsilon, xi, at2, level2)
+            n2 = _landmarks(rows[c], interval, epsilon, xi, height, at2, level2)
             s2 = _shape(at, level, n, at2, level2, n2, interval, threshold)
             scores[0, c], scores[1, c], scores[2, c] = np.sqrt(s1 * s2), s1, s2
     return scores, whole, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kept(nogil=True, error_model="numpy")
 def score_numerically(x, rows, failed):  # type: ignore[no-untyped-def]
     """Return S1 of every row, (n_candidates,), `failed` for a row that is not finite; and sum |x|."""
     scores = np.full(rows.shape[0], failed)
@@ -151,7 +185,7 @@ def score_numerically(x, rows, failed):  # type: ignore[no-untyped-def]
 
 
 # Neither nnan nor ninf may be added: the sum of misses has to turn into NaN or infinity when y holds one.
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+@kept(nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def _common(x, y):  # type: ignore[no-untyped-def]
     """Return sum max(0, |x| - |x - y|), the numerator of S1, or NaN when y holds a NaN or an infinity."""
     common, misses = 0.0, 0.0
@@ -163,7 +197,7 @@ def _common(x, y):  # type: ignore[no-untyped-def]
     return common + 0.0 * misses
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def _extrema(x, at):  # type: ignore[no-untyped-def]
     """Write both ends and the inner extrema (of a plateau its first sample) into at; return their number."""
     at[0] = 0
@@ -182,8 +216,8 @@ def _extrema(x, at):  # type: ignore[no-untyped-def]
     return n + 1
 
 
-@njit(cache=True, nogil=True)
-def _landmarks(x, interval, epsilon, xi, at, level):  # type: ignore[no-untyped-def]
+@kept(nogil=True)
+def _landmarks(x, interval, epsilon, xi, height, at, level):  # type: ignore[no-untyped-def]
     """Write the ends of the intervals and their normalised levels; return how many there are, 0 for a constant series.
 
     Small close pairs leave smallest first. One pass with a stack does it: a pair no larger than its neighbours leaves
@@ -207,20 +241,28 @@ def _landmarks(x, interval, epsilon, xi, at, level):  # type: ignore[no-untyped-
     while m > 2 and _is_small(at, level, m - 2, interval, epsilon, xi):
         m -= 2
     at[m], level[m] = x.size - 1, (x[-1] - low) / (high - low)
+    near, least = NEAR_END * x.size, height / (high - low)
+    if m > 1 and at[m] - at[m - 1] < near and _gain(level, m - 1) < least:
+        at[m - 1], level[m - 1] = at[m], level[m]
+        m -= 1
+    if m > 1 and at[1] < near and _gain(level, 0) < least:
+        for k in range(1, m):
+            at[k], level[k] = at[k + 1], level[k + 1]
+        m -= 1
     return m
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def _gain(level, k):  # type: ignore[no-untyped-def]
     return abs(level[k + 1] - level[k])
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def _is_small(at, level, k, interval, epsilon, xi):  # type: ignore[no-untyped-def]
     return _gain(level, k) < epsilon and (at[k + 1] - at[k]) * interval < xi
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def _shape(at, level, n, at2, level2, n2, interval, threshold):  # type: ignore[no-untyped-def]
     """Return S2 of Eq 14, in whole samples: exactly 1 for equal series, 0 for a constant candidate (n2 = 0)."""
     if n2 == 0:
@@ -237,7 +279,7 @@ def _shape(at, level, n, at2, level2, n2, interval, threshold):  # type: ignore[
     return similar / (at[n] + at2[n2])
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def _pairs(at, n, at2, n2):  # type: ignore[no-untyped-def]
     """Pair intervals by order when their numbers agree, else one to one by overlap, largest (then earliest) first."""
     if n == n2:

@@ -96,8 +96,23 @@ def space_of(
 ) -> Space:
     """Return the space of a model: declared bounds, then a campaign's overrides, then the caller's bounds and values.
 
-    What a campaign says of an effect that is not in the model is passed over.
-    Raises ArmidError for a name that the model does not have, and for a parameter both bounded and fixed.
+    Parameters
+    ----------
+    model : Model
+        Whose parameters these are.
+    overrides : Mapping
+        Name -> what a campaign says of it; of an effect that is not in the model it is passed over.
+    bounds, fixed : Mapping
+        Name -> (low, high), and value, SI.
+
+    Returns
+    -------
+    Space
+
+    Raises
+    ------
+    ArmidError
+        For a name that the model does not have, and for a parameter both bounded and fixed.
     """
     declared = [(p.low, p.high, np.nan if p.fixed is None else p.fixed) for p in model.parameters.values()]
     units = tuple(p.unit for p in model.parameters.values())

@@ -5,9 +5,11 @@ campaign  `read_campaign`: campaign.toml and its CSV files -> Campaign; `write_c
 schema    the kinds of values in a TOML file, and the shape of campaign.toml
 reader    one [[records]] entry and its CSV file -> Record
 table     CSV files of numbers, and what their headers mean
-resample  even time grids out of the times of a file; where simulations start, which samples count
+resample  even time grids out of the times of a file; which samples count
+start     the state from which a record or a piece of it is simulated
 noise     the noise of a sensor, from rest or from the motion itself
-record    Record, Piece, Noise, Irregularity: what all of that is put into
+broken    samples that are no data: gaps, clipped and repeated ones, spikes
+record    Record (one output of one file), Piece, Noise, Irregularity: what all of that is put into
 importers public measured sets as campaigns: EMPS, and DFKI's pendulum
 """
 

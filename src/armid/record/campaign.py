@@ -1,32 +1,45 @@
 """The records of one machine, each to train on or to hold out."""
 
 import os.path
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, nearest, shown
-from armid.model import EFFECTS, PLANTS, Effect, Model, Parameter, Plant
-from armid.model.parameter import resolve
+from armid.errors import ArmidError, nearest, quoted
+from armid.model import EFFECTS, PLANTS, Effect, Model, Output, Parameter, Plant
+from armid.model.effects.sensor import sensor_effects
+from armid.model.parameter import resolve, warn_if_far
 from armid.record.reader import NAME, SharedEntries, campaign_path, gravity_of, read_record, record_path
 from armid.record.record import Record
 from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Override, RecordSheet, load_toml, unknown_name, validated
-from armid.record.table import DEGREE, write_table
+from armid.record.table import write_table
+from armid.units import DEGREE
+
+# Records of each role that a campaign's repr names.
+MOST_NAMED = 8
+# What [tolerances] of a file says of every constant that it does not name.
+DEFAULT = "default"
+# From this tolerance on a value is one to be found rather than one that is known.
+ROUGH = 0.1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Campaign:
     """Hold the records of one machine and what is declared of it.
 
-    folder: where campaign.toml lies. plant: the sibling for the records' unit; an axis has its scales set from the
-    train records. effects: names of those declared beforehand. parameters: qualified name -> Override. constants: those
-    of the campaign, SI; each record's manoeuvre holds all that apply to it. gyro_range: [rad/s], None when not given.
+    folder: where campaign.toml lies. plant: the sibling for the records' unit, with the outputs that some record
+    holds; an axis has its scales set from the train records. unmeasured: its other outputs. effects: names of those
+    declared beforehand. parameters: qualified name -> Override. constants: those of the campaign, SI; each record's
+    manoeuvre holds all that apply to it. gyro_range: [rad/s], None when not given. tolerances: constant -> relative
+    half-range within which it is known. rough: those of a tenth or more, with parameters of the plant that are fixed.
     """
 
     name: str
@@ -37,6 +50,15 @@ class Campaign:
     parameters: Mapping[str, Override]
     constants: Mapping[str, float]
     gyro_range: float | None = None
+    unmeasured: tuple[Output, ...] = ()
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    rough: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
+        told = "; ".join(f"{len(files)} {role}: {', '.join(files[:MOST_NAMED])}{', ...' * (len(files) > MOST_NAMED)}"
+                         for role, files in named.items())  # fmt: skip
+        return f"<Campaign {self.name} of {self.plant.name} [{self.unit}]; {told}>"
 
     @property
     def train(self) -> tuple[Record, ...]:
@@ -49,8 +71,13 @@ class Campaign:
         return tuple(r for r in self.records if r.role == "holdout")
 
     @property
+    def declared(self) -> Plant:
+        """The plant with the outputs that no record holds, too."""
+        return replace(self.plant, outputs=(*self.plant.outputs, *self.unmeasured))
+
+    @property
     def unit(self) -> str:
-        """Unit of the recorded speed, "rad/s" or "m/s"."""
+        """Unit of the first output that was measured, of a speed "rad/s" or "m/s"."""
         return self.plant.output_unit
 
     def model(self, effects: Mapping[str, Effect] = EFFECTS) -> Model:
@@ -58,10 +85,8 @@ class Campaign:
 
         Raises ArmidError where they do not compose.
         """
-        model = Model(self.plant)
-        for name in self.effects:
-            model = model + effects[name]
-        return model
+        known = {**sensor_effects(self.declared), **effects}
+        return Model(self.plant, tuple(known[name] for name in self.effects))
 
     def with_window(self, begin: float, end: float) -> "Campaign":
         """Return the campaign with one window [s] for every record, whatever its file says; both ends count.
@@ -84,7 +109,14 @@ def read_campaign(
     plants, effects : Mapping
         Name -> those that the file may name.
 
-    Warns with IrregularSamplingWarning for a record that is resampled for its uneven times.
+    Returns
+    -------
+    Campaign
+
+    Warns
+    -----
+    IrregularSamplingWarning
+        For a record that is resampled for its uneven times.
 
     Raises
     ------
@@ -94,11 +126,12 @@ def read_campaign(
     toml = campaign_path(path)
     above = toml.parent.name or toml.parent.resolve().name
     # what messages put before the files of the campaign: c00/
-    folder = f"{above if above.isprintable() else shown(above)}/" if above else ""
+    folder = f"{above if above.isprintable() else quoted(above)}/" if above else ""
     where = f"{folder}{toml.name}"
     sheet = validated(CampaignSheet, load_toml(toml, where), where)
     if sheet.plant not in plants:
         raise unknown_name("plant", sheet.plant, plants, where)
+    effects = {**sensor_effects(plants[sheet.plant]), **effects}
     for i, name in enumerate(sheet.effects):
         if name not in effects:
             raise unknown_name("effect", name, effects, where)
@@ -108,32 +141,47 @@ def read_campaign(
     entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
     gyro_range = None if sheet.gyro_range_deg_s is None else sheet.gyro_range_deg_s * DEGREE
     shared = SharedEntries(folder, sheet.constants, sheet.inputs, sheet.hold, gyro_range)
-    places = [f"{where}, record {shown(entry.file)}" for entry in entries]
+    places = [f"{where}, record {quoted(entry.file)}" for entry in entries]
     paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
     records = [
         read_record(path, entry, declared, shared, at) for path, entry, at in zip(paths, entries, places, strict=True)
     ]
-    for record in records:
+    for record in records if declared.records_one_speed else ():
         if record.unit != records[0].unit:
             raise ArmidError(f"{folder}{record.file}: the speed is in {record.unit}, {records[0].unit} is expected "
                              f"as in {records[0].file}")  # fmt: skip
-    plant = scaled(declared.for_unit(records[0].unit), records, where)
+    recorded = {one.output for record in records for one in record.each}
+    whole = declared.for_unit(records[0].unit) if declared.records_one_speed else declared
+    own = [{*e.constants, *(k.constant for k in declared.keys if k.key in e.keys)} for e in entries]
+    for name in sheet.constants:
+        if all(name in constants for constants in own):
+            warnings.warn(f"{where}: constant '{name}' counts nowhere, since every record sets its own", stacklevel=2)
+    plant = scaled(whole.recording(recorded), records, where)
+    parameters = overrides_of(sheet.parameters, plant, effects, where)
+    held = {p.name: parameters[p.name].fixed for p in plant.parameters if p.name in parameters}
+    fixed = {name: value for name, value in held.items() if value is not None}
+    tolerances = tolerances_of(sheet.tolerances, plant, where, fixed)
+    # of what is 0 nothing is known by a share of it
+    values = {c.name: c.value for c in plant.constants} | dict(sheet.constants) | fixed
     return Campaign(
         name=sheet.name,
         folder=toml.parent,
         plant=plant,
         effects=tuple(sheet.effects),
         records=tuple(records),
-        parameters=overrides_of(sheet.parameters, plant, effects, where),
+        parameters=parameters,
         constants=dict(sheet.constants),
         gyro_range=gyro_range,
+        tolerances={name: t for name, t in tolerances.items() if name not in fixed and values[name]},
+        rough={name: t for name, t in tolerances.items() if t >= ROUGH and values[name]},
+        unmeasured=tuple(o for o in whole.outputs if o.name not in recorded),
     )
 
 
 def write_campaign(
     out: str | Path, campaign_toml: str, tables: Mapping[str, Mapping[str, NDArray[np.float64]]]
 ) -> Path:
-    """Write campaign.toml and its CSV files, whole or not at all, and return the folder.
+    """Write campaign.toml and its CSV files, whole or not at all.
 
     Parameters
     ----------
@@ -144,6 +192,11 @@ def write_campaign(
     tables : Mapping
         File -> header -> values, (n_rows,); every number is written with all its digits.
 
+    Returns
+    -------
+    Path
+        The folder.
+
     Raises
     ------
     ArmidError
@@ -151,7 +204,7 @@ def write_campaign(
     """
     folder = Path(out)
     if os.path.lexists(folder) and not (folder.is_dir() and not any(folder.iterdir())):
-        raise ArmidError(f"{shown(str(out))} exists already, a new or empty folder is expected")
+        raise ArmidError(f"{quoted(str(out))} exists already, a new or empty folder is expected")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder.parent, prefix=".armid-") as beside:
@@ -164,7 +217,7 @@ def write_campaign(
                 folder.rmdir()
             made.rename(folder)
     except OSError as error:
-        raise ArmidError(f"{shown(str(out))} cannot be written: {error.strerror or error}") from error
+        raise ArmidError(f"{quoted(str(out))} cannot be written: {error.strerror or error}") from error
     return folder
 
 
@@ -176,15 +229,15 @@ def record_entries(tables: Sequence[Mapping[str, Any]], keys: Sequence[str], whe
     entries = []
     for i, table in enumerate(tables):
         file = table.get("file")
-        place = f"{where}, record {shown(file) if isinstance(file, str) else i + 1}"
+        place = f"{where}, record {quoted(file) if isinstance(file, str) else i + 1}"
         entries.append(validated(RecordSheet, table, place, keys))
     files = [os.path.normpath(entry.file) for entry in entries]
     for i, entry in enumerate(entries):
         if files[i] in files[:i]:
-            raise ArmidError(f"{where}: file {shown(entry.file)} is in two records, each file once is expected")
+            raise ArmidError(f"{where}: file {quoted(entry.file)} is in two records, each file once is expected")
         others = [other.file for other in entries if other.file != entry.file]
         if entry.repeat_of is not None and entry.repeat_of not in others:
-            raise ArmidError(f"{where}, record {shown(entry.file)}: repeat_of {shown(entry.repeat_of)} is no file of "
+            raise ArmidError(f"{where}, record {quoted(entry.file)}: repeat_of {quoted(entry.repeat_of)} is no file of "
                              f"another record, {nearest(entry.repeat_of, others)}")  # fmt: skip
     if not any(entry.role == "train" for entry in entries):
         raise ArmidError(f"{where}: no record has the role 'train', at least one is expected")
@@ -195,12 +248,16 @@ def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     """Return the plant with the sizes of effort and speed that its train records show, where it asks for that.
 
     Effort = max |gain x drive|, the drive being its first input, or the moment of gravity where the drive rests, and
-    speed = max |measured speed|; a holdout record has no say.
+    speed = max |measured speed|, or of the change of a position over a hundredth of the record; a holdout record has no
+    say.
     """
     if not plant.scales_from_records:
         return plant
     train = [r for r in records if r.role == "train"]
-    speed = max(float(np.max(np.abs(r.measured))) for r in train)
+    speed = max(map(largest_speed, (one for r in train for one in r.each)))
+    if speed == 0.0:
+        raise ArmidError(f"{where}: no train record holds a speed or a position, from which the scale of speed comes: "
+                         "one of them, or a plant that states its scales, is expected")  # fmt: skip
     default = {c.name: c.value for c in plant.constants}.get("gain", 1.0)
     effort = 0.0
     for r in train if plant.inputs else ():
@@ -210,6 +267,38 @@ def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     if effort < 1e-30:
         raise ArmidError(f"{where}: the drive of every train record is 0 throughout, a driven motion is expected")
     return replace(plant, scales=replace(plant.scales, effort=effort, speed=speed))
+
+
+def tolerances_of(
+    told: Mapping[str, float], plant: Plant, where: str, fixed: Mapping[str, float] = MappingProxyType({})
+) -> dict[str, float]:
+    """Return the tolerance of each constant above 0: what the campaign tells, by name or as `default`, else the plant.
+
+    What the plant declares as exact, or a record sets (start, target, load), keeps 0 unless it is named.
+    fixed: parameters of the plant that the campaign fixes, which are constants then.
+
+    Raises ArmidError for a constant that the plant does not have.
+    """
+    declared = {**dict.fromkeys(fixed), **{c.name: c.tolerance for c in plant.constants}}
+    for name in told:
+        if name not in declared and name != DEFAULT:
+            raise unknown_name("constant", name, [*declared, DEFAULT], f"{where}, tolerances")
+    of_records = {*plant.start_constants.values(), *(key.constant for key in plant.keys)}
+    found = {}
+    for name, usual in declared.items():
+        otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT, usual or 0.0)
+        found[name] = told.get(name, otherwise)
+    return {name: tolerance for name, tolerance in found.items() if tolerance > 0.0}
+
+
+def largest_speed(record: Record) -> float:
+    """Return the largest speed that a record of a speed or a position shows, SI, 0 for another output."""
+    if record.unit in ("rad/s", "m/s"):
+        return float(np.max(np.abs(record.measured)))
+    if record.unit not in ("rad", "m"):
+        return 0.0
+    lag = max(record.measured.size // 100, 1)
+    return float(np.max(np.abs(record.measured[lag:] - record.measured[:-lag]))) / (lag * record.manoeuvre.interval)
 
 
 def overrides_of(
@@ -248,7 +337,7 @@ def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
 
 
 def check_bounds(override: Override, declared: Parameter, where: str) -> None:
-    """Refuse bounds that leave nothing between them, and bounds beside a fixed value, which would not count.
+    """Refuse bounds that leave nothing between them, and bounds beside a fixed value; warn of values far outside.
 
     The declared bound (SI) stands for one that is not given.
     """
@@ -258,3 +347,6 @@ def check_bounds(override: Override, declared: Parameter, where: str) -> None:
     high = declared.high if override.high is None else override.high
     if not low < high:
         raise ArmidError(f"{where}: low is {low:g} and high is {high:g}, low below high is expected")
+    given = [v for v in (override.low, override.high, override.fixed) if v is not None]
+    if given:
+        warn_if_far(declared, given, f"{where}: {' to '.join(f'{v:g}' for v in given)}")

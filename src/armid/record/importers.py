@@ -3,6 +3,7 @@
 import struct
 import zipfile
 import zlib
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, nearest, shown
+from armid.errors import ArmidError, nearest, quoted
 from armid.record.campaign import write_campaign
 from armid.record.table import read_table
 
@@ -115,13 +116,13 @@ def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
     from scipy.io.matlab import MatReadError
 
     if not path.is_file():
-        raise ArmidError(f"{shown(str(path))} does not exist, the file {path.name} of the EMPS set is expected")
+        raise ArmidError(f"{quoted(str(path))} does not exist, the file {path.name} of the EMPS set is expected")
     damaged = (ValueError, TypeError, KeyError, IndexError, EOFError, OverflowError, NotImplementedError, OSError,
                MatReadError, zlib.error, struct.error)  # fmt: skip
     try:
         variables: dict[str, Any] = loadmat(path)
     except damaged as error:
-        raise ArmidError(f"{path.name} is no readable MATLAB file: {shown(str(error))}") from error
+        raise ArmidError(f"{path.name} is no readable MATLAB file: {quoted(str(error))}") from error
     for name in EMPS_VARIABLES:
         if name not in variables:
             raise ArmidError(f"{path.name}: variable '{name}' is missing, {', '.join(EMPS_VARIABLES)} are expected")
@@ -168,7 +169,7 @@ def downloaded_folder() -> Path:
     try:
         files = package.EMPS(data_file_locations=True)
     except (OSError, ValueError, RuntimeError, zlib.error, zipfile.BadZipFile) as error:
-        raise ArmidError(f"the EMPS set could not be downloaded: {shown(str(error))}; name the folder with "
+        raise ArmidError(f"the EMPS set could not be downloaded: {quoted(str(error))}; name the folder with "
                          f"{train}.mat instead") from error  # fmt: skip
     return Path(files[0]).parent
 
@@ -216,8 +217,17 @@ def read_dfki(folder: Path, file: str) -> dict[str, Array]:
     if not path.is_file():
         raise ArmidError(f"{folder}: {file} does not exist there, the folder results/ of the set, or its files in one "
                          "folder, is expected")  # fmt: skip
-    columns = read_table(path, file).columns
-    for name in DFKI_COLUMNS:
-        if name not in columns:
-            raise ArmidError(f"{file}, line 1: column '{name}' is missing, {', '.join(DFKI_COLUMNS)} are expected")
+    columns = read_columns(path, file, DFKI_COLUMNS)
     return {header: columns[name] for name, header in DFKI_COLUMNS.items()}
+
+
+def read_columns(path: Path, file: str, names: Collection[str]) -> dict[str, Array]:
+    """Return the named columns of a CSV file; refuse a file or column that is missing with ArmidError.
+
+    file: how messages name it.
+    """
+    columns = read_table(path, file).columns
+    for name in names:
+        if name not in columns:
+            raise ArmidError(f"{file}, line 1: column '{name}' is missing, {', '.join(names)} are expected")
+    return {name: columns[name] for name in names}

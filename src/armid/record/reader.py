@@ -8,33 +8,23 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, nearest, shown
-from armid.model import Manoeuvre, ManoeuvreKey, Plant
+from armid.errors import ArmidError, nearest, quoted
+from armid.model import Manoeuvre, ManoeuvreKey, Output, Plant
 from armid.record.noise import noise_of, smallest_step
-from armid.record.record import Record
-from armid.record.resample import (
-    Timing,
-    Track,
-    is_constant,
-    moved_onto_grid,
-    onto_grid,
-    part,
-    piece_length,
-    timing_of,
-    track_of,
-    with_window,
-)
+from armid.record.record import Piece, Record
+from armid.record.resample import Timing, is_constant, moved_onto_grid, onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import KindError, RecordSheet, number
+from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
     LARGEST,
     POSITIONS,
     TIME,
     CsvTable,
     input_columns,
+    output_columns,
     position_of,
     read_table,
     si_factor,
-    speed_column,
     time_column,
 )
 
@@ -60,7 +50,7 @@ class SharedEntries:
 
 
 def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: SharedEntries, where: str) -> Record:
-    """Read the record of one [[records]] entry.
+    """Read the record of one [[records]] entry: of the first output in the file, with those of the others.
 
     plant: the one that the campaign names; its sibling for the record's unit is taken. where: how messages name the
     entry. Warns with IrregularSamplingWarning where the file is resampled for its uneven times.
@@ -69,35 +59,37 @@ def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: SharedEntr
     """
     table = read_table(path, f"{shared.folder}{sheet.file}")
     times = time_column(table)
-    header, unit, speed = speed_column(table, [p.output_unit for p in (plant, *plant.variants)])
-    try:
-        plant = plant.for_unit(unit)
-    except ArmidError as error:
-        raise ArmidError(f"{table.file}, line 1: a speed in {unit} is not what is expected: {error}") from error
+    plant, found = output_columns(table, plant)
     timing = timing_of(times, plant.from_rest, table.file)
-    check_speed(speed, timing, shared.gyro_range, unit, table)
-    rest, motion = speed[: timing.first], speed[timing.first :]
+    signals = {output: table.columns[header] * output.factors[header] for output, header in found.items()}
+    check_signals(signals, timing, shared.gyro_range, table)
     rest_interval = float(np.median(np.diff(times[: timing.first]))) if timing.first > 1 else timing.interval
     irregular = times[timing.first :] if timing.irregularity else None
-    others = {name: values for name, values in table.columns.items() if name not in (TIME, header)}
-    record = Record(
-        file=sheet.file,
-        role=sheet.role,
-        unit=unit,
-        manoeuvre=manoeuvre_of(plant, shared, sheet, table, timing, where=where),
-        measured=moved_onto_grid(speed, times, timing),
-        rest=rest,
-        noise=noise_of(rest, motion, rest_interval, irregular),
-        pieces=(),
-        whole_pieces=(),
-        earliest=timing.earliest,
-        columns={name: onto_grid(values, times, timing) for name, values in others.items()},
-        repeat_of=sheet.repeat_of or "",
-        restart_s=sheet.restart_s,
-        irregularity=timing.irregularity,
+    others = {name: values for name, values in table.columns.items() if name not in (TIME, *found.values())}
+    columns = {name: onto_grid(values, times, timing) for name, values in others.items()}
+    manoeuvre = manoeuvre_of(plant, shared, sheet, table, timing, where=where)
+    first, *further = (
+        Record(
+            file=sheet.file,
+            role=sheet.role,
+            unit=output.unit,
+            manoeuvre=manoeuvre,
+            measured=moved_onto_grid(signal, times, timing),
+            rest=signal[: timing.first],
+            noise=noise_of(signal[: timing.first], signal[timing.first :], rest_interval, irregular),
+            pieces=(),
+            whole_pieces=(),
+            earliest=timing.earliest,
+            columns=columns,
+            repeat_of=sheet.repeat_of or "",
+            restart_s=sheet.restart_s,
+            irregularity=timing.irregularity,
+            output=output.name,
+        )
+        for output, signal in signals.items()
     )
-    tracks = {} if plant.from_rest else tracks_of(record, plant, table, speed, timing)
-    return with_window(started(record, plant, tracks, where), sheet.window_s, where)
+    tracks = {} if plant.from_rest else tracks_of(first, plant, table, signals, timing)
+    return with_window(started(replace(first, others=tuple(further)), plant, tracks, where), sheet.window_s, where)
 
 
 def manoeuvre_of(
@@ -121,17 +113,23 @@ def manoeuvre_of(
     return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
 
 
-def check_speed(speed: Array, timing: Timing, gyro_range: float | None, unit: str, table: CsvTable) -> None:
-    """Refuse a signal that shows no motion, or is cut off by the range of the gyro.
+def check_signals(
+    signals: Mapping[Output, Array], timing: Timing, gyro_range: float | None, table: CsvTable
+) -> None:  # fmt: skip
+    """Refuse a signal that shows no motion, and a speed that is cut off by the range of the gyro.
 
-    speed: SI, (n_rows,). Saturated are 5 samples in a row within one quantisation step of the range; the step is the
+    signals: SI, (n_rows,). Saturated are 5 samples in a row within one quantisation step of the range; the step is the
     smallest change between neighbours, but at most a hundredth of the range.
     """
-    if is_constant(speed[timing.first :]):
-        raise ArmidError(f"{table.file}: the measured speed is constant after the start, a motion is expected")
+    for output, signal in signals.items():
+        if is_constant(signal[timing.first :]):
+            what = "speed" if output.unit in ("rad/s", "m/s") else output.name
+            raise ArmidError(f"{table.file}: the measured {what} is constant after the start, a motion is expected")
     if gyro_range is None:
         return
-    if unit != "rad/s":
+    speed = next((signal for output, signal in signals.items() if output.unit == "rad/s"), None)
+    if speed is None:
+        unit = next(iter(signals)).unit
         raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {unit}: a speed in deg/s or "
                          "rad/s is expected")  # fmt: skip
     step = min(smallest_step(speed), gyro_range / 100)
@@ -149,32 +147,58 @@ def check_speed(speed: Array, timing: Timing, gyro_range: float | None, unit: st
 def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: str) -> Record:
     """Return the record with its pieces, each from the state that the tracks tell at its first sample.
 
-    An incomplete last piece is dropped. Raises ArmidError for restarts of a plant that starts from rest.
+    An incomplete last piece is dropped. Raises ArmidError for restarts of a plant that starts from rest, or of a record
+    whose start is given.
     """
-    manoeuvre, measured = record.manoeuvre, record.measured
-    length = measured.size
+    manoeuvre, length = record.manoeuvre, record.measured.size
+    asked = {} if plant.records_one_speed else plant.start_constants
+    given = sorted(set(asked.values()) & set(manoeuvre.constants))
     if record.restart_s is not None:
         if plant.from_rest:
             raise ArmidError(f"{where}: restart_s is given, but plant '{plant.name}' starts at rest: a record without "
                              "restarts is expected")  # fmt: skip
-        length = piece_length(record.restart_s, manoeuvre.interval, measured.size, where)
-    starts = range(0, measured.size - length + 1, length)
-    pieces = tuple(part(manoeuvre, measured, start, length, tracks) for start in starts)
+        if given:
+            raise ArmidError(f"{where}: restart_s and the constant {given[0]} are both given: the start of one piece "
+                             "or of each is expected")  # fmt: skip
+        length = piece_length(record.restart_s, manoeuvre.interval, record.measured.size, where)
+    fitted = len(asked) > len(given)
+    spent = n_spent(length, manoeuvre.interval) if fitted and record.role == "holdout" else 0
+    pieces: list[list[Piece]] = [[] for _ in record.each]
+    for start in range(0, record.measured.size - length + 1, length):
+        if fitted and spent:
+            first = {name: replace(t, values=t.values[start : start + spent]) for name, t in tracks.items()}
+            state = state_shown(plant, manoeuvre.constants, first, manoeuvre.interval, 0)
+        elif fitted:
+            state = state_shown(plant, manoeuvre.constants, tracks, manoeuvre.interval, start)
+        else:
+            state = ({}, {}) if asked else state_at(tracks, start)
+        cut = manoeuvre.part(start, length, state[0])
+        for one, found in zip(record.each, pieces, strict=True):
+            measured, shown_start = one.measured[start : start + length], state[0] if fitted and not spent else {}
+            found.append(Piece(cut, measured, slice(0, length), start, state[1], spent, shown_start))
     # the first piece starts where the record does
-    from_there = replace(manoeuvre, constants=pieces[0].manoeuvre.constants)
-    return replace(record, manoeuvre=from_there, whole_pieces=pieces)
+    from_there = replace(manoeuvre, constants=pieces[0][0].manoeuvre.constants)
+    first_one, *further = (replace(one, manoeuvre=from_there, whole_pieces=tuple(found))
+                           for one, found in zip(record.each, pieces, strict=True))  # fmt: skip
+    return replace(first_one, others=tuple(further))
 
 
-def tracks_of(record: Record, plant: Plant, table: CsvTable, speed: Array, timing: Timing) -> dict[str, Track]:
-    """Return the signals from which the start constants that the plant declares are taken.
+def tracks_of(
+    record: Record, plant: Plant, table: CsvTable, signals: Mapping[Output, Array], timing: Timing
+) -> dict[str, Track]:
+    """Return the signals from which a start is taken: of a plant that records one speed by constant, else by output.
 
-    speed: as in the file, SI, (n_rows,).
+    signals: as in the file, SI, (n_rows,).
 
     Raises ArmidError where a position is needed and the file has none. An axis without gravity needs none: it starts at
     its default.
     """
+    times = table.columns[TIME]
+    if not plant.records_one_speed:
+        return {output.name: track_of(signal, times, timing) for output, signal in signals.items()}
+    (speed,) = signals.values()
     declared = {c.name for c in plant.constants}
-    position, times = position_of(table, record.unit), table.columns[TIME]
+    position = position_of(table, record.unit)
     tracks = {SPEED: track_of(speed, times, timing)} if SPEED in declared else {}
     if POSITION in declared and position is not None:
         tracks[POSITION] = track_of(position, times, timing)
@@ -201,13 +225,18 @@ def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordShe
     for what, given in (("constants of the campaign", shared), ("constants", sheet.constants)):
         for name in given:
             if name not in known:
-                raise ArmidError(f"{where}: {shown(name)} in {what} is no constant of plant '{plant.name}', "
+                raise ArmidError(f"{where}: {quoted(name)} in {what} is no constant of plant '{plant.name}', "
                                  f"{nearest(name, known)}")  # fmt: skip
-            if not plant.from_rest and name in (POSITION, SPEED):
+            if not plant.from_rest and plant.records_one_speed and name in (POSITION, SPEED):
                 raise ArmidError(f"{where}: '{name}' in {what} is set, but it comes from the first samples of a "
                                  "record: another constant is expected")  # fmt: skip
     own = {k.constant: key_value(k, sheet.keys[k.key], where) for k in plant.keys if k.key in sheet.keys}
     constants = {**shared, **own, **sheet.constants}
+    for declared in plant.constants:
+        value = constants.get(declared.name, declared.value)
+        if not declared.low <= value <= declared.high:
+            raise ArmidError(f"{where}: constant '{declared.name}' is {value:.9g} {declared.unit}, a value from "
+                             f"{declared.low:g} to {declared.high:g} is physically possible and expected")  # fmt: skip
     for key in plant.keys:
         check_key(key, constants, where)
     return constants
@@ -218,11 +247,11 @@ def key_value(key: ManoeuvreKey, value: object, where: str) -> float:
     if key.boolean:
         if isinstance(value, bool):
             return float(value)
-        raise ArmidError(f"{where}: key '{key.key}' is {shown(value)}, true or false is expected")
+        raise ArmidError(f"{where}: key '{key.key}' is {quoted(value)}, true or false is expected")
     try:
         return key.factor * number(value)
     except KindError as error:
-        raise ArmidError(f"{where}: key '{key.key}' is {shown(value)}, a finite number is expected") from error
+        raise ArmidError(f"{where}: key '{key.key}' is {quoted(value)}, a finite number is expected") from error
 
 
 def check_key(key: ManoeuvreKey, constants: Mapping[str, float], where: str) -> None:
@@ -255,11 +284,11 @@ def range_of(key: ManoeuvreKey) -> str:
 def campaign_path(path: str | Path) -> Path:
     """Return the campaign.toml that a folder or a file stands for; refuse with ArmidError where there is none."""
     if not os.path.exists(path):
-        raise ArmidError(f"campaign {shown(str(path))} does not exist, a folder with a {NAME} is expected")
+        raise ArmidError(f"campaign {quoted(str(path))} does not exist, a folder with a {NAME} is expected")
     if os.path.isfile(path):
         return Path(path)
     if not os.path.isfile(os.path.join(path, NAME)):
-        raise ArmidError(f"campaign {shown(str(path))} holds no {NAME}, a folder with one is expected")
+        raise ArmidError(f"campaign {quoted(str(path))} holds no {NAME}, a folder with one is expected")
     return Path(path) / NAME
 
 
@@ -270,14 +299,17 @@ def record_path(folder: Path, file: str, where: str) -> Path:
     """
     pure = PurePosixPath(file.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
-        raise ArmidError(f"{where}: file {shown(file)} leads out of the campaign's folder, a file inside is expected")
+        raise ArmidError(f"{where}: file {quoted(file)} leads out of the campaign's folder, a file inside is expected")
     if pure.suffix.lower() != SUFFIX or not file.isprintable():
-        raise ArmidError(f"{where}: file {shown(file)} is no CSV file, a name that ends in {SUFFIX} is expected")
+        raise ArmidError(f"{where}: file {quoted(file)} is no CSV file, a name that ends in {SUFFIX} is expected")
     path = os.path.join(folder, file)
     if not os.path.isfile(path):
-        there = sorted(p.name for p in folder.glob(f"*{SUFFIX}"))
-        raise ArmidError(f"{where}: file {shown(file)} does not exist, {nearest(file, there)}")
+        there = sorted(p.name for p in folder.glob(f"*{SUFFIX}") if p.is_file())
+        if os.path.lexists(path):
+            raise ArmidError(f"{where}: file {quoted(file)} does not exist: a folder or a dead link has that name, a "
+                             "CSV file is expected")  # fmt: skip
+        raise ArmidError(f"{where}: file {quoted(file)} does not exist, {nearest(file, there)}")
     real = Path(os.path.realpath(path))
     if not real.is_relative_to(os.path.realpath(folder)):
-        raise ArmidError(f"{where}: file {shown(file)} links out of the campaign's folder, a file inside is expected")
+        raise ArmidError(f"{where}: file {quoted(file)} links out of the campaign's folder, a file inside is expected")
     return real

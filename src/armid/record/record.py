@@ -16,7 +16,7 @@ NOISE_FREE = 1e-6
 class Noise:
     """Hold what is known of a sensor's noise.
 
-    rms: [rad/s or m/s], about the mean. mean: [same], not subtracted anywhere; None where no rest was recorded.
+    rms: [unit of the output], about the mean. mean: [same], not subtracted anywhere; None where no rest was recorded.
     correlation_time_s: time constant [s] of the exponential correlation with the same sum; 0 for white noise.
     effective_fraction: independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1]. n_samples: that were looked at.
     source: "rest" (the arm under its brake) or "differences" (high differences of the motion, which cannot tell a
@@ -45,13 +45,46 @@ class Irregularity:
 
 
 @dataclass(frozen=True, eq=False)
+class StartCorrection:
+    """Hold how the signals of a piece answer to its start, and how much of it a candidate lacks.
+
+    Beside a candidate's signals y the start moves by d = gain (x - y) + offset, x what was measured: the d that brings
+    x - y - slopes d down, of all outputs of the file together, and does not leave the start that the reader saw.
+
+    places: of the outputs in the plant. slopes: d signal / d start constant, SI, (n_constants, n_outputs, n_samples).
+    gain: (n_constants, n_seen); offset: (n_constants,). measured: samples in the window, the outputs one behind the
+    other, (n_seen,).
+    """
+
+    places: tuple[int, ...]
+    slopes: Array
+    gain: Array
+    offset: Array
+    measured: Array
+    window: slice
+
+    def corrected(self, outputs: Array) -> Array:
+        """Return signals from each candidate's own best start; outputs: of the plant, (n_outputs, n, n_samples)."""
+        seen = np.concatenate([outputs[place][:, self.window] for place in self.places], axis=1)
+        # no matrix product: its rounding of one candidate may depend on how many others there are
+        lacking = np.einsum("cn,sn->cs", self.measured - seen, self.gain) + self.offset
+        found = outputs.copy()
+        for place, slopes in zip(self.places, self.slopes.swapaxes(0, 1), strict=True):
+            found[place] += np.einsum("cs,sn->cn", lacking, slopes[:, : outputs.shape[2]])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class Piece:
     """Hold what is simulated in one go and compared with its measurement.
 
-    manoeuvre: from the piece's first sample on. measured: [rad/s or m/s], (n_samples,), the same grid.
+    manoeuvre: from the piece's first sample on. measured: [unit of the output], (n_samples,), the same grid.
     window: the samples that fitness and errors see. start_index: sample of the record at which the piece begins.
     start_deviation: constant (`start_position`, `start_speed`) -> standard deviation of its measured value, SI; empty
-    for a machine that starts from its declared state.
+    for a machine that starts from its declared state. n_spent: first samples that told the start of a record that is
+    held out, so that they judge nothing. shown_start: constant -> its measured value, SI, where a fit estimates these
+    constants beside the parameters, else empty; correction: what does so, about the constants of the manoeuvre, None
+    before.
     """
 
     manoeuvre: Manoeuvre
@@ -59,6 +92,9 @@ class Piece:
     window: slice
     start_index: int = 0
     start_deviation: Mapping[str, float] = field(default_factory=dict)
+    n_spent: int = 0
+    shown_start: Mapping[str, float] = field(default_factory=dict)
+    correction: StartCorrection | None = None
 
     @property
     def n_samples(self) -> int:
@@ -76,17 +112,18 @@ class Piece:
         return replace(self, manoeuvre=self.manoeuvre.shortened(stop), measured=self.measured[:stop])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Record:
-    """Hold one measurement: its file, its grid, what was measured on it, and the pieces to simulate.
+    """Hold one measured output of one file: its grid, what was measured on it, and the pieces to simulate.
 
-    file: name inside the campaign's folder. role: "train" or "holdout". unit: "rad/s" or "m/s".
+    file: name inside the campaign's folder. role: "train" or "holdout". unit: of the output, SI.
     manoeuvre: of the whole record, on an even grid from t = 0 (a plant from rest) or from the first sample (an axis).
-    measured: recorded speed [unit], (n_samples,), on that grid. rest: samples before t = 0 [unit], as in the file.
+    measured: recorded signal [unit], (n_samples,), on that grid. rest: samples before t = 0 [unit], as in the file.
     pieces: cut to the window; one piece unless `restart_s` was given. whole_pieces: the same before the window.
     earliest: first sample that may be in a window. columns: header -> the file's other columns on the grid, in the
     unit of the header. repeat_of: file of the record whose manoeuvre this one repeats, or "".
-    irregularity: None where the file's times were even.
+    irregularity: None where the file's times were even. output: name of the output, "" for a plant's only one.
+    others: records of the file's other outputs, with the same manoeuvres.
     """
 
     file: str
@@ -103,6 +140,17 @@ class Record:
     repeat_of: str = ""
     restart_s: float | None = None
     irregularity: Irregularity | None = None
+    output: str = ""
+    others: tuple["Record", ...] = ()
+
+    def __repr__(self) -> str:
+        return (f"<Record {self.file} ({self.role}): {len(self.measured)} samples of {self.manoeuvre.interval:g} s, "
+                f"noise {self.noise.rms:.3g} {self.unit}>")  # fmt: skip
+
+    @property
+    def each(self) -> tuple["Record", ...]:
+        """The records of all outputs of the file."""
+        return (self, *self.others)
 
     @property
     def times(self) -> Array:
@@ -125,6 +173,11 @@ class Record:
         return sum(p.duration for p in self.pieces)
 
     @property
+    def noises(self) -> dict[str, float]:
+        """Output -> rms of its noise [its unit], of all outputs of the file."""
+        return {one.output: one.noise.rms for one in self.each}
+
+    @property
     def is_noise_free(self) -> bool:
-        """Tell whether the noise is below a millionth of the largest speed: a simulation, not a measurement."""
+        """Tell whether the noise is below a millionth of the largest value: a simulation, not a measurement."""
         return self.noise.rms <= NOISE_FREE * float(np.max(np.abs(self.measured)))

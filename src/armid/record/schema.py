@@ -10,7 +10,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from armid.errors import ArmidError, nearest, shown
+from armid.errors import ArmidError, nearest, quoted
 from armid.record.table import LARGEST
 
 if TYPE_CHECKING:
@@ -45,8 +45,14 @@ def number(value: object) -> float:
 
 
 def above_zero(value: object) -> float:
-    """Return a number above 0."""
     if number(value) <= 0:
+        raise KindError(value)
+    return number(value)
+
+
+def share(value: object) -> float:
+    """Return a number from 0 to below 1."""
+    if not 0.0 <= number(value) < 1.0:
         raise KindError(value)
     return number(value)
 
@@ -97,8 +103,10 @@ def key(kind: Kind, expected: str) -> dict[str, Any]:
     return {"kind": kind, "expected": expected}
 
 
+LARGEST_TOML = 10_000_000
 HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'")
 CONSTANTS = key(table_of(number), "a finite number in SI")
+TOLERANCES = key(table_of(share), "a share from 0 to below 1")
 INPUTS = key(table_of(text), "the name of a column")
 BOUND = key(number, "a finite number in SI")
 WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds")
@@ -132,6 +140,7 @@ class CampaignSheet:
     gyro_range_deg_s: float | None = field(default=None, metadata=key(above_zero, "a range in deg/s above 0"))
     parameters: Mapping[str, dict[str, Any]] = field(default_factory=dict, metadata=PARAMETERS)
     constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
+    tolerances: Mapping[str, float] = field(default_factory=dict, metadata=TOLERANCES)
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
     hold: str = field(default="linear", metadata=HOLD)
 
@@ -156,7 +165,7 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
     Raises ArmidError for the first key that is unknown, missing or of another kind.
     """
     if not isinstance(table, dict):
-        raise ArmidError(f"{where} is {shown(table)}, a table is expected")
+        raise ArmidError(f"{where} is {quoted(table)}, a table is expected")
     declared: list[Field[Any]] = [f for f in fields(sheet) if f.metadata]
     known = [*(f.name for f in declared), *further]
     for name in table:
@@ -169,7 +178,7 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
             try:
                 values[f.name] = part(f.metadata["kind"], table[f.name], f.name)
             except KindError as error:
-                raise ArmidError(f"{where}: key {shown(error.path)} is {shown(error.found)}, {expected} is "
+                raise ArmidError(f"{where}: key {quoted(error.path)} is {quoted(error.found)}, {expected} is "
                                  "expected") from error  # fmt: skip
         elif f.default is MISSING and f.default_factory is MISSING:
             raise ArmidError(f"{where}: key '{f.name}' is missing, {expected} is expected")
@@ -180,7 +189,7 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
 
 def unknown_name(what: str, name: str, known: Collection[str], where: str) -> ArmidError:
     """Return the sentence for a name that nobody declared or registered."""
-    return ArmidError(f"{where}: {what} {shown(name)} is unknown, {nearest(name, known)}")
+    return ArmidError(f"{where}: {what} {quoted(name)} is unknown, {nearest(name, known)}")
 
 
 def load_toml(path: Path, named: str = "") -> dict[str, Any]:
@@ -190,6 +199,11 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
     """
     where = named or path.name
     try:
+        size = path.stat().st_size
+        if size > LARGEST_TOML:
+            raise ArmidError(
+                f"{where} has {size / 1e6:.0f} MB, at most {LARGEST_TOML / 1e6:.0f} MB of TOML are expected"
+            )
         content = path.read_bytes()
     except OSError as error:
         raise ArmidError(f"{where} cannot be read: {error.strerror or error}") from error

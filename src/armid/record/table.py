@@ -14,21 +14,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, nearest, shown
-from armid.model import Plant
+from armid.errors import ArmidError, nearest, quoted
+from armid.model import Output, Plant
+from armid.model.plant import SPEEDS
+from armid.units import DEGREE
 
 Array = NDArray[np.float64]
 LARGEST = 1e30
 LONGEST_HEADER = 1 << 16
 NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
-DEGREE = np.pi / 180.0
 TIME = "time_s"
-# header -> unit of the speed, SI, and factor; of a position: unit of the speed that it belongs to
-SPEEDS = {
-    "angular_velocity_deg_s": ("rad/s", DEGREE),
-    "angular_velocity_rad_s": ("rad/s", 1.0),
-    "velocity_m_s": ("m/s", 1.0),
-}
+# header of a position -> unit of the speed that it belongs to, factor
 QUANTITIES = ("angular_velocity", "velocity", "time", "drive")
 POSITIONS = {"position_m": ("m/s", 1.0), "angle_rad": ("rad/s", 1.0), "angle_deg": ("rad/s", DEGREE)}
 
@@ -66,11 +62,16 @@ def read_table(path: Path, file: str) -> CsvTable:
     """
     try:
         with path.open(encoding="utf-8-sig") as lines:
-            header = lines.readline(LONGEST_HEADER)
+            header = lines.readline(LONGEST_HEADER + 1)
+        if len(header) > LONGEST_HEADER:
+            raise ArmidError(f"{file}, line 1: the header has more than {LONGEST_HEADER} characters, a shorter one is "
+                             "expected")  # fmt: skip
         with warnings.catch_warnings():
             # of a file without rows; said below in a sentence of our own
             warnings.filterwarnings("ignore", message=".*input contained no data", category=UserWarning)
             values: Array = np.loadtxt(path, delimiter=",", comments=None, skiprows=1, ndmin=2, encoding="utf-8-sig")
+    except ArmidError:
+        raise
     except OSError as error:
         raise ArmidError(f"{file} cannot be read: {error.strerror or error}") from error
     except ValueError as error:
@@ -107,13 +108,13 @@ def column_names(header: str, file: str) -> list[str]:
                          "'time_s,angular_velocity_deg_s' is expected")  # fmt: skip
     names = [name.strip().strip('"').strip() for name in header.split(",")]
     if len(names) == 1 and any(separator in names[0] for separator in ";\t "):
-        raise ArmidError(f"{file}, line 1: one column {shown(names[0])} is there, columns separated by commas are "
+        raise ArmidError(f"{file}, line 1: one column {quoted(names[0])} is there, columns separated by commas are "
                          "expected")  # fmt: skip
     for i, name in enumerate(names):
         if not name or not name.isprintable():
-            raise ArmidError(f"{file}, line 1: column {i + 1} is called {shown(name)}, a readable name is expected")
+            raise ArmidError(f"{file}, line 1: column {i + 1} is called {quoted(name)}, a readable name is expected")
         if name in names[:i]:
-            raise ArmidError(f"{file}, line 1: column {shown(name)} is there twice, each name once is expected")
+            raise ArmidError(f"{file}, line 1: column {quoted(name)} is there twice, each name once is expected")
     return names
 
 
@@ -134,8 +135,8 @@ def wrong_line(path: Path, file: str, error: ValueError) -> ArmidError:
         elif text:
             for name, value in zip(names, fields, strict=True):
                 if not NUMBER.fullmatch(value):
-                    return ArmidError(f"{where}: {name} is {shown(value.strip())}, a finite number is expected")
-    return ArmidError(f"{file} cannot be read as a table of numbers: {shown(str(error))}")
+                    return ArmidError(f"{where}: {name} is {quoted(value.strip())}, a finite number is expected")
+    return ArmidError(f"{file} cannot be read as a table of numbers: {quoted(str(error))}")
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, bytes]]:
@@ -159,17 +160,34 @@ def time_column(table: CsvTable) -> Array:
     return times
 
 
-def speed_column(table: CsvTable, units: Sequence[str]) -> tuple[str, str, Array]:
-    """Return header, SI unit and SI values, (n_rows,), of the recorded speed; units: those that the plant can record.
+def output_columns(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, str]]:
+    """Return the plant, of several for one speed that of its unit, and its outputs in a file, each with its header.
 
-    Raises ArmidError unless exactly one of the known headers is there.
+    Raises ArmidError where there is none, or two columns for one, and for a speed in a unit that no plant records.
     """
-    found = [name for name in SPEEDS if name in table.columns]
-    header = table.only_one_of(found, "exactly one speed column is expected")
+    if plant.records_one_speed:
+        return speed_column(table, plant)
+    columns = {o: [c for c in o.factors if c in table.columns] for o in plant.outputs}
+    headers = {o: table.only_one_of(c, f"one column of {o.name} is expected") for o, c in columns.items()}
+    known = {o: header for o, header in headers.items() if header is not None}
+    if not known:
+        raise missing(table, "output", [c for o in plant.outputs for c in o.factors])
+    return plant, known
+
+
+def speed_column(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, str]]:
+    """Return the sibling of a plant for the unit of the recorded speed, and the header of its output."""
+    units_of = {c: unit for unit, (_, columns) in SPEEDS.items() for c in columns}
+    header = table.only_one_of([c for c in units_of if c in table.columns], "exactly one speed column is expected")
     if header is None:
-        raise missing(table, "speed column", [name for name, (unit, _) in SPEEDS.items() if unit in units])
-    unit, factor = SPEEDS[header]
-    return header, unit, table.columns[header] * factor
+        units = [p.output_unit for p in (plant, *plant.variants)]
+        raise missing(table, "speed column", [c for c, unit in units_of.items() if unit in units])
+    try:
+        sibling = plant.for_unit(units_of[header])
+    except ArmidError as error:
+        raise ArmidError(f"{table.file}, line 1: a speed in {units_of[header]} is not what is expected: "
+                         f"{error}") from error  # fmt: skip
+    return sibling, {sibling.outputs[0]: header}
 
 
 def position_of(table: CsvTable, unit: str) -> Array | None:
@@ -192,10 +210,10 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
     """
     for name, header in named.items():
         if name not in {i.name for i in plant.inputs}:
-            raise ArmidError(f"{where}: {shown(name)} in inputs is no input of plant '{plant.name}', "
+            raise ArmidError(f"{where}: {quoted(name)} in inputs is no input of plant '{plant.name}', "
                              f"{nearest(name, (i.name for i in plant.inputs))}")  # fmt: skip
         if header not in table.columns:
-            raise ArmidError(f"{where}: input '{name}' names the column {shown(header)}, which {table.file} does not "
+            raise ArmidError(f"{where}: input '{name}' names the column {quoted(header)}, which {table.file} does not "
                              f"have, {nearest(header, table.columns)}")  # fmt: skip
     found = dict(named)
     for wanted in plant.inputs:
@@ -224,5 +242,7 @@ def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
     alike = [name for name in table.columns if quantity_of(name) in quantities]
     wanted = " or ".join(expected) or "a name under [records.inputs]"
     if alike:
-        return ArmidError(f"{table.file}, line 1: column {shown(alike[0])} is in an unknown unit, {wanted} is expected")
-    return ArmidError(f"{table.file}, line 1: no {what} among {shown(list(table.columns))}, {wanted} is expected")
+        return ArmidError(
+            f"{table.file}, line 1: column {quoted(alike[0])} is in an unknown unit, {wanted} is expected"
+        )
+    return ArmidError(f"{table.file}, line 1: no {what} among {quoted(list(table.columns))}, {wanted} is expected")

@@ -9,13 +9,14 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
+from math import isfinite
 from typing import TYPE_CHECKING, Any, ClassVar, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.report.style import pyplot, thinned
-from armid.units import SHOWN, shown
+from armid.report.style import place_labels, pyplot, thinned
+from armid.units import shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 # Rows of a table that are shown; its file holds all.
 MOST_SHOWN = 60
+# A column that says the same in all rows of a page's table is told below it, from so many rows and columns on.
+LEAST_ROWS, LEAST_COLUMNS = 3, 4
 FIRST_NUMBER = re.compile(r"\s*(?:below )?([-+]?(?:inf|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?))(?=[\s%,;(]|$)")
 
 
@@ -44,6 +47,10 @@ class Column:
     factor: float = 1.0
 
 
+class Struck(str):
+    """A text that is shown struck through: it is told, and it does not hold."""
+
+
 @dataclass(frozen=True)
 class Cell:
     """A cell as shown, and the number (SI) it is sorted by; None for one that is sorted as text."""
@@ -55,6 +62,11 @@ class Cell:
     def key(self) -> str:
         """The number as a script reads it, "" for none."""
         return "" if self.number is None else repr(self.number).replace("inf", "Infinity")
+
+    @property
+    def is_struck(self) -> bool:
+        """Whether the text does not hold."""
+        return isinstance(self.text, Struck)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +108,20 @@ class Table:
         return [[cell(value, column) for value, column in zip(row, self.columns, strict=True)] for row in rows]
 
 
+def varying(part: Table) -> tuple[list[Column], list[list[Cell]], str]:
+    """Return what a narrow page shows of a table: columns whose cells differ, their cells, and what the others say.
+
+    Of fewer than three rows or four columns all are kept.
+    """
+    rows = part.cells()
+    texts = [{row[i].text for row in rows} - {""} for i in range(len(part.columns))]
+    kept = [i for i, told in enumerate(texts) if len(rows) < LEAST_ROWS or len(told) > 1 or len(texts) < LEAST_COLUMNS]
+    same = [f"{column.header} is {next(iter(told))}" for i, (column, told) in enumerate(zip(part.columns, texts,
+            strict=True)) if i not in kept and told]  # fmt: skip
+    note = f"In every line {', '.join(same)}." if same else ""
+    return [part.columns[i] for i in kept], [[row[i] for i in kept] for row in rows], note
+
+
 def table(
     title: str, columns: Sequence[object], rows: Sequence[Sequence[Any]], caption: str = "", name: str = ""
 ) -> Table:
@@ -112,7 +138,8 @@ def cell(value: Any, column: Column) -> Cell:
         # + 0.0 takes the sign off a zero
         return Cell(format(column.factor * float(value) + 0.0, column.digits), float(value))
     found = FIRST_NUMBER.match(str(value))
-    return Cell(str(value), float(found.group(1)) if found else None)
+    text = value if isinstance(value, Struck) else str(value)
+    return Cell(text, float(found.group(1)) if found else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +253,16 @@ class Document:
     main: tuple[Part, ...] = field(default=(), kw_only=True)
 
     @property
+    def said(self) -> list[str]:
+        """What must be known first, then the answer, a sentence each."""
+        return [sentence for sentence in (self.warning, *self.answer) if sentence]
+
+    @property
+    def main_tables(self) -> tuple[Table, ...]:
+        """The tables that a terminal shows."""
+        return tuple(p for p in self.main if isinstance(p, Table))
+
+    @property
     def tables(self) -> tuple[Table, ...]:
         """All tables in order."""
         return tuple(p for s in self.sections for p in s.parts if isinstance(p, Table))
@@ -237,12 +274,10 @@ class Document:
 
 
 def listing(title: str, text: str, folded: bool = False) -> Listing:
-    """Return a text as it is."""
     return Listing(title, lines(text), folded)
 
 
 def lines(text: str) -> tuple[Line, ...]:
-    """Return the lines of a text."""
     return tuple(Line(line) for line in text.splitlines())
 
 
@@ -277,7 +312,8 @@ Array = NDArray[np.float64]
 MOST_RECORDS = 24
 ERROR_NOTE = (
     "RMSE: pooled over all samples. NRMSE: each record divided by its rms. chi2/sample: mean of (residual/noise)^2, 1 "
-    "where only noise is left. S, S1, S2: similarity degrees of the paper (whole, numbers, shape), mean by duration."
+    "where only noise is left. S, S1, S2: similarity degrees of the paper (whole, numbers, shape), mean by duration; "
+    "not usable: only noise is left, and a landmark of noise spoils the shape."
 )
 
 
@@ -296,15 +332,40 @@ def value_text(entry: Mapping[str, Any]) -> str:
     return f"{value:.5g}{unit} ({low:.5g} to {high:.5g})"
 
 
+def stored_figures(titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str]) -> dict[str, tuple[Figure, ...]]:
+    """Return the figures of a page that are stored, by name. titles: name -> title and caption; svgs: name -> SVG."""
+    return {name: (Figure(name, *titles[name], svg=svg),) for name, svg in svgs.items()}
+
+
+def remark_parts(first: Sequence[str], rest: Sequence[str]) -> tuple[Sentences, ...]:
+    """Return what must be known, and what is for the record, where there is any."""
+    ranked = (("What must be known", first), ("For the record", rest))
+    return tuple(Sentences(tuple(sentences), title) for title, sentences in ranked if sentences)
+
+
+def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) -> tuple[Table, ...]:
+    """Return a table of the correlations of the estimates, none for a single one."""
+    rows = [(name, *row.values()) for name, row in correlation.items()]
+    note = "Near +1 or -1: a change of one is made up for by the other."
+    columns = ["parameter", *(Column(name, name, "+.3f") for name in correlation)]
+    return (table("Correlation of the estimates", columns, rows, note),) if len(rows) > 1 else ()
+
+
 def listed(names: Sequence[str]) -> str:
     """Return names as people list them."""
     return " and ".join(([", ".join(names[:-1])] if names[1:] else []) + list(names[-1:]))
 
 
 def error_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]], unit: str, note: str = "") -> Table:
-    """Return a table of errors. rows: the texts of the first columns, then the stored errors or None for none."""
-    name, factor = SHOWN[unit]
-    digits = {"s": ".4f", "s1": ".4f", "s2": ".4f", "rmse": ".4g", "nrmse": ".3%", "chi2_per_sample": ".4g"}
+    """Return a table of errors, of several outputs one below the other.
+
+    rows: the texts of the first columns, then the stored errors or None for none. unit: of the first output.
+    """
+    if len({name for *_, error in rows for name in (error or {}).get("outputs", ())}) > 1:
+        return output_table(title, first, rows, note)
+    factor, name = shown(1.0, unit)
+    # what decides stands first: what a narrow screen leaves out is the rest
+    digits = {"rmse": ".4g", "chi2_per_sample": ".4g", "s": ".4f", "nrmse": ".3%", "s1": ".4f", "s2": ".4f"}
     headers = {"rmse": f"RMSE, {name}", "nrmse": "NRMSE", "chi2_per_sample": "chi2/sample"}
     numbers = [Column(k, headers.get(k, k.upper()), d, factor if k == "rmse" else 1.0) for k, d in digits.items()]
     cells = []
@@ -312,8 +373,34 @@ def error_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]
         values = dict(error or dict.fromkeys(digits))
         if error is not None and error["chi2_per_sample"] is None:
             values["chi2_per_sample"] = "no noise"
+        if error is not None and error["s2"] is None and error["s1"] is not None:
+            values["s"] = values["s2"] = "not usable"
         cells.append((*texts, *(values[k] for k in digits)))
     return table(title, [*first, *numbers], cells, note)
+
+
+def output_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]], note: str) -> Table:
+    """Return a table of errors of several outputs, a row for each, with its unit."""
+    cells = [(*texts, name, f"{rmse_text(e, e['unit'])} {shown(0.0, e['unit'])[1]}", e["nrmse"],
+              "no noise" if e["chi2_per_sample"] is None else e["chi2_per_sample"], e["s"])
+             for *texts, error in rows for name, e in (error or {"outputs": {}})["outputs"].items()]  # fmt: skip
+    columns = ["output", "RMSE", Column("nrmse", "NRMSE", ".3%"), Column("chi2", "chi2/sample", ".4g"),
+               Column("s", "S", ".4f")]  # fmt: skip
+    return table(title, [*first, *columns], cells, note)
+
+
+def others_text(*errors: Mapping[str, Any] | None) -> str:
+    """Return the RMSE of the outputs beside the first, on each of some sets of records, "" where there is one output.
+
+    errors: stored errors of train and held-out records, None for no such records.
+    """
+    said: dict[str, list[str]] = {}
+    for error in (e for e in errors if e is not None):
+        first = next((e for e in error.get("outputs", {}).values() if e["rmse"] == error["rmse"]), None)
+        for name, e in error.get("outputs", {}).items():
+            if e is not first:
+                said.setdefault(name, []).append(f"{rmse_text(e, e['unit'])} {shown(0.0, e['unit'])[1]}")
+    return "".join(f" {name}: {' and '.join(texts)}." for name, texts in said.items())
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:
@@ -346,8 +433,14 @@ def setting_text(value: Any) -> str:
 def curve_entry(x: Array, y: Array) -> dict[str, list[float | None]]:
     """Return a curve for details.json: no more points than can be seen, five digits, null for what is not finite."""
     kept = thinned(np.nan_to_num(y))
-    return {k: [float(f"{v:.5g}") if np.isfinite(v) else None for v in values[kept]] for k, values in
-            (("x", x), ("y", y))}  # fmt: skip
+    return {"x": five_digits(x[kept]), "y": five_digits(y[kept])}
+
+
+def five_digits(values: Array) -> list[float | None]:
+    with np.errstate(invalid="ignore"):
+        scale = 10.0 ** (4.0 - np.floor(np.log10(np.maximum(np.abs(values), 1e-200))))
+        short = np.round(values * scale) / scale
+    return [v if isfinite(v) else None for v in short.tolist()]
 
 
 def points(curve: Mapping[str, Any]) -> tuple[Array, Array]:
@@ -363,20 +456,30 @@ def small_axes(width: float, height: float, heights: tuple[float, ...] = (1,)) -
                                      sharex=True, gridspec_kw=place | {"hspace": 0.12})  # fmt: skip
     for axis in axes.flat:
         axis.margins(x=0.01)
+        place_labels(axis)
     return figure, list(axes.flat)
 
 
-def record_axes(n: int, height: float, more: float, heights: Sequence[float] = (1,)) -> tuple[Any, list[list[Any]]]:
+def record_axes(n: int, height: float, heights: Sequence[float] = (1,)) -> tuple[Any, list[list[Any]]]:
     """Return a figure for n records in one or two columns, and the axes of each, above each other.
 
-    height: of a row of records, more: of the figure beside them [inch]; heights: shares of the axes of a record.
+    There is room for a title on top and a legend at the bottom. height: of a row of records [inch]; heights: shares of
+    the axes of a record.
     """
     columns, k = 1 if n == 1 else 2, len(heights)
     rows = -(-n // columns)
-    size = (6.8 * columns, height * rows + more)
-    figure, axes = pyplot().subplots(k * rows, columns, figsize=size, squeeze=False, height_ratios=list(heights) * rows,
-                                     layout="constrained")  # fmt: skip
-    cells = [list(axes[k * row : k * row + k, column]) for row in range(rows) for column in range(columns)]
-    for unused in (axis for cell in cells[n:] for axis in cell):
-        unused.set_visible(False)
-    return figure, cells[:n]
+    # as for `small_axes` margins are told, in inches: a layout engine takes longer than all the drawing
+    width, above, below, gap, between = 6.8 * columns, 0.95, 1.0, 0.85, 1.1
+    whole = height * rows + above + below - gap
+    figure = pyplot().figure(figsize=(width, whole))
+    grid = figure.add_gridspec(
+        rows, columns, left=between / width, right=1.0 - 0.15 / width, bottom=below / whole, top=1.0 - above / whole,
+        wspace=between / (6.8 - between), hspace=gap / (height - gap),
+    )  # fmt: skip
+    cells = []
+    for i in range(n):
+        inner = grid[i // columns, i % columns].subgridspec(k, 1, height_ratios=list(heights), hspace=0.08)
+        cells.append([figure.add_subplot(inner[j, 0]) for j in range(k)])
+        for axis in cells[-1]:
+            place_labels(axis)
+    return figure, cells

@@ -2,9 +2,13 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from armid.report.document import Document, Table
 from armid.report.style import save
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
@@ -30,6 +34,16 @@ def csv(table: Table) -> str:
     if not isinstance(frame, DataFrame):
         frame = DataFrame([list(row) for row in frame], columns=[c.key for c in table.columns])
     return str(frame.to_csv(index=False, lineterminator="\n"))
+
+
+def frame_of(table: Table) -> "DataFrame":
+    """Return the rows that are shown under their headings, numbers in the units of these."""
+    from pandas import DataFrame
+
+    heads = [c.header or c.key for c in table.columns]
+    rows = [[c.number * column.factor if column.digits and c.number is not None else c.text or None
+             for c, column in zip(row, table.columns, strict=True)] for row in table.cells()]  # fmt: skip
+    return DataFrame(rows, columns=heads)
 
 
 def latex(table: Table) -> str:

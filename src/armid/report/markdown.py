@@ -3,23 +3,18 @@
 import re
 from collections.abc import Iterator
 
-from armid.report.document import Document, Figure, Gallery, Listing, Part, Section, Sentences, Table, Text
+from armid.report.document import Document, Figure, Gallery, Listing, Part, Sentences, Table, Text
 
 
 def markdown(document: Document, made_by: str = "") -> str:
     """Return the page; made_by: a last sentence of its head, which may hold `code`."""
-    head = [f"# {escaped(document.title)}", escaped(document.question)]
-    head += [f"**{escaped(sentence)}**" for sentence in (document.warning, *document.answer[:1]) if sentence]
-    head += [escaped(" ".join(document.answer[1:])), bullets(document.facts), made_by]
-    parts = [*head, *(text for section in document.sections for text in section_texts(section))]
-    return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def section_texts(section: Section) -> Iterator[str]:
-    yield f"## {escaped(section.title)}"
-    yield escaped(section.text)
-    for part in section.parts:
-        yield from part_texts(part, section.title)
+    texts = [f"# {escaped(document.title)}", escaped(document.question)]
+    texts += [f"**{escaped(sentence)}**" for sentence in (document.warning, *document.answer[:1]) if sentence]
+    texts += [escaped(" ".join(document.answer[1:])), bullets(document.facts), made_by]
+    for section in document.sections:
+        texts += [f"## {escaped(section.title)}", escaped(section.text)]
+        texts += [text for part in section.parts for text in part_texts(part, section.title)]
+    return "\n\n".join(part for part in texts if part) + "\n"
 
 
 def part_texts(part: Part, section: str) -> Iterator[str]:
@@ -48,12 +43,11 @@ def table_text(table: Table) -> str:
     """Return a table, numbers to the right."""
     header = [escaped(c.header) for c in table.columns]
     rule = ["---:" if c.digits else "---" for c in table.columns]
-    rows = [[escaped(c.text) for c in row] for row in table.cells()]
+    rows = [[f"~~{escaped(c.text)}~~" if c.is_struck else escaped(c.text) for c in row] for row in table.cells()]
     return "\n".join(f"| {' | '.join(line)} |" for line in (header, rule, *rows))
 
 
 def bullets(sentences: tuple[str, ...]) -> str:
-    """Return sentences as a list."""
     return "\n".join(f"- {escaped(sentence)}" for sentence in sentences)
 
 
@@ -66,8 +60,9 @@ def code(listing: Listing) -> str:
 
 
 def escaped(text: str) -> str:
-    """Return text that stays in its place: one cell, no HTML, no link, no image."""
+    """Return text that stays in its place and as it is: one cell, no HTML, no link, no image, no emphasis."""
     for plain, safe in (("\\", "\\\\"), ("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "\\|"), ("\n", " ")):
         text = text.replace(plain, safe)
+    text = re.sub(r"\*|~~|(?<!\w)_|_(?!\w)", r"\\\g<0>", text)
     # every kind of link and image has a closing bracket before one of these
     return re.sub(r"\](?=\s*[(\[:])", r"\\]", text)

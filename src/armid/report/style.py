@@ -1,5 +1,6 @@
 """The style of every figure, and how figures are written."""
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
@@ -21,22 +22,39 @@ INK, PALE, GREY = "#222222", "0.75", "0.6"
 DPI = 130
 MANY_MARKS = 1_000
 MOST_POINTS = 1_000
+# Where labels stand outside of a frame [inch]: behind tick labels of six letters.
+BELOW_INCH, LEFT_INCH = 0.34, 0.6
 # Ids of an SVG come out of a hash; letters are drawn, so that no font is needed to read the file.
 SETTINGS: Any = {"svg.hashsalt": "armid", "svg.fonttype": "path"}
 # On a page letters stay text: smaller, and found by the search of a browser.
 PAGE_SETTINGS: Any = SETTINGS | {"svg.fonttype": "none", "font.family": "sans-serif"}
 
 
-def pyplot() -> Any:
-    """Return pyplot on a backend without a screen, in the house style, without the upper and right frame."""
-    import matplotlib as mpl
-    import seaborn as sns
+# Seaborn's theme "ticks", context "notebook": importing it for these numbers takes as long as drawing a figure. A title
+# whose height is told is not moved around ticks, which would measure all of them once more.
+SIDES = ("x", "y")
+THEME: Any = {
+    "axes.axisbelow": True, "axes.edgecolor": ".15", "axes.labelcolor": ".15", "axes.labelsize": 12.0,
+    "axes.linewidth": 1.25, "axes.titlesize": 12.0, "axes.titley": 1.0,
+    "axes.spines.top": False, "axes.spines.right": False,
+    "font.size": 12.0, "grid.color": ".8", "grid.linewidth": 1.0, "legend.fontsize": 11.0,
+    "legend.title_fontsize": 12.0, "lines.solid_capstyle": "round", "patch.edgecolor": "w",
+    "patch.force_edgecolor": True, "text.color": ".15",
+    **{f"{side}tick.color": ".15" for side in SIDES}, **{f"{side}tick.labelsize": 11.0 for side in SIDES},
+    **{f"{side}tick.major.size": 6.0 for side in SIDES}, **{f"{side}tick.major.width": 1.25 for side in SIDES},
+    **{f"{side}tick.minor.size": 4.0 for side in SIDES}, **{f"{side}tick.minor.width": 1.0 for side in SIDES},
+}  # fmt: skip
 
-    mpl.use("Agg")
+
+def pyplot() -> Any:
+    """Return pyplot on a backend without a screen (but a notebook's own), in the house style."""
+    import matplotlib as mpl
+
+    if "inline" not in os.environ.get("MPLBACKEND", ""):
+        mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    sns.set_theme(context="notebook", style="ticks", font_scale=1.0)
-    plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False} | SETTINGS)
+    plt.rcParams.update(THEME | SETTINGS)
     return plt
 
 
@@ -58,13 +76,24 @@ def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list
     return figure, flat[:n]
 
 
+def place_labels(axis: Any) -> None:
+    """Put the labels of an axis so many inches from its frame: by itself each draw would measure all ticks for that."""
+    from matplotlib.transforms import ScaledTranslation
+
+    shifts = [ScaledTranslation(x, y, axis.figure.dpi_scale_trans) for x, y in ((0.0, -BELOW_INCH), (-LEFT_INCH, 0.0))]
+    axis.xaxis.set_label_coords(0.5, 0.0, axis.transAxes + shifts[0])
+    axis.yaxis.set_label_coords(0.0, 0.5, axis.transAxes + shifts[1])
+
+
 def save(figure: Any, *paths: Path) -> None:
     """Write a figure as PNG or SVG, as each name says, and close it; the same figure gives the same bytes."""
     import matplotlib as mpl
 
-    # The layout takes longer than the drawing, and need not be found twice for each file.
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    write_names_as_they_are(figure)
+    # The layout takes longer than the drawing, and need not be found once more for each file.
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
     for axis in figure.axes:
         flatten_marks(axis)
     with mpl.rc_context(SETTINGS):
@@ -72,6 +101,31 @@ def save(figure: Any, *paths: Path) -> None:
             without = ("Date", "Creator") if path.suffix == ".svg" else ("Software",)
             figure.savefig(path, dpi=DPI, metadata=dict.fromkeys(without))
     pyplot().close(figure)
+
+
+def no_formulas() -> Any:
+    """Return a context for drawing without logarithmic axes by what lays out names before `save` sees them."""
+    import matplotlib as mpl
+
+    return mpl.rc_context({"text.parse_math": False})
+
+
+def write_names_as_they_are(artist: Any) -> None:
+    """Take the `$` of a name in a figure for no formula: only numbers along a logarithmic axis are formulas."""
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+    from matplotlib.ticker import LogFormatter
+
+    for child in artist.get_children():
+        if isinstance(child, Axis):
+            # its children would make further ticks, before its limits are known
+            named = [] if isinstance(child.get_major_formatter(), LogFormatter) else child.majorTicks
+            for text in (child.label, *(tick.label1 for tick in named)):
+                text.set_parse_math(False)
+        elif isinstance(child, Text):
+            child.set_parse_math(False)
+        else:
+            write_names_as_they_are(child)
 
 
 def flatten_marks(axis: Any) -> None:
@@ -87,6 +141,7 @@ def svg_text(figure: Any) -> str:
     import matplotlib as mpl
     import matplotlib.pyplot as plt
 
+    write_names_as_they_are(figure)
     text = StringIO()
     with mpl.rc_context(PAGE_SETTINGS):
         figure.savefig(text, format="svg", metadata={"Date": None})

@@ -1,71 +1,137 @@
-"""Show a document on a terminal: the answer first, then its main parts."""
+"""Show a document on a terminal: the answer first, then its main parts. No number is ever cut."""
 
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby
 from typing import TYPE_CHECKING
 
-from armid.report.document import Document, Sentences, Table, Text
+from armid.report.document import Cell, Column, Document, Sentences, Table, Text
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table as RichTable
+    from rich.text import Text as RichText
 
-
-# Columns of text and of tables where the output is no terminal.
-TEXT_WIDTH, TABLE_WIDTH = 120, 150
+# Letters that stand beside each column, and those of the frame.
+BESIDE, FRAME = 3, 1
+# A column of words is folded down to this width before another column is left out; one of numbers in words, such as
+# intervals, to the second.
+LEAST_WORDS, LEAST_NUMBERS = 12, 22
+FEW = 5
+# The first column tells the rows apart, and is not folded down to this width.
+NAME = 28
 
 
 def show(document: Document) -> None:
-    """Print warning, answer and main parts of a document; nothing from files is taken for markup or control codes."""
+    """Print warning, answer and main parts of a document; nothing from files is taken for markup or control codes.
+
+    The width is that of the terminal, or COLUMNS; into a pipe without either tables are 80 wide and sentences whole.
+    """
     from rich.console import Console
 
-    text_width, table_width = (None, None) if sys.stdout.isatty() else (TEXT_WIDTH, TABLE_WIDTH)
-    console = Console(width=table_width)
+    console = Console()
+    whole = not sys.stdout.isatty()
 
     def say(text: str) -> None:
-        console.print(printable(text), highlight=False, markup=False, emoji=False, width=text_width)
+        console.print(printable(text), highlight=False, markup=False, emoji=False, soft_wrap=whole)
 
-    for sentence in (document.warning, *document.answer):
-        if sentence:
-            say(sentence)
+    for sentence in document.said:
+        say(sentence)
     for part in document.main:
         if isinstance(part, Table):
-            console.print(drawn(part))
+            print_table(part, console)
             if part.note:
                 say(part.note)
         elif isinstance(part, Sentences):
-            for sentence in part.sentences:
-                say(f"- {sentence}")
+            for sentence in (part.title and f"{part.title}:", *(f"- {text}" for text in part.sentences)):
+                if sentence:
+                    say(sentence)
         elif isinstance(part, Text):
             say(part.text)
 
 
-def drawn(table: Table) -> "RichTable":
-    """Return a table as rich draws it; what the first column of a grouped one repeats becomes a line of its own."""
-    from rich.box import SIMPLE_HEAD
+def print_table(table: Table, console: "Console") -> None:
+    """Print the columns of a table that fit, the first ones first, and name the others below.
+
+    Rows of a grouped table that share the first column stand under it as a heading.
+    """
+    rows, columns = table.cells(), list(table.columns)
+    if not console.is_terminal:
+        # nothing can be struck through in a pipe
+        rows = [[replace(c, text=f"~{c.text}~") if c.is_struck else c for c in row] for row in rows]
+    skip = int(table.grouped and len(columns) > 1)
+    widths = fitted(columns[skip:], [row[skip:] for row in rows], console.width)
+    names = [printable(c.header or c.key) for c in columns[skip + len(widths) :] if c.header or table.name]
+    kept = columns[skip : skip + len(widths)]
+    console.print(printable(table.title), style="italic", markup=False, highlight=False, soft_wrap=True)
+    for i, (group, own) in enumerate(groupby(rows, lambda row: row[0].text if skip else "")):
+        if skip and group:
+            heading = f"{printable(columns[0].header)}: {printable(group)}"
+            console.print(heading, style="bold", markup=False, highlight=False, soft_wrap=True)
+        console.print(drawn(kept, [row[skip:] for row in own], widths, not i))
+    if names:
+        place = f"in {table.name}.csv" if table.name else "on the page, and on a wider terminal"
+        console.print(f"({place}: {', '.join(names)})", style="dim", markup=False, highlight=False, soft_wrap=True)
+
+
+def fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int) -> list[int]:
+    """Return the widths of the columns that fit into so many letters, the first of them at least.
+
+    Intervals are folded where fewer than five columns would fit otherwise.
+    """
+    whole, folded = (folded_to(columns, rows, room, least) for least in (LEAST_NUMBERS, LEAST_WORDS))
+    return folded if len(whole) < min(FEW, len(columns)) else whole
+
+
+def folded_to(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int, least_numbers: int) -> list[int]:
+    texts = [[cell.text for cell in cells] for _, *cells in zip(columns, *rows, strict=True)]
+    heads = [words(column.header).splitlines() or [""] for column in columns]
+    cells = [max((len(line) for text in own for line in text.splitlines()), default=0) for own in texts]
+    whole = [max(width, len(column.header)) for width, column in zip(cells, columns, strict=True)]
+    least = []
+    for column, head, own, width in zip(columns, heads, texts, cells, strict=True):
+        longest = max(len(word) for word in head)
+        parts = max((len(word) for text in own for word in text.split()), default=0)
+        folded = least_numbers if any(c.isdigit() for text in own for c in text) else LEAST_WORDS
+        least.append(max(longest, width if column.digits else min(width, max(folded, parts))))
+    least[0] = min(whole[0], max(least[0], NAME))
+    n = max((k for k in range(1, len(columns) + 1) if FRAME + sum(least[:k]) + BESIDE * k <= room), default=1)
+    widths = least[:n]
+    left = room - FRAME - sum(widths) - BESIDE * n
+    for i in range(n):
+        more = max(min(left, whole[i] - widths[i]), 0)
+        widths[i], left = widths[i] + more, left - more
+    widths[0] = min(widths[0], max(room - FRAME - BESIDE, 1))
+    return widths
+
+
+def words(header: str) -> str:
+    """Return a heading with each of its words on a line of its own, so that it is no wider than its numbers."""
+    return printable(header).replace(" ", "\n")
+
+
+def drawn(
+    columns: Sequence[Column], rows: Sequence[Sequence[Cell]], widths: Sequence[int], headed: bool
+) -> "RichTable":
     from rich.table import Table as RichTable
     from rich.text import Text as RichText
 
-    rows = [[RichText(printable(c.text)) for c in row] for row in table.cells()]
-    title = RichText(printable(table.title), style="italic")
-    if not table.grouped:
-        made = RichTable(title=title)
-        for column in table.columns:
-            made.add_column(RichText(printable(column.header)))
-        for row in rows:
-            made.add_row(*row)
-        return made
-    made = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    first, *others = table.columns
-    for column in others:
-        header = RichText(printable(column.header.replace(" ", "\n", 1)))
-        made.add_column(header, justify="right" if column.digits else "left")
-    before = ""
-    for group, *cells in rows:
-        if group.plain != before:
-            made.add_section()
-            made.add_row(RichText(f"{printable(first.header)}: {group}"), style="bold")
-        before = group.plain
-        made.add_row(*cells)
+    made = RichTable(show_header=headed)
+    for column, width in zip(columns, widths, strict=False):
+        header = printable(column.header)
+        # as Text: a name is no markup
+        shown = RichText(header if len(header) <= width else words(column.header))
+        made.add_column(shown, width=width, overflow="fold", justify="right" if column.digits else "left")
+    for row in rows:
+        made.add_row(*(text_of(cell) for cell, _ in zip(row, widths, strict=False)))
     return made
+
+
+def text_of(cell: Cell) -> "RichText":
+    from rich.text import Text as RichText
+
+    return RichText(printable(cell.text), style="strike" if cell.is_struck else "")
 
 
 def printable(text: str) -> str:

@@ -1,5 +1,6 @@
 """Cases out of the study's file: simulated ones, random ones, and campaigns; and the records of simulated ones."""
 
+import fnmatch
 import hashlib
 import os.path
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,14 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine import FINE, Schedule, calibrate, simulate
-from armid.errors import ArmidError, shown
+from armid.errors import ArmidError, quoted
 from armid.model import Manoeuvre, Model, Plant
 from armid.problem.space import Space, space_of
-from armid.record import Campaign, Noise, Override, Record, read_campaign
+from armid.problem.suite import DEFINITIONS, N_INSTANCES, SuiteProblem
+from armid.record import Campaign, Noise, Override, Piece, Record, read_campaign
 from armid.record.reader import campaign_path, record_constants
-from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, part, with_window
+from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
-from armid.study.spec import WHOLE, CaseSpec, ManoeuvreSpec, RandomCasesSpec, StudyRegistry, StudySpec, lookup
+from armid.study.spec import (
+    WHOLE,
+    CaseSpec,
+    ManoeuvreSpec,
+    RandomCasesSpec,
+    StudyRegistry,
+    StudySpec,
+    SuiteSpec,
+    lookup,
+)
 
 Array = NDArray[np.float64]
 DEGREE = np.pi / 180.0
@@ -48,7 +59,8 @@ class Case:
 
     truth: parameter -> true value, SI, empty where not known; all parameters of the model where the records are
     simulated. published: values of others to stand beside. space: bounds and fixed values.
-    strokes: manoeuvres to simulate, each with its constants (SI), duration_s and role; or source: the campaign to read.
+    strokes: manoeuvres to simulate, each with its constants (SI), duration_s and role; or source: the campaign to read;
+    or suite: the problem of `armid.suite()`, which has a fitness of its own.
     """
 
     name: str
@@ -58,6 +70,7 @@ class Case:
     published: Mapping[str, float] = field(default_factory=dict)
     strokes: tuple[dict[str, Any], ...] = ()
     source: Source | None = None
+    suite: SuiteProblem | None = None
 
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
@@ -82,12 +95,14 @@ def cases_of(spec: StudySpec, model: Model, registry: StudyRegistry, folder: Pat
     cases = []
     for i, table in enumerate(spec.cases):
         name = table.get("name")
-        at = f"{where}, case {shown(name) if isinstance(name, str) else i + 1}"
+        at = f"{where}, case {quoted(name) if isinstance(name, str) else i + 1}"
         cases.append(_case(validated(CaseSpec, table, at), spec, model, registry, folder, at))
+    if spec.suite is not None:
+        cases += suite_cases(spec, f"{where}, suite")
     if spec.random_cases is not None:
         cases += _random_cases(spec, model, f"{where}, random_cases")
     if not cases:
-        raise ArmidError(f"{where}: there is no case, a table [[cases]] or [random_cases] is expected")
+        raise ArmidError(f"{where}: there is no case, a table [[cases]], [random_cases] or [suite] is expected")
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
@@ -96,6 +111,26 @@ def cases_of(spec: StudySpec, model: Model, registry: StudyRegistry, folder: Pat
             raise ArmidError(f"{where}: the name of case '{name}' holds '/', which --only needs between case and "
                              "identifier, another sign is expected")  # fmt: skip
     return tuple(cases)
+
+
+def suite_cases(spec: StudySpec, where: str, train: bool = False) -> list[Case]:
+    """Return the instances of the suite that a study names, or those that `armid tune` learns from."""
+    wanted = validated(SuiteSpec, spec.suite, where)
+    if spec.plant != "shell_transfer_arm" or spec.effects:
+        raise ArmidError(f"{where}: the suite brings its effects, plant 'shell_transfer_arm' without any is expected")
+    for pattern in wanted.problems:
+        if not fnmatch.filter(DEFINITIONS, pattern):
+            raise unknown_name("problem", pattern, DEFINITIONS, where)
+    instances = wanted.train if train else wanted.instances
+    if not instances or max(instances) > N_INSTANCES or len(set(instances)) < len(instances):
+        raise ArmidError(f"{where}: {'train' if train else 'instances'} is {list(instances)}, different ones from 1 to "
+                         f"{N_INSTANCES} are expected")  # fmt: skip
+    names = [name for name in DEFINITIONS if any(fnmatch.fnmatchcase(name, p) for p in wanted.problems)]
+    problems = [SuiteProblem(name, i, units="SI") for name in names for i in instances]
+    return [
+        Case(p.name.replace("/", " "), p.model, p.space, dict(zip(p.names, p.truth.tolist(), strict=True)), suite=p)
+        for p in problems
+    ]
 
 
 def _case(
@@ -155,14 +190,14 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
     """
     pure = PurePosixPath(campaign.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(campaign).drive or ".." in pure.parts or not campaign.isprintable():
-        raise ArmidError(f"{where}: campaign {shown(campaign)} leads out of the folder of the study, a folder inside "
+        raise ArmidError(f"{where}: campaign {quoted(campaign)} leads out of the folder of the study, a folder inside "
                          "is expected")  # fmt: skip
     try:
         toml = campaign_path(folder / pure)
     except ArmidError as error:
         raise ArmidError(f"{where}: {error}") from error
     if not Path(os.path.realpath(toml)).is_relative_to(os.path.realpath(folder)):
-        raise ArmidError(f"{where}: campaign {shown(campaign)} links out of the folder of the study, a folder inside "
+        raise ArmidError(f"{where}: campaign {quoted(campaign)} links out of the folder of the study, a folder inside "
                          "is expected")  # fmt: skip
     return toml.parent
 
@@ -305,6 +340,7 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
         record = Record(
             file=name, role=stroke["role"], unit=model.plant.output_unit, manoeuvre=manoeuvre, measured=run.output[0],
             rest=np.empty(0), noise=Noise(0.0, 0.0, 0.0, 1.0, n_samples, KNOWN), pieces=(), whole_pieces=(),
+            output=model.plant.outputs[0].name,
         )  # fmt: skip
         records.append(_with_signal(record, run.output[0]))
     return tuple(records)
@@ -312,7 +348,7 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
 def _with_signal(record: Record, measured: Array) -> Record:
     """Return the record with another signal over its whole length, in one piece."""
-    pieces = (part(record.manoeuvre, measured, 0, measured.size, {}),)
+    pieces = (Piece(record.manoeuvre, measured, slice(0, measured.size)),)
     return replace(record, measured=measured, pieces=pieces, whole_pieces=pieces)
 
 

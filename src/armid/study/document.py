@@ -9,14 +9,22 @@ import numpy as np
 
 from armid.errors import ArmidError
 from armid.report.document import Document, Line, Listing, Part, Section, listing
+from armid.report.files import write_files
+from armid.report.html import html
+from armid.report.markdown import markdown
+from armid.report.result import NewFiles
 from armid.study.analyses.analysis import PAPER, Evidence, wide_runs
-from armid.study.analyses.catalogue import ANALYSES, OwnAnalyses, check_names, own_sections
+from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, check_names, own_sections
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
+from armid.study.analyses.ranks import class_ranks, suite_answer
 from armid.study.results import StudyResults
 from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
 
+BESIDE = "each table is there as CSV and LaTeX too, each figure as SVG."
 MOST_SETTINGS = 2
+# Of the paper's simulations: what its table is to be beaten with.
+QUARTER = 0.25
 ALONE = "A seed decides the search alone; the noise is the records' own."
 PAIRED = "The same seed gives the same noise to all identifiers, so that they are compared in pairs."
 SYNTHETIC = (
@@ -60,10 +68,10 @@ def report_of(
     check_names(own)
     if kind == IDENTIFIES:
         evidence = Evidence(results)
-        found = [Section(a.title, tuple(a.parts(evidence))) for a in ANALYSES]
+        found = [Section(a.title, tuple(a.parts(evidence))) for a in (OF_SUITES if evidence.is_suite else ANALYSES)]
         sections, facts, runs = tuple(s for s in found if s.parts), facts_of(evidence), wide_runs(evidence)
         main = sections[0].parts
-        answer = nearest(main[0], evidence.settings) if evidence.knows_truth else (lowest_fitness(evidence),)
+        answer = answer_of(evidence, main[0])
     else:
         runs = loop_runs(results.loops)
         main = (verdicts(runs),)
@@ -81,10 +89,56 @@ def report_of(
 def summary_of(results: StudyResults) -> Document:
     """Return state and main table alone; no trace is read."""
     if known_kind(results.study) == IDENTIFIES:
-        main = main_table(Evidence(results))
+        evidence = Evidence(results)
+        main = class_ranks(evidence) if evidence.is_suite else main_table(evidence)
+        answer = answer_of(evidence, main)
     else:
-        main = verdicts(loop_runs(results.loops))
-    return Document(results.study["name"], "Study", "", (state_of(results.study),), (), main=(main,))
+        runs = loop_runs(results.loops)
+        main, answer = verdicts(runs), (counted(runs),)
+    return Document(results.study["name"], "Study", str(results.study.get("question", "")),
+                    (*answer, state_of(results.study)), (), main=(main,))  # fmt: skip
+
+
+def answer_of(evidence: Evidence, overview: Any) -> tuple[str, ...]:
+    """Return the answer to the question of a study that identifies; overview: its main table."""
+    if evidence.is_suite:
+        return suite_answer(evidence)
+    if not evidence.knows_truth:
+        return (lowest_fitness(evidence),)
+    return (*beside_paper(evidence, overview.frame), *nearest(overview, evidence.settings))
+
+
+def beside_paper(evidence: Evidence, frame: Any) -> tuple[str, ...]:
+    """Return whether the paper's table is reproduced, and beaten at a quarter of the cost; nothing without its row."""
+    setting = evidence.settings[0]
+    ours = frame[(frame["variant"] != PAPER) & (frame["setting"] == setting)].set_index("variant")
+    swarms = ours.loc[[v for v in ours.index if v.startswith("pso") and "+" not in v]]
+    printed = frame.loc[frame["variant"] == PAPER, "largest_median"]
+    if printed.empty or swarms.empty:
+        return ()
+    paper, swarm = float(printed.iloc[0]), swarms.iloc[0]
+    cheap = ours[ours["used"] <= QUARTER * swarm["used"]]
+    best = cheap.loc[cheap["largest_median"].idxmin()] if len(cheap) else None
+    reproduced = swarm["largest_median"] <= paper
+    beaten = best is not None and best["largest_median"] < min(paper, swarm["largest_median"])
+    words = {(True, True): "Yes, reproduced and beaten", (True, False): "Reproduced, not beaten",
+             (False, True): "Not reproduced by its own method, but beaten", (False, False): "No"}  # fmt: skip
+    cost = "" if best is None else (f"; with at most a quarter of these, {best.name} is off by "
+                                    f"{percent(best['largest_median'])} with {best['used']:,.0f}")  # fmt: skip
+    return (f"{words[bool(reproduced), bool(beaten)]}: the paper's printed values are off by {percent(paper)} (largest "
+            f"error of a run, median), its own swarm here ({swarm.name}) by {percent(swarm['largest_median'])} with "
+            f"{swarm['used']:,.0f} simulations{cost}.",)  # fmt: skip
+
+
+def write_report(document: Document, files: NewFiles) -> None:
+    """Write every table as CSV and LaTeX, every figure as PNG and SVG, report.md, and all of it as report.html."""
+    write_files(document, files.path)
+    commands = document.sections[-1].parts[0]
+    again = commands.lines[1].text if isinstance(commands, Listing) else ""
+    files.path("report.md").write_text(markdown(document, f"Made from the stored results by `{again}`; {BESIDE}"),
+                                       encoding="utf-8")  # fmt: skip
+    svgs = {f.name: (files.place / f"{f.name}.svg").read_text(encoding="utf-8") for f in document.figures}
+    files.path("report.html").write_text(html(document, svgs), encoding="utf-8")
 
 
 def known_kind(study: dict[str, Any]) -> str:
@@ -150,7 +204,7 @@ def facts_of(evidence: Evidence) -> tuple[str, ...]:
         origin(study),
         f"Plant: {study['plant']}{effects}. Fitness: {', '.join(dict.fromkeys(runs['fitness']))}.",
         f"{len(evidence.cases)} cases, {len(evidence.variants)} identifiers, {runs['seed'].nunique()} seeds, "
-        f"noise and windows: {'; '.join(evidence.settings)}.",
+        f"{'budgets' if evidence.is_suite else 'noise and windows'}: {'; '.join(evidence.settings)}.",
         f"Budget: {' and '.join(f'{b:g}' for b in sorted(set(runs['budget'])))} simulations a run; "
         f"{runs['used'].sum():,.0f} in all.",
         PAIRED if runs["noise_deg_s"].notna().any() else ALONE,

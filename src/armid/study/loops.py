@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from numpy.random import default_rng
 
-from armid.errors import ArmidError, nearest, shown
+from armid.errors import ArmidError, nearest, quoted
 from armid.loop import close_loop, report_of
 from armid.record import read_campaign
 from armid.record.reader import NAME, SUFFIX
@@ -54,6 +54,7 @@ class LoopStudy:
 
     @property
     def case_names(self) -> list[str]:
+        """Names of the campaigns."""
         return [case.name for case in self.cases]
 
     @classmethod
@@ -72,7 +73,7 @@ class LoopStudy:
         candidates = tuple(n for n in spec.candidates or registry.effects if n not in spec.without)
         return cls(spec, text, folder, _campaigns(spec, folder, where), candidates, registry)
 
-    def check(self) -> None:
+    def check(self, _: object) -> None:
         """Nothing is to be checked: a campaign that cannot be read fails alone."""
 
     def candidates_for(self, case: str) -> tuple[str, ...]:
@@ -137,14 +138,14 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> tuple[LoopCase, ...]
     place = folder / spec.campaigns
     made = f", `{spec.made_by}` makes them" if spec.made_by else ", a folder of campaigns is expected"
     if not place.is_dir():
-        raise ArmidError(f"{where}: there are no campaigns in {shown(spec.campaigns)}{made}")
+        raise ArmidError(f"{where}: there are no campaigns in {quoted(spec.campaigns)}{made}")
     names = sorted(path.name for path in place.iterdir() if (path / NAME).is_file())
     if not names:
-        raise ArmidError(f"{where}: {shown(spec.campaigns)} holds no folder with a {NAME}{made}")
+        raise ArmidError(f"{where}: {quoted(spec.campaigns)} holds no folder with a {NAME}{made}")
     for pattern in spec.only:
         if not any(fnmatchcase(name, pattern) for name in names):
-            raise ArmidError(f"{where}: key 'only' holds {shown(pattern)}, which is no campaign of "
-                             f"{shown(spec.campaigns)}, {nearest(pattern, names)}")  # fmt: skip
+            raise ArmidError(f"{where}: key 'only' holds {quoted(pattern)}, which is no campaign of "
+                             f"{quoted(spec.campaigns)}, {nearest(pattern, names)}")  # fmt: skip
     chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in spec.only)]
     return tuple(LoopCase(name, _digest(place / name)) for name in chosen)
 

@@ -5,13 +5,15 @@ concurrent.futures cannot stop the one run that hangs, and when a worker dies fa
 """
 
 import os
+import pickle
 import signal
+import struct
 import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
@@ -19,17 +21,29 @@ from pathlib import Path
 
 from armid.errors import ArmidError
 from armid.study.outcome import FAILED, ClaimedRun, Outcome
-from armid.study.worker import FINISHED, READY
+from armid.study.worker import FINISHED, READY, REFUSED
 
 # Runs that a worker has before it: while it performs one, the next lies ready.
 AHEAD = 2
 # How often a run may take its worker with it: the first time it may have been someone else's kill.
 MOST_DEATHS = 2
+# How often a worker that ends before it is ready is started again: it may have been someone's kill.
+MOST_STARTS = 3
 # A process that does not even start within this time [s] never will.
 START_S = 300.0
 # Short runs are fetched from the store as many at a time as take about this long [s], but no more than so many.
 BATCH_S, LARGEST_BATCH = 0.5, 64
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+LENGTH, LONGEST_MESSAGE = struct.Struct("!i"), 1 << 28
+
+
+class GarbledError(OSError):
+    """Tell that a worker's pipe holds what no worker writes."""
+
+    def __str__(self) -> str:
+        return "what came from the worker process is no message of ours: something in the run writes into its pipe"
 
 
 @dataclass(frozen=True)
@@ -40,6 +54,15 @@ class WorkerSetup:
     plugins: tuple[str, ...]
     folder: Path
     time_limit: float
+
+
+def performed_apart(setup: WorkerSetup, run: ClaimedRun) -> Outcome:
+    """Perform one run in a worker process of its own."""
+    worker = WorkerProcess(setup)
+    try:
+        return worker.perform([run])[0]
+    finally:
+        worker.stop()
 
 
 class BatchSize:
@@ -78,7 +101,6 @@ class LocalPool:
         return enough + self._batch.n_runs if self.held <= enough else 0
 
     def give(self, runs: Sequence[ClaimedRun]) -> None:
-        """Add runs."""
         self._waiting.extend(runs)
         self._hand_out()
 
@@ -119,6 +141,7 @@ class WorkerProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
         self._ready, self._since = False, 0.0
+        self._inbox, self._unready = bytearray(), 0
 
     @property
     def held(self) -> int:
@@ -133,7 +156,6 @@ class WorkerProcess:
         return self._connection
 
     def give(self, runs: list[ClaimedRun]) -> None:
-        """Add runs."""
         self.waiting.extend(runs)
         self._send()
 
@@ -146,10 +168,10 @@ class WorkerProcess:
         """Return what the worker has finished, without waiting; a dead worker or one that hangs is dealt with."""
         outcomes: list[Outcome] = []
         try:
-            while self.connection.poll():
-                outcomes += self._take(*self.connection.recv())
-        except (EOFError, OSError):
-            return outcomes + self._after_death()
+            for word, content in self._messages():
+                outcomes += self._take(word, content)
+        except (EOFError, OSError) as error:
+            return outcomes + self._after_death(str(error) if isinstance(error, GarbledError) else "")
         if self.held and self.seconds_left() <= 0.0:
             started = self._ready
             self.stop()
@@ -175,12 +197,13 @@ class WorkerProcess:
         if self._connection is not None:
             self._connection.close()
         self._process, self._connection, self._ready = None, None, False
+        self._inbox.clear()
 
     def _start(self) -> Connection:
         ours, theirs = Pipe()
         command = [sys.executable, "-P", "-m", "armid.study.worker", str(theirs.fileno()), str(os.getpid())]
         nothing = subprocess.DEVNULL
-        with theirs:
+        with theirs, sigint_blocked():
             # a session of its own: Ctrl-C reaches the process that decides, and no worker
             self._process = subprocess.Popen(
                 command, stdin=nothing, stdout=nothing, stderr=nothing, pass_fds=(theirs.fileno(),),
@@ -192,17 +215,45 @@ class WorkerProcess:
             ours.send((self.setup.kind, self.setup.plugins, str(self.setup.folder)))
         return ours
 
+    def _messages(self) -> Iterator[tuple[str, object]]:
+        """Yield what has come as a whole; a part of a message waits for the rest, so that nothing is waited for here.
+
+        A message is its length in four bytes, as `Connection.send` writes it, and a pickled pair of word and content.
+        Raises EOFError when the worker has closed its end, GarbledError for what is no message.
+        """
+        while self.connection.poll():
+            part = os.read(self.connection.fileno(), 1 << 16)
+            if not part:
+                raise EOFError
+            self._inbox += part
+        while len(self._inbox) >= LENGTH.size:
+            (length,) = LENGTH.unpack(self._inbox[: LENGTH.size])
+            if not 0 < length <= LONGEST_MESSAGE:
+                raise GarbledError
+            if len(self._inbox) < LENGTH.size + length:
+                return
+            content = bytes(self._inbox[LENGTH.size : LENGTH.size + length])
+            del self._inbox[: LENGTH.size + length]
+            try:
+                word, found = pickle.loads(content)
+            except Exception as error:
+                raise GarbledError from error
+            yield word, found
+
     def _take(self, word: str, content: object) -> list[Outcome]:
         self._since = self._clock()
         outcomes: list[Outcome] = []
         if word == FINISHED:
-            assert isinstance(content, Outcome)
+            if not (isinstance(content, Outcome) and self._sent and content.run == self._sent[0].run):
+                raise GarbledError
             self._sent.popleft()
             outcomes.append(content)
         elif word == READY:
-            self._ready = True
-        else:
+            self._ready, self._unready = True, 0
+        elif word == REFUSED:
             raise ArmidError(str(content))
+        else:
+            raise GarbledError
         self._send()
         return outcomes
 
@@ -215,13 +266,19 @@ class WorkerProcess:
                 self.connection.send(self.waiting[0])
                 self._sent.append(self.waiting.popleft())
 
-    def _after_death(self) -> list[Outcome]:
-        """Start anew; a run that has taken two workers with it has failed."""
+    def _after_death(self, cause: str) -> list[Outcome]:
+        """Start anew; a run that has taken two workers with it has failed. cause: "" for how the process ended."""
         assert self._process is not None
-        started, code = self._ready, self._process.wait()
+        started = self._ready
+        if cause:
+            self._process.kill()
+        cause = cause or f"the worker process ended {_cause(self._process.wait())}"
         self.stop()
+        self._unready += not started
+        if not started and self._unready < MOST_STARTS:
+            return []
         if not started:
-            raise ArmidError(f"a worker process cannot start: it ends {_cause(code)}")
+            raise ArmidError(f"a worker process cannot start: {cause.replace('the worker process ended', 'it ends')}")
         if not self._sent:
             return []
         run = self._sent[0].run
@@ -229,7 +286,7 @@ class WorkerProcess:
         if self._deaths[run] < MOST_DEATHS:
             self._take_back()
             return []
-        return self._failed(f"the worker process ended {_cause(code)}, {MOST_DEATHS} times")
+        return self._failed(f"{cause}, {MOST_DEATHS} times")
 
     def _failed(self, error: str) -> list[Outcome]:
         run = self._sent.popleft().run
@@ -240,6 +297,19 @@ class WorkerProcess:
         """Put runs that a lost worker had before it back to the front."""
         self.waiting.extendleft(reversed(self._sent))
         self._sent.clear()
+
+
+@contextmanager
+def sigint_blocked() -> Iterator[None]:
+    """Let what is started meanwhile begin its life without SIGINT, until it ignores it by itself."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _cause(code: int) -> str:

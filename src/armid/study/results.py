@@ -6,16 +6,29 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from armid.errors import ArmidError
+from armid.errors import ArmidError, nearest
+from armid.report.result import NewFiles, Shown
 from armid.study.outcome import DONE, RunTrace, unpacked
-from armid.study.store import FILE_NAME, WAIT_S, check_format, corruption_guard, description_of, translate_errors
+from armid.study.store import (
+    FILE_NAME,
+    WAIT_S,
+    check_content,
+    check_format,
+    corruption_guard,
+    description_of,
+    translate_errors,
+)
+
+if TYPE_CHECKING:
+    from armid.report.document import Document
 
 RUNS = """
 SELECT p.run, p."case", p.identifier, p.fitness, p.noise_deg_s, p.window, p.seed, p.budget, i.used, i.n_failed, i.value,
@@ -35,9 +48,11 @@ NUMBERS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s
 COUNTED = ("used", "n_failed")
 
 
-@dataclass(frozen=True, eq=False)
-class StudyResults:
+@dataclass(frozen=True, eq=False, repr=False)
+class StudyResults(Shown):
     """Hold what a study had found when it was loaded; traces are read from the store when they are asked for.
+
+    It prints itself, and has `table`, `plot()`, `to_dict()`, `save(folder)`.
 
     Only runs that the study asks for count: settings that are no longer in its file are left out.
     study: name, question, kind, text (the TOML file as run), folder, cases (name, truth, published, bounds, units),
@@ -53,6 +68,33 @@ class StudyResults:
     study: dict[str, Any]
     runs: pd.DataFrame
     parameters: pd.DataFrame
+
+    def document(self) -> "Document":
+        """Return the answer and the main table; no trace is read."""
+        found: Document = documents().summary_of(self)
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the answer, how far the study is, and one entry a run, SI; what is not known is None."""
+        counts = {key: self.study[key] for key in ("name", "n_planned", "n_done", "n_failed")}
+        runs = json.loads(self.runs.to_json(orient="records"))
+        return {**counts, "question": self.study.get("question", ""), "answer": self.document().said, "runs": runs}
+
+    def plot(self, name: str = "") -> Any:
+        """Draw one figure of the report and return it, matplotlib's. name: which, "" for the first.
+
+        Raises ArmidError for a name that it does not have.
+        """
+        figures = {f.name: f.draw for f in documents().report_of(self).figures if f.draw is not None}
+        if not figures or (name and name not in figures):
+            raise ArmidError(f"the report has no figure '{name}': {nearest(name, figures)}")
+        return figures[name or next(iter(figures))]()
+
+    def save(self, folder: str | Path) -> list[str]:
+        """Write page, Markdown, tables and figures of the report to a folder, all or none, and return their names."""
+        with NewFiles(Path(folder)) as files:
+            documents().write_report(documents().report_of(self), files)
+        return files.names
 
     @property
     def traces(self) -> pd.DataFrame:
@@ -123,10 +165,27 @@ class StudyResults:
         return pd.DataFrame(columns)
 
 
-def load_study(path: str | Path) -> StudyResults:
-    """Read the stored results of a study: the folder that holds study.sqlite, or that file. Nothing is changed.
+def documents() -> Any:
+    """Return armid.study.document, which builds on this file."""
+    return import_module("armid.study.document")
 
-    Raises ArmidError for what is no store of a study.
+
+def load_study(path: str | Path) -> StudyResults:
+    """Read the stored results of a study; nothing is changed.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder that holds study.sqlite, or that file.
+
+    Returns
+    -------
+    StudyResults
+
+    Raises
+    ------
+    ArmidError
+        For what is no store of a study.
     """
     file = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
     if not file.is_file():
@@ -134,6 +193,7 @@ def load_study(path: str | Path) -> StudyResults:
     with _reading(file) as connection:
         # one transaction: a runner that is at work changes nothing between the tables
         connection.execute("BEGIN")
+        check_content(connection, file)
         row = connection.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
         if row is None:
             raise ArmidError(f"{file} holds no study yet: let `armid study` begin it")
@@ -143,9 +203,10 @@ def load_study(path: str | Path) -> StudyResults:
         study["n_planned"] = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
         study["n_done"] = ended.get(DONE, 0)
         study["n_failed"] = sum(ended.values()) - study["n_done"]
-        study |= {"versions": _versions(connection), "folder": str(file.parent)}
-        study["parameters"] = list(dict.fromkeys(name for case in study["cases"] for name in case["bounds"]))
-        return StudyResults(file, study, _runs(connection), _parameters(connection, study))
+        with corruption_guard(file, "what it says of its study, its runs or their versions"):
+            study |= {"versions": _versions(connection), "folder": str(file.parent)}
+            study["parameters"] = list(dict.fromkeys(str(name) for case in study["cases"] for name in case["bounds"]))
+            return StudyResults(file, study, _runs(connection), _parameters(connection, study))
 
 
 def _runs(connection: sqlite3.Connection) -> pd.DataFrame:

@@ -8,16 +8,30 @@ from pathlib import Path
 from typing import Any
 
 from armid.errors import ArmidError
+from armid.estimation.least_squares import with_fitted_starts
 from armid.model import Model
 from armid.problem.problem import Replay, replay_of
 from armid.problem.space import Space, space_of
+from armid.problem.suite import VERSION, suite
 from armid.record import Record, read_campaign
 from armid.study.cases import DEGREE, campaign_folder, clean_records, digest_of, in_window, noisy_records
 from armid.study.spec import StudyRegistry, lookup
 
 # How many cases, each at one level of noise and in one window, are kept ready in a process.
 MOST_KEPT = 512
-SHARED = ("plant", "effects", "bounds", "fixed", "accuracy", "window_s", "truth", "strokes", "interval_s", "campaign")
+SHARED = (
+    "plant",
+    "effects",
+    "bounds",
+    "fixed",
+    "accuracy",
+    "window_s",
+    "truth",
+    "strokes",
+    "interval_s",
+    "campaign",
+    "suite",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +69,12 @@ class RunCache:
         return case, tuple(_measured_again(r, record) for r, record in zip(case.replays, noisy, strict=True))
 
     def _prepared(self, settings: Mapping[str, Any], level: float) -> PreparedCase:
+        if "suite" in settings:
+            name, version = settings["suite"]
+            if version != VERSION:
+                raise ArmidError(f"problem '{name}' is of version {version} of the suite, {VERSION} is expected")
+            problem = suite()[name].identification
+            return PreparedCase(str(problem.replays[0].model), problem.space, (), problem.replays)
         model, whole = self._source(settings)
         bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
         space = space_of(model, {}, bounds, settings["fixed"])
@@ -63,7 +83,9 @@ class RunCache:
         if level:
             # the accuracy that is enough depends on how loud the noise is, not on how it turns out
             records = [replace(r, noise=replace(r.noise, rms=DEGREE * level)) for r in records]
-        replays = tuple(replay_of(record, model, space, accuracy) for record in records)
+        replays = tuple(r for record in records for r in replay_of(record, model, space, accuracy).each)
+        train = iter(with_fitted_starts(tuple(r for r in replays if r.record.role == "train"), space))
+        replays = tuple(next(train) if r.record.role == "train" else r for r in replays)
         return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), replays)
 
     def _source(self, settings: Mapping[str, Any]) -> tuple[Model, tuple[Record, ...]]:

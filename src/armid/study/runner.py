@@ -5,13 +5,14 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armid.errors import ArmidError, nearest
 from armid.estimation.identify import ctrl_c_waits
 from armid.study.outcome import Outcome
-from armid.study.pool import LocalPool, WorkerSetup
+from armid.study.pool import LocalPool, WorkerSetup, performed_apart
 from armid.study.store import Counts, Store
 from armid.study.tasks import Task, read_study
 
@@ -76,6 +77,11 @@ def run_study(
     retry
         Whether failed runs are performed anew.
 
+    Returns
+    -------
+    StudyResults
+        All runs that the store holds.
+
     Raises
     ------
     ArmidError
@@ -116,7 +122,8 @@ def run(
         raise ArmidError("both jobs and a Dask cluster are given, one of them is expected")
     if not 0.0 < time_limit < 1e9:
         raise ArmidError(f"the time limit is {time_limit:g}, a number of seconds above 0 is expected")
-    study.check()
+    setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
+    study.check(partial(performed_apart, setup))
     folder, named = RESULTS / study.name if out is None else Path(out), Path(file)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
         # a whole path says something on this machine alone
@@ -128,7 +135,6 @@ def run(
         progress(counts, None)
         finished = simulations = 0
         if counts.missing:
-            setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
             pool = _pool(jobs, dask, setup, counts.missing)
             try:
                 for outcome in _performed(store, pool, interrupted):
@@ -193,13 +199,14 @@ def absolute(plugins: Iterable[str]) -> tuple[str, ...]:
 class ProgressBar:
     """Count runs and simulations, and show a bar with rate and time left on a terminal, nothing elsewhere."""
 
-    def __init__(self) -> None:
+    def __init__(self, is_shown: bool = True) -> None:
+        self.is_shown = is_shown
         self.finished, self.simulations = 0, 0
         self._began = time.monotonic()
         self._bar: Any = None
 
     def __enter__(self) -> "ProgressBar":
-        if sys.stderr.isatty():
+        if self.is_shown and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn
 

@@ -80,6 +80,14 @@ def seeds(value: object) -> tuple[int, ...]:
     return tuple(range(1, held_count(value) + 1))
 
 
+def counts(value: object) -> tuple[int, ...]:
+    """Return rising numbers above 0: one number stands for a list of it."""
+    found = (count(value),) if isinstance(value, int) else tuple(list_of(count, 1)(value))
+    if list(found) != sorted(set(found)):
+        raise KindError(value)
+    return found
+
+
 def names(value: object) -> tuple[str, ...]:
     """Return names: one name stands for a list of it."""
     return (text(value),) if isinstance(value, str) else tuple(list_of(text, 1)(value))
@@ -132,6 +140,7 @@ LINE = key(line_of_text, "a text on one line")
 QUESTION = key(any_text, "a text")
 KIND = key(text, "the kind of a study")
 SEEDS = key(seeds, "at most 1,000,000 seeds or a list")
+PER_PARAMETER = key(counts, "a whole number above 0, or a rising list of such")
 SEED = key(whole_number, "a whole number of at least 0")
 
 
@@ -172,12 +181,22 @@ class RandomCasesSpec:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SuiteSpec:
+    """Declare [suite]: instances of problems of `armid.suite()`. train: instances that `armid tune` learns from."""
+
+    problems: tuple[str, ...] = field(default=("*",), metadata=key(list_of(text, 1), "a list of names of problems"))
+    instances: tuple[int, ...] = field(default=(1, 2, 3, 4, 5), metadata=key(list_of(count, 1), "a list of instances"))
+    train: tuple[int, ...] = field(default=(), metadata=key(list_of(count), "a list of instances"))
+
+
+@dataclass(frozen=True, kw_only=True)
 class EntrySpec:
     """Declare an [[identifiers]] entry; what is not given is the study's."""
 
     name: str = field(metadata=key(text, "the name of an identifier"))
     label: str | None = field(default=None, metadata=LINE)
     budget: int | None = field(default=None, metadata=key(count, "a whole number above 0"))
+    budget_per_parameter: tuple[int, ...] | None = field(default=None, metadata=PER_PARAMETER)
     fitness: tuple[str, ...] | None = field(default=None, metadata=NAMES)
     noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=LEVELS)
     seeds: tuple[int, ...] | None = field(default=None, metadata=SEEDS)
@@ -214,6 +233,8 @@ class StudySpec:
     fixed: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
     cases: tuple[dict[str, Any], ...] = field(default=(), metadata=TABLES)
     random_cases: dict[str, Any] | None = field(default=None, metadata=key(any_table, "a table"))
+    suite: dict[str, Any] | None = field(default=None, metadata=key(any_table, "a table"))
+    budget_per_parameter: tuple[int, ...] = field(default=(), metadata=PER_PARAMETER)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,12 +7,12 @@ import platform
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from armid.errors import ArmidError
-from armid.study.outcome import FAILED, ClaimedRun, Outcome, Planned
+from armid.errors import ArmidError, quoted
+from armid.study.outcome import DONE, FAILED, ClaimedRun, Outcome, Planned
 
 FILE_NAME = "study.sqlite"
 # "armd" in ASCII: a file of another program is recognised before anything is written to it.
@@ -23,35 +23,37 @@ WORDS = ("name", "cases")
 
 # The last four hold what a run gave: one that identifies fills three, one that closes the loop the fourth.
 SCHEMA = """
-CREATE TABLE IF NOT EXISTS study (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS settings (run TEXT PRIMARY KEY, settings TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS study (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID, STRICT;
+CREATE TABLE IF NOT EXISTS settings (run TEXT PRIMARY KEY, settings TEXT NOT NULL) WITHOUT ROWID, STRICT;
 CREATE TABLE IF NOT EXISTS plan (
     place INTEGER PRIMARY KEY, run TEXT NOT NULL UNIQUE, "case" TEXT NOT NULL, identifier TEXT NOT NULL,
     fitness TEXT NOT NULL, noise_deg_s REAL, window TEXT NOT NULL, seed INTEGER NOT NULL, budget INTEGER NOT NULL
-);
+) STRICT;
 CREATE TABLE IF NOT EXISTS runs (
     run TEXT PRIMARY KEY, status TEXT NOT NULL, error TEXT NOT NULL, seconds REAL NOT NULL, started_at TEXT NOT NULL,
     model TEXT NOT NULL, versions TEXT NOT NULL
-) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS texts (hash TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID;
+) WITHOUT ROWID, STRICT;
+CREATE TABLE IF NOT EXISTS texts (hash TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID, STRICT;
 CREATE TABLE IF NOT EXISTS claims (
     run TEXT PRIMARY KEY, place TEXT NOT NULL, pid INTEGER NOT NULL, start TEXT NOT NULL
-) WITHOUT ROWID;
+) WITHOUT ROWID, STRICT;
 CREATE TABLE IF NOT EXISTS identified (
     run TEXT NOT NULL PRIMARY KEY, used INTEGER, n_failed INTEGER, value REAL, stopped TEXT, train_rmse REAL,
     train_s REAL, train_s1 REAL, train_s2 REAL, holdout_rmse REAL
-);
+) STRICT;
 CREATE TABLE IF NOT EXISTS parameters (
     run TEXT NOT NULL, parameter TEXT NOT NULL, unit TEXT, value REAL, low REAL, high REAL, deviation REAL,
     correlation_max REAL, at_bound INTEGER, PRIMARY KEY (run, parameter)
-);
-CREATE TABLE IF NOT EXISTS traces (run TEXT NOT NULL PRIMARY KEY, names TEXT, trace BLOB);
+) STRICT;
+CREATE TABLE IF NOT EXISTS traces (run TEXT NOT NULL PRIMARY KEY, names TEXT, trace BLOB) STRICT;
 CREATE TABLE IF NOT EXISTS loops (
     run TEXT NOT NULL PRIMARY KEY, verdict TEXT NOT NULL, cpu_seconds REAL NOT NULL, report TEXT NOT NULL
-);
+) STRICT;
 """
 
 
+# Declared type of a column -> what SQLite calls the types of its values.
+TYPES = {"TEXT": ("text",), "INTEGER": ("integer",), "REAL": ("real", "integer"), "BLOB": ("blob",)}
 # Runs that this runner looks at, those of them that are not finished, and those that nobody is at.
 CHOSEN = """
 (p."case" = :case OR p."case" GLOB :case) AND (p.identifier = :identifier OR p.identifier GLOB :identifier)
@@ -131,6 +133,9 @@ class Store:
                 "INSERT INTO wanted VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", self._rows(planned, digest)
             )
             self._plan = digest.hexdigest()
+            # an earlier version kept runs that were cut off
+            cut = "SELECT run FROM identified WHERE stopped = 'interrupted'"
+            self._connection.execute(f"DELETE FROM runs WHERE run IN ({cut})")
             if self._plan != self._kept("plan"):
                 self._connection.execute("DELETE FROM plan")
                 self._connection.execute("INSERT INTO plan SELECT * FROM wanted")
@@ -234,7 +239,10 @@ def translate_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
-        raise ArmidError(f"{path} cannot be used: {error}; what was finished before is kept") from error
+        raise ArmidError(f"{path} cannot be used: {str(error)[:120]}; what was finished before is kept") from error
+    except UnicodeDecodeError as error:
+        # SQLite quotes what is damaged in its message
+        raise ArmidError(f"{path} is damaged: what SQLite says of it cannot be read as text") from error
     except OSError as error:
         raise ArmidError(f"{error.filename or path} cannot be used: {error.strerror or error}") from error
 
@@ -256,6 +264,7 @@ def opened(path: Path) -> sqlite3.Connection:
             with transaction(connection):
                 for statement in filter(str.strip, SCHEMA.split(";")):
                     connection.execute(statement)
+                check_content(connection, path)
                 if not connection.execute("PRAGMA user_version").fetchone()[0]:
                     connection.execute(f"PRAGMA application_id = {APPLICATION}")
                     connection.execute(f"PRAGMA user_version = {FORMAT}")
@@ -280,6 +289,39 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
     if found[0] != APPLICATION:
         raise ArmidError(f"{path} is no store of a study: another program's data, or nothing, is in it")
     raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
+
+
+def check_content(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse a store whose pages are damaged, or whose tables hold what no armid writes into them.
+
+    Tables are STRICT; those of earlier versions, or made by another program, may hold any type anywhere.
+    """
+    found = str(connection.execute("PRAGMA quick_check(1)").fetchone()[0])
+    if found != "ok":
+        raise ArmidError(f"{path} is damaged: {found[:100]}")
+    with closing(sqlite3.connect(":memory:")) as declared:
+        declared.executescript(SCHEMA)
+        tables = declared.execute("SELECT name FROM sqlite_schema WHERE type = 'table'").fetchall()
+        columns = [(table, row) for (table,) in tables for row in declared.execute(f"PRAGMA table_info({table})")]
+    there = {(table, row[1]) for (table,) in tables for row in connection.execute(f"PRAGMA table_info({table})")}
+    for table, (_, column, kind, required, *_) in columns:
+        # an earlier version may lack a whole table
+        if not any(name == table for name, _ in there):
+            continue
+        if (table, column) not in there:
+            raise ArmidError(f"{path} is damaged: its table '{table}' has no column '{column}'")
+        types = [*TYPES[kind], *([] if required else ["null"])]
+        marks = ", ".join("?" * len(types))
+        wrong = f'SELECT typeof("{column}") FROM {table} WHERE typeof("{column}") NOT IN ({marks}) LIMIT 1'
+        row = connection.execute(wrong, types).fetchone()
+        if row is not None:
+            found = f"'{column}' of its table '{table}' holds {row[0]}"
+            raise ArmidError(f"{path} is damaged: {found}, {kind.lower()} is expected")
+    row = connection.execute("SELECT status FROM runs WHERE status NOT IN (?, ?) LIMIT 1", (DONE, FAILED)).fetchone()
+    if row is not None:
+        raise ArmidError(
+            f"{path} is damaged: a run has the status {quoted(row[0])}, '{DONE}' or '{FAILED}' is expected"
+        )
 
 
 @contextmanager
@@ -313,8 +355,10 @@ def corruption_guard(file: Path, what: str) -> Iterator[None]:
     """
     try:
         yield
-    except (json.JSONDecodeError, UnicodeDecodeError, zlib.error) as error:
-        raise ArmidError(f"{file} is damaged: {what} cannot be read ({error})") from error
+    except ArmidError:
+        raise
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError, zlib.error) as error:
+        raise ArmidError(f"{file} is damaged: {what} cannot be read ({type(error).__name__}: {error})") from error
 
 
 def description_of(file: Path, text: str) -> dict[str, Any]:

@@ -3,31 +3,35 @@
 There are two: `Study` identifies parameters, here below, and `LoopStudy` (see loops) closes the loop on campaigns. Both
 have name, kind, folder of their file, registry, case_names (what they are tried on) and labels (who tries), and
 
-- check(): refuse what cannot be run, before anything is written
+- check(performed): refuse what cannot be run, before anything is written
 - description(out): what a report needs to know, as JSON can hold it; out: folder of the store
 - plan(): every run, in the order in which they are performed
 - perform(settings, cache): perform one, in a worker; what it raises is kept as the run's error
 """
 
+import errno
 import json
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from armid.errors import ArmidError, shown
-from armid.estimation.identify import campaign_errors, search, versions_of
+from armid.errors import ArmidError, MachineError, quoted
+from armid.estimation.identify import INTERRUPTED, campaign_errors, search, versions_of
 from armid.estimation.information import information_at
 from armid.estimation.least_squares import held_by_bound
 from armid.model import Model
+from armid.problem.fitness import fitness_of_name
 from armid.problem.meter import Meter
 from armid.problem.problem import IdentificationProblem, Replay
 from armid.problem.space import Space
+from armid.problem.suite import SuiteProblem, first_of
 from armid.record.schema import load_toml, unknown_name, validated
 from armid.registry import place_in_plugin
 from armid.study.cases import Case, cases_of, clean_records
@@ -49,9 +53,12 @@ if TYPE_CHECKING:
     from armid.study.loops import LoopStudy
 
 Task: TypeAlias = "Study | LoopStudy"
+Performer: TypeAlias = Callable[[ClaimedRun], Outcome]
 SUFFIX = ".toml"
 LONGEST_ERROR = 2000
 PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
+# What the system says when disk, memory or open files run out, or a disk fails.
+MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
 
 def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
@@ -63,6 +70,10 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
         The file.
     plugins
         `FILE.py:attribute` of the user's own things that it names; this runs their code.
+
+    Returns
+    -------
+    Study or LoopStudy
 
     Raises
     ------
@@ -94,16 +105,30 @@ def task_type(kind: str) -> "type[Task]":
 
 
 def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
-    """Perform a run of any kind; one that fails is an outcome too, so that the others go on."""
+    """Perform a run of any kind; one that fails is an outcome too, so that the others go on.
+
+    Raises MachineError where disk, memory or cache are at fault: that is no result of a run.
+    """
     began, started_at = time.perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
     try:
         settings = json.loads(run.settings)
         made = task_type(settings["kind"]).perform(settings, cache)
     except (Exception, SystemExit) as error:
+        if isinstance(error, MachineError):
+            raise
+        if of_machine(error):
+            raise MachineError(f"the machine, not a run, is at fault: {sentence(error)}") from error
         seconds = time.perf_counter() - began
         return Outcome(run.run, FAILED, sentence(error), seconds=seconds, started_at=started_at)
     seconds = time.perf_counter() - began
     return Outcome(run.run, DONE, "", made.used, seconds, started_at, made.model, versions(), made.rows)
+
+
+def of_machine(error: BaseException) -> bool:
+    """Tell whether disk or memory are at fault; what a plug-in itself opens or asks for is its own fault."""
+    if isinstance(error, OSError):
+        return error.errno in MACHINE and place_in_plugin(error) is None
+    return isinstance(error, MemoryError) and place_in_plugin(error) is None
 
 
 def sentence(error: BaseException) -> str:
@@ -126,6 +151,7 @@ class Entry:
     """Hold one identifier of a study with all that was left to the study filled in.
 
     label: how reports call it. noise_deg_s: levels it is tried at. seeds: of its search and of the noise.
+    budget: of a run at most; per_parameter: budgets in simulations a free parameter, empty: the budget alone.
     """
 
     label: str
@@ -135,6 +161,11 @@ class Entry:
     fitness: tuple[str, ...]
     noise_deg_s: tuple[float, ...]
     seeds: tuple[int, ...]
+    per_parameter: tuple[int, ...] = ()
+
+    def budgets(self, n_free: int) -> list[int]:
+        """Return the budgets of its runs on a case, rising."""
+        return sorted({min(self.budget, each * n_free) for each in self.per_parameter}) or [self.budget]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,17 +214,35 @@ class Study:
             _check_noise(entry, cases, registry, where)
         return cls(spec, text, folder, cases, entries, registry)
 
-    def check(self) -> None:
-        """Simulate each case's truth once: the model is compiled and the machine moves.
+    def check(self, performed: Performer) -> None:
+        """Simulate each case's truth once: the model is compiled and the machine moves; build identifiers of the user.
 
-        Raises ArmidError for a truth at which it does not.
+        performed: performs a run in a process of its own, which what a user's function does cannot harm.
+        Raises ArmidError for a truth at which it does not move, and for an identifier that cannot be built.
         """
+        for entry in self.entries:
+            if self.registry.own("identifiers", entry.name):
+                settings = {"kind": self.kind, "only_built": True, "identifier": entry.name,
+                            "options": dict(entry.options), "budget": entry.budget}  # fmt: skip
+                outcome = performed(ClaimedRun(entry.label, json.dumps(settings)))
+                if outcome.status == FAILED:
+                    raise ArmidError(f"identifier '{entry.label}': it cannot be built: {outcome.error}")
         for case in self.cases:
-            if case.source is None:
+            if case.source is None and case.suite is None:
                 try:
                     clean_records(self._case_settings(case), case.model)
                 except ArmidError as error:
                     raise ArmidError(f"case '{case.name}', {error}") from error
+
+    def cost(self) -> str:
+        """Return in words what all runs need: simulations, and on a suite the time of the engine, measured here."""
+        runs, problem_of = list(self.plan()), {case.name: case.suite for case in self.cases}
+        total = f"{len(runs):,} runs, {sum(run.budget for run in runs):,} simulations at most in all"
+        if not all(problem_of.values()):
+            return total
+        seconds = sum(run.budget * first_of(p.problem_name).cost_s for run in runs if (p := problem_of[run.case]))
+        return (f"{total}; they take the engine about {seconds / 60.0:.3g} min of one processor, to which comes what "
+                "the identifiers themselves need")  # fmt: skip
 
     def description(self, _: Path = Path()) -> dict[str, Any]:
         """Return what a report needs to know, as JSON can hold it, wherever the store is."""
@@ -215,6 +264,7 @@ class Study:
             "windows": [window_text(w) for w in spec.windows_s],
             "plugins": list(self.registry.plugins),
             "cases": [_case_description(case) for case in self.cases],
+            "budget_per_parameter": sorted({m for e in entries for m in e.per_parameter}),
             "published": {case.name: dict(case.published) for case in self.cases if case.published},
         }
 
@@ -229,17 +279,17 @@ class Study:
 
     def _runs(self, case: Case, shared: dict[str, Any], entry: Entry, seed: int) -> Iterator[Planned]:
         """Yield the runs of one entry on one case with one seed."""
-        for window in self.spec.windows_s:
-            for noise in entry.noise_deg_s if case.source is None else (None,):
-                for fitness in entry.fitness:
-                    own = self.registry.own("fitness", fitness) | self.registry.own("identifiers", entry.name)
-                    settings = shared | {
-                        "identifier": entry.name, "options": dict(entry.options), "budget": entry.budget,
-                        "fitness": fitness, "noise_deg_s": noise, "window_s": window, "seed": seed,
-                        "own": shared["own"] | own,
-                    }  # fmt: skip
-                    words = (case.name, entry.label, fitness, noise, window_text(window))
-                    yield planned(settings, *words, seed, entry.budget)
+        noises = entry.noise_deg_s if case.strokes else (None,)
+        fitnesses = entry.fitness if case.suite is None else (case.suite.definition.fitness,)
+        choices = product(self.spec.windows_s, noises, fitnesses, entry.budgets(len(case.bounds)))
+        for window, noise, fitness, budget in choices:
+            own = self.registry.own("fitness", fitness) | self.registry.own("identifiers", entry.name)
+            settings = shared | {
+                "identifier": entry.name, "options": dict(entry.options), "budget": budget, "fitness": fitness,
+                "noise_deg_s": noise, "window_s": window, "seed": seed, "own": shared["own"] | own,
+            }  # fmt: skip
+            words = (case.name, entry.label, fitness, noise, window_text(window))
+            yield planned(settings, *words, seed, budget)
 
     def _case_settings(self, case: Case) -> dict[str, Any]:
         """Return the settings that the runs on a case have in common: all that decides their results."""
@@ -249,6 +299,8 @@ class Study:
             "fixed": case.fixed, "accuracy": self.spec.accuracy,
             "own": self.registry.own("plants", plant) | self.registry.own("effects", *effects),
         }  # fmt: skip
+        if case.suite is not None:
+            return settings | {"suite": (case.suite.name, case.suite.version)}
         if case.source is not None:
             return settings | {"campaign": asdict(case.source)}
         return settings | {
@@ -262,13 +314,19 @@ class Study:
 
         Raises ArmidError when no candidate has a fitness, and whatever an identifier raises.
         """
+        identifier = cache.registry.identifier(settings["identifier"], "settings").with_options(settings["options"])
+        if settings.get("only_built"):
+            identifier.build(settings["budget"])
+            return Performed(0, "", {})
         case, replays = cache.replays(settings)
         train = tuple(r for r in replays if r.record.role == "train")
         holdout = tuple(r for r in replays if r.record.role == "holdout")
-        identifier = cache.registry.identifier(settings["identifier"], "settings").with_options(settings["options"])
-        meter = Meter(settings["budget"])
-        problem = IdentificationProblem(case.space, train, cache.registry.fitness[settings["fitness"]], meter)
+        meter, fitness = Meter(settings["budget"]), fitness_of_name(settings["fitness"], cache.registry.fitness)
+        problem = IdentificationProblem(case.space, train, fitness, meter)
         stopped = search(problem, meter, identifier, settings["seed"], None)
+        if stopped == INTERRUPTED:
+            # not what was asked for: the worker ends, and the run is given back
+            raise KeyboardInterrupt
         if meter.best_x is None:
             raise ArmidError(
                 f"none of {meter.used} candidates has a fitness: each diverged, or it was no finite number"
@@ -291,11 +349,12 @@ def _entries(spec: StudySpec, registry: StudyRegistry, where: str) -> tuple[Entr
     entries: list[Entry] = []
     for i, table in enumerate(spec.identifiers):
         name = table.get("label", table.get("name"))
-        at = f"{where}, identifier {shown(name) if isinstance(name, str) else i + 1}"
+        at = f"{where}, identifier {quoted(name) if isinstance(name, str) else i + 1}"
         own = validated(EntrySpec, table, at)
         noise = spec.noise_deg_s if own.noise_deg_s is None else own.noise_deg_s
         entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
-                      own.fitness or spec.fitness, noise, own.seeds or spec.seeds)  # fmt: skip
+                      own.fitness or spec.fitness, noise, own.seeds or spec.seeds,
+                      own.budget_per_parameter or spec.budget_per_parameter)  # fmt: skip
         _check_built(entry, registry, at)
         entries.append(entry)
     for i, entry in enumerate(entries):
@@ -305,16 +364,19 @@ def _entries(spec: StudySpec, registry: StudyRegistry, where: str) -> tuple[Entr
 
 
 def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
-    """Refuse an identifier that cannot be built with its options and budget, or cannot minimise its fitness."""
+    """Refuse an identifier that cannot be built with its options and budget, or cannot minimise its fitness.
+
+    One of the user is built later, see `Study.check`: whatever its function does has to happen in another process.
+    """
     identifier = registry.identifier(entry.name, where)
     try:
         for fitness in entry.fitness:
-            identifier.refuse(lookup(registry.fitness, fitness, "fitness", where))
-        identifier.with_options(entry.options).build(entry.budget)
+            identifier.refuse(lookup(registry.fitness, fitness.partition(":")[0], "fitness", where))
+        built = identifier.with_options(entry.options)
+        if not registry.own("identifiers", entry.name):
+            built.build(entry.budget)
     except ArmidError as error:
         raise ArmidError(f"{where}: {error}") from error
-    except Exception as error:
-        raise ArmidError(f"{where}: it cannot be built: {type(error).__name__}: {error}") from error
 
 
 def _check_apart(entry: Entry, other: Entry, where: str) -> None:
@@ -334,9 +396,9 @@ def _check_apart(entry: Entry, other: Entry, where: str) -> None:
 def _check_noise(entry: Entry, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
     """Refuse a fitness that needs noise where there is none, and noise that the plant's speed cannot have."""
     at = f"{where}, identifier '{entry.label}'"
-    simulated = any(case.source is None for case in cases)
+    simulated = any(case.strokes for case in cases)
     for fitness in entry.fitness:
-        if "noise" in registry.fitness[fitness].asks and 0.0 in entry.noise_deg_s and simulated:
+        if "noise" in fitness_of_name(fitness, registry.fitness).asks and 0.0 in entry.noise_deg_s and simulated:
             raise ArmidError(f"{at}: fitness '{fitness}' needs noise, but noise_deg_s holds 0, levels of its own that "
                              "are above 0 are expected")  # fmt: skip
     if any(entry.noise_deg_s) and any(case.model.plant.output_unit != "rad/s" for case in cases):
@@ -355,7 +417,15 @@ def _case_description(case: Case) -> dict[str, Any]:
         "effects": [e.name for e in case.model.effects],
         "campaign": case.source.campaign if case.source else None,
         "records": list(case.source.records) if case.source else len(case.strokes),
-    }
+    } | ({} if case.suite is None else suite_description(case.suite))
+
+
+def suite_description(problem: SuiteProblem) -> dict[str, Any]:
+    """Return what a report needs to know of an instance; landscape and difficulty are those of the first one."""
+    first = first_of(problem.problem_name)
+    own = {"n_records": len(first.definition.strokes), "noise_deg_s": first.definition.noise_deg_s}
+    return {"suite": problem.problem_name, "floor": problem.floor, "difficulty": first.difficulty,
+            "landscape": own | first.landscape}  # fmt: skip
 
 
 def window_text(window: Sequence[float] | str) -> str:

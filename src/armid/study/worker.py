@@ -1,24 +1,29 @@
 """A process that performs runs for another one: `python -m armid.study.worker FILE_DESCRIPTOR PARENT`."""
 
 import os
+import signal
 import sys
 import threading
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from armid.errors import ArmidError
+from armid.errors import ArmidError, MachineError
 from armid.study.run_cache import RunCache
 from armid.study.spec import study_registry
 from armid.study.tasks import perform, task_type
 
 READY, REFUSED, FINISHED = "ready", "refused", "finished"
+# The code with which a worker ends that a plug-in has interrupted.
+INTERRUPTED = 130
 # How often a worker looks whether the process that it works for still lives [s].
 LOOKS_EVERY_S = 1.0
 
 
 def main(descriptor: int, parent: int) -> None:
     """Receive kind, plug-ins and folder, then perform one run after the other until the other end is closed."""
+    # Ctrl-C and its like are for the process that decides: a run is made whole, or not at all
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     connection = Connection(descriptor)
     try:
@@ -33,6 +38,10 @@ def main(descriptor: int, parent: int) -> None:
         connection.send((READY, None))
         while True:
             connection.send((FINISHED, perform(connection.recv(), cache)))
+    except MachineError as error:
+        connection.send((REFUSED, str(error)))
+    except KeyboardInterrupt:
+        os._exit(INTERRUPTED)
     except (EOFError, OSError):
         # the process that we work for has closed its end, or has ended
         os._exit(0)

@@ -1,9 +1,13 @@
 """Judge what the report of one campaign says against the truth."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+from stand import RefusalError
 
 Entry = Mapping[str, Any]
 PARAMETERS = ("p0", "k", "eta3", "n")
@@ -120,6 +124,31 @@ def judge(campaign: str, entry: Entry, report: Entry) -> dict[str, Any]:
         "has_empirical": bool(claim.empirical),
     }
     return row | _errors(entry, report) | _parameters(entry, report)
+
+
+def judge_all(key: Mapping[str, Any], reports: Mapping[str, Any]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Judge every campaign of the key; those without a report come second."""
+    rows, missing = [], []
+    for campaign, entry in key.items():
+        if campaign not in reports:
+            missing.append(told(campaign, entry) | {"judgement": "missing"})
+            continue
+        try:
+            rows.append(judge(campaign, entry, reports[campaign]))
+        except (KeyError, TypeError) as error:
+            told_of = f"the report of {campaign} is no report of a closed loop"
+            raise RefusalError(f"{told_of}: {error} is not as expected") from error
+    return rows, missing
+
+
+def read_json(file: Path) -> Any:
+    """Read a JSON file."""
+    try:
+        return json.loads(file.read_text())
+    except OSError as error:
+        raise RefusalError(f"{file} cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise RefusalError(f"{file} is no JSON: {error}") from error
 
 
 def told(campaign: str, entry: Entry) -> dict[str, Any]:

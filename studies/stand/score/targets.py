@@ -36,10 +36,10 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
 
 def _controls(rows: Sequence[Row]) -> list[Target]:
     controls = _of(rows, "control")
-    lines = [_most("controls: false alarms", controls, _is_alarm, 0.02)]
+    lines = [most("controls: false alarms", controls, _is_alarm, 0.02)]
     for noise in ("white", "coloured"):
         some = [row for row in controls if row["noise"] == noise]
-        lines.append(_share(f"controls with {noise} noise: false alarms", some, _is_alarm))
+        lines.append(share(f"controls with {noise} noise: false alarms", some, _is_alarm))
     return lines
 
 
@@ -48,16 +48,16 @@ def _singles(rows: Sequence[Row]) -> list[Target]:
     weighty = [row for row in singles if row["matters"]]
     held = "single effects that move the held-out error by more than 20 %"
     lines = [
-        _least(f"{held}: share of all", singles, lambda row: row["matters"], 0.70),
-        _least(f"{held}: right name, or a group that holds it", weighty, _is_right, 0.95),
-        _most(f"{held}: wrong name alone", weighty, _is_wrong_alone, 0.02),
+        least(f"{held}: share of all", singles, lambda row: row["matters"], 0.70),
+        least(f"{held}: right name, or a group that holds it", weighty, _is_right, 0.95),
+        most(f"{held}: wrong name alone", weighty, _is_wrong_alone, 0.02),
     ]
     for word, count in sorted(Counter(row["judgement"] for row in weighty).items()):
         lines.append(Target(f"{held}: judged {word}", count / len(weighty), len(weighty), is_share=True))
     for matching in (True, False):
         some = [row for row in weighty if row["matching"] == matching]
         form = "matching" if matching else "non-matching"
-        lines.append(_share(f"{held}, {form} form: right name, or a group that holds it", some, _is_right))
+        lines.append(share(f"{held}, {form} form: right name, or a group that holds it", some, _is_right))
         lines.append(_middle(f"{held}, {form} form: held-out error over noise, median", some, "after_over_floor"))
     sizes = [row["group_of_truth"] for row in weighty if row["group_of_truth"]]
     mean = sum(sizes) / len(sizes) if sizes else None
@@ -65,7 +65,7 @@ def _singles(rows: Sequence[Row]) -> list[Target]:
 
 
 def _two(rows: Sequence[Row]) -> list[Target]:
-    return [_least("two effects: both right", _of(rows, "two"), _is_right, 0.80)]
+    return [least("two effects: both right", _of(rows, "two"), _is_right, 0.80)]
 
 
 def _fits(rows: Sequence[Row]) -> list[Target]:
@@ -76,7 +76,7 @@ def _fits(rows: Sequence[Row]) -> list[Target]:
     errors = [row for row in listed if row["after_over_floor"] is not None]
     lines = [
         _middle(f"{held}: held-out error over noise, median", listed, "after_over_floor", 1.10),
-        _share(f"{held}: held-out error up to 1.10 of noise", errors, lambda row: row["after_over_floor"] <= 1.10),
+        share(f"{held}: held-out error up to 1.10 of noise", errors, lambda row: row["after_over_floor"] <= 1.10),
         _middle(f"{held}: held-out error over noise before, median", listed, "before_over_floor"),
         _limited(f"{held}: bias of the four parameters, median", median(after) if after else None, len(after), 0.01),
         Target(f"{held}: bias before, median", median(before) if before else None, len(before)),
@@ -96,7 +96,7 @@ def _unlisted(rows: Sequence[Row]) -> list[Target]:
     middle = median(cut) if cut else None
     met = None if middle is None else middle >= 0.60
     return [
-        _least(f"{held}: no library name said to explain all", some, lambda row: row["judgement"] != "claimed", 0.80),
+        least(f"{held}: no library name said to explain all", some, lambda row: row["judgement"] != "claimed", 0.80),
         Target(f"{held}: cut of the held-out error, median", middle, len(cut), ">= 0.6", met),
         Target(f"{held}: cut of what is above noise, median", median(excess) if excess else None, len(excess)),
     ]
@@ -107,8 +107,8 @@ def _one_stroke(rows: Sequence[Row]) -> list[Target]:
     trusted = [row for row in some if row["trusted_p0"] or row["trusted_eta3"] or row["trusted_n"]]
     met = None if not some else not trusted
     return [
-        _most("one stroke: wrong name alone", some, lambda row: row["wrong_alone"], 0.0),
-        _share("one stroke: a group without the truth", some, lambda row: row["wrong_group"]),
+        most("one stroke: wrong name alone", some, lambda row: row["wrong_alone"], 0.0),
+        share("one stroke: a group without the truth", some, lambda row: row["wrong_group"]),
         Target("one stroke: p0, eta3 or n trusted", len(trusted), len(some), "= 0", met),
     ]
 
@@ -134,20 +134,20 @@ def _biases(rows: Iterable[Row], when: str) -> list[float]:
     return [abs(row[f"bias_{when}_{name}"]) for row in rows for name in PARAMETERS]
 
 
-def _share(question: str, rows: Sequence[Row], test: Callable[[Row], bool]) -> Target:
+def share(question: str, rows: Sequence[Row], test: Callable[[Row], bool]) -> Target:
     found = sum(map(test, rows)) / len(rows) if rows else None
     return Target(question, found, len(rows), is_share=True)
 
 
-def _least(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
-    share = _share(question, rows, test)
-    met = None if share.found is None else share.found >= limit
-    return replace(share, limit=f">= {limit:g}", met=met)
+def least(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
+    line = share(question, rows, test)
+    met = None if line.found is None else line.found >= limit
+    return replace(line, limit=f">= {limit:g}", met=met)
 
 
-def _most(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
-    share = _share(question, rows, test)
-    return replace(share, limit=f"<= {limit:g}", met=None if share.found is None else share.found <= limit)
+def most(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
+    line = share(question, rows, test)
+    return replace(line, limit=f"<= {limit:g}", met=None if line.found is None else line.found <= limit)
 
 
 def _middle(question: str, rows: Sequence[Row], column: str, limit: float | None = None) -> Target:

@@ -1,1 +1,1 @@
-"""The library of effects, one file a family: friction, bodies, drive, motor, balance, control, sensor."""
+"""The library of effects, one file a family: friction, bodies, drive (motor and balance too), control, sensor."""

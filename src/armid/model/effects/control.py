@@ -4,7 +4,7 @@ import numpy as np
 
 from armid.model.effect import Effect, Guard, State
 from armid.model.effects.sensor import lag_error, lagging_rate
-from armid.model.effects.shared import slope_itself, start_speed, zero
+from armid.model.effects.shared import drive_now, slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 
 tachometer_lag = Effect(
@@ -129,8 +129,27 @@ def still_to_wait(closed, delay, period, waiting, clock):
     return np.where(closed > 0.5, np.where(period > SHORT, sample, due) - clock, lateness(delay, period))
 
 
+def late_drive(delay, slope):
+    """Effort on top of the drive's, -T dw/dt: with w = E / (1 + T s/2 + T^2 s^2/12) the drive is E exp(-T s)."""
+    return -delay * slope
+
+
+def late_drive_rate(delay, drive_effort, smooth, slope):
+    """Second derivative of the smoothed effort w, 12/T^2 (E - w - T/2 dw/dt), T at least 2 ms (see above)."""
+    T = np.maximum(delay, 2e-3)
+    return 12 / T**2 * (drive_effort - smooth - 0.5 * T * slope)
+
+
+dead_time = Effect(
+    name="controller_delay", form="command", adds={"drive": late_drive},
+    states=(State("smooth", "effort", slope_itself, drive_now), State("slope", "effort/s", late_drive_rate, zero)),
+    parameters=(Parameter("delay", "s", 0.0, 0.1, null=0.0, note="dead time of the command"),),
+    note="the command acts a dead time late",
+    source="Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9",
+)  # fmt: skip
 controller_delay = Effect(
-    name="controller_delay", adds={"feedback": late_feedback, "command": late_command},
+    name="controller_delay", form="feedback", forms=(dead_time,),
+    adds={"feedback": late_feedback, "command": late_command},
     states=(
         State("smooth", "rad/s", slope_itself, start_speed),
         State("slope", "rad/s2", slope_rate, zero),

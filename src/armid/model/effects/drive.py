@@ -1,11 +1,11 @@
-"""Drive and gear: from the motor to the arm."""
+"""What moves the arm: drive and gear, motor and supply, and the balance machine with its gas and oil."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from armid.model.effect import Effect, State
-from armid.model.effects.shared import SIGN_WIDTH, SIZE_WIDTH, zero
+from armid.model.effect import Effect, Guard, State
+from armid.model.effects.shared import SIGN_WIDTH, SIZE_WIDTH, drive_now, zero
 from armid.model.parameter import Parameter
 
 
@@ -25,8 +25,7 @@ def drive_lag_effort(time_constant, lagging, drive_effort):
     """Effort on top of the drive's, z - E, z drives.
 
     Below 1 ms the filter stays at 1 ms and takes a share tau / 1 ms of the drive: the same delay, no stiff equation,
-    and a derivative by tau at the null. z starts from 0, the drive being switched on at the start: a record that starts
-    under drive starts too weak, by the drive's first value for a time tau.
+    and a derivative by tau at the null. z has settled before the start.
     """
     return time_constant / np.maximum(time_constant, 1e-3) * (lagging - drive_effort)
 
@@ -36,8 +35,15 @@ def drive_lag_rate(time_constant, lagging, drive_effort):
     return (drive_effort - lagging) / np.maximum(time_constant, 1e-3)
 
 
-drive_lag = Effect(
-    name="drive_lag", adds={"drive": drive_lag_effort}, states=(State("lagging", "effort", drive_lag_rate, zero),),
+actuator_lag = Effect(
+    name="drive_lag", form="actuator", adds={"drive": drive_lag_effort},
+    states=(State("lagging", "effort", drive_lag_rate, drive_now),),
+    parameters=(Parameter("time_constant", "s", 0.0, 0.5, null=0.0, note="of a propeller, a valve, a cylinder"),),
+    note="the actuator follows late, first order, up to half a second",
+    source="Mahony, Kumar, Corke 2012, doi:10.1109/MRA.2012.2206474 (rotors)",
+)  # fmt: skip
+drive_lag = replace(
+    actuator_lag, form="current_loop", forms=(actuator_lag,),
     parameters=(Parameter("time_constant", "s", 0.0, 0.05, null=0.0, note="of the drive's current loop"),),
     note="the drive follows late, first order",
     source="Leonhard, Control of Electrical Drives, doi:10.1007/978-3-642-56649-3",
@@ -58,6 +64,86 @@ drive_saturation = Effect(
     parameters=(Parameter("sharpness", "1/effort", 0.0, 1.0, null=0.0, note="1/E_s, E_s the effort that saturates"),),
     note="the drive gives less per command the more it gives",
     source="Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives, doi:10.1201/9781420014235",
+)  # fmt: skip
+
+
+def droop_loss(drive_effort, sharpness_squared):
+    """Effort lost, -E x / (1 + x) with x = sharpness_squared E^2: the torque per current falls as 1 / (1 + x).
+
+    Flat at no current, as a field that the current weakens; a core that saturates bends at once (`drive_saturation`).
+    """
+    x = sharpness_squared * drive_effort**2
+    return -drive_effort * x / (1 + x)
+
+
+torque_constant_droop = Effect(
+    name="torque_constant_droop", adds={"drive": droop_loss},
+    parameters=(
+        Parameter("sharpness_squared", "1/effort^2", 0.0, 2.0, null=0.0, note="1/E_d^2, E_d the effort that halves it"),
+    ),
+    note="the torque constant falls with the current",
+    source="Hanselman, Brushless Permanent Magnet Motor Design, chapter 4 (armature reaction)",
+)  # fmt: skip
+
+
+def dead_zone_loss(drive_effort, zone):
+    """Effort lost, -E cut to +-zone: a drive answers nothing below a command, and by so much less above it."""
+    return -np.minimum(np.maximum(drive_effort, -zone), zone)
+
+
+def to_upper_edge(drive_effort, zone):
+    """Effort of the command above the zone."""
+    return drive_effort - zone
+
+
+def to_lower_edge(drive_effort, zone):
+    """Effort of the command above the other edge of the zone."""
+    return drive_effort + zone
+
+
+dead_zone = Effect(
+    name="dead_zone", adds={"drive": dead_zone_loss},
+    guards=(Guard("upper", to_upper_edge), Guard("lower", to_lower_edge)),
+    parameters=(Parameter("zone", "effort", 0.0, 0.5, null=0.0, note="effort of the command that is not answered"),),
+    note="the drive answers no small command", source="Tao and Kokotovic 1994, IEEE Trans. Automatic Control 39(1)",
+)  # fmt: skip
+
+
+def play_width(width):
+    """Half the play of the coupling [rad or m]."""
+    return width
+
+
+backlash = Effect(
+    name="backlash", adds={"play": play_width},
+    parameters=(Parameter("width", "speed*s", 0.0, 0.02, null=0.0, note="to either side of the middle"),),
+    note="play between the two inertias", source="Nordin and Gutman 2002, doi:10.1016/S0005-1098(02)00047-X",
+)  # fmt: skip
+
+
+def coupling_compliance(compliance):
+    """Compliance in series with the coupling [rad/(N m) or m/N]."""
+    return compliance
+
+
+elastic_drive = Effect(
+    name="elastic_drive", adds={"series_compliance": coupling_compliance},
+    parameters=(Parameter("compliance", "speed*s/effort", 0.0, 0.1, null=0.0, note="1 over the stiffness that is in "
+                          "series with the declared one"),),
+    note="the drive between the two inertias twists more than declared",
+    source="Spong 1987, doi:10.1115/1.3143860",
+)  # fmt: skip
+
+
+def coupling_damper(twist_speed, slope):
+    """Torque of the damper on top of the coupling's, slope times the speed of twisting."""
+    return slope * twist_speed
+
+
+coupling_damping = Effect(
+    name="coupling_damping", adds={"coupling": coupling_damper},
+    parameters=(Parameter("slope", "effort/speed", 0.0, 5.0, null=0.0, note="torque per speed of twisting"),),
+    note="the coupling damps its own oscillation", source="Den Hartog, Mechanical Vibrations, chapter 3",
 )  # fmt: skip
 
 
@@ -117,4 +203,142 @@ worm_speed = replace(
     note="the drive is less efficient at low speed",
 )
 
-EFFECTS = (drive_gain, drive_lag, drive_saturation, worm_direction, worm_speed)
+
+def rational_flux(current, K, sharpness):
+    """Flux that is missing [Wb], -K abs(I) x / (1 + x) with x = sharpness abs(I)."""
+    return -K * sharpness * current**2 / (1 + sharpness * np.abs(current))
+
+
+def missing_share(y):
+    """Return 1 - atan(x)/x with y = x^2; a series where x < 0.1, where the difference would cancel."""
+    x = np.sqrt(np.maximum(y, 0.01))
+    series = y * (1 / 3 - y * (1 / 5 - y * (1 / 7 - y * (1 / 9 - y * (1 / 11 - y / 13)))))
+    return np.where(y < 0.01, series, 1 - np.arctan(x) / x)
+
+
+def arctangent_flux(current, K, sharpness_squared):
+    """Flux that is missing [Wb], -K abs(I) (1 - atan(x)/x) with x^2 = sharpness_squared I^2."""
+    return -K * np.abs(current) * missing_share(sharpness_squared * current**2)
+
+
+arctangent = Effect(
+    name="flux_saturation", form="arctangent", adds={"flux": arctangent_flux},
+    parameters=(
+        Parameter("sharpness_squared", "1/A2", 0.0, 1e-3, null=0.0, note="1/I_s^2, I_s the current that saturates"),
+    ),
+    note="the flux saturates (arctangent)", source="Perez-Rojas, IEEE Power Engineering Review 20(11), 2000",
+)  # fmt: skip
+flux_saturation = Effect(
+    name="flux_saturation", form="rational", forms=(arctangent,), adds={"flux": rational_flux},
+    parameters=(Parameter("sharpness", "1/A", 0.0, 0.03, null=0.0, note="1/I_s, I_s the current that saturates"),),
+    note="the flux saturates (rational)",
+    source="Krause, Wasynczuk, Sudhoff, Analysis of Electric Machinery, chapter 1",
+)  # fmt: skip
+
+
+def brush_voltage(current, drop, width):
+    """Voltage at the winding [V], -drop sign(I), the sign smoothed over width."""
+    return -drop * current / np.sqrt(current**2 + width**2)
+
+
+brush_drop = Effect(
+    name="brush_drop", adds={"winding": brush_voltage},
+    parameters=(
+        Parameter("drop", "V", 0.0, 5.0, null=0.0, note="both brushes together"),
+        Parameter("width", "A", 0.2, 10.0, fixed=1.0, note="current over which the sign is smoothed"),
+    ),
+    note="voltage drop at the brushes", source="Hughes and Drury, Electric Motors and Drives, chapter 3",
+)  # fmt: skip
+
+
+def heating_voltage(current, R, rise, heat):
+    """Voltage at the winding [V], -R rise heat I; at the start the resistance is the declared one."""
+    return -R * rise * heat * current
+
+
+def heat_rate(current, heat, cooling):
+    """Square of the current less what is lost again [A2], I^2 - cooling heat.
+
+    On the time of a stroke hardly any heat leaves the copper: the resistance follows the integral of I^2, unless
+    `cooling` says that the heat is lost again.
+    """
+    return current**2 - cooling * heat
+
+
+winding_heating = Effect(
+    name="winding_heating", adds={"winding": heating_voltage}, states=(State("heat", "A2 s", heat_rate, zero),),
+    parameters=(
+        Parameter("rise", "1/(A2 s)", 0.0, 2e-4, null=0.0, note="relative growth of resistance per integral of I^2"),
+        Parameter("cooling", "1/s", 0.0, 5.0, fixed=0.0, note="rate at which the heat is lost again"),
+    ),
+    note="the winding's resistance grows with the integral of the current squared",
+    source="Hughes and Drury, Electric Motors and Drives, chapter 3; IEC 60034-1",
+)  # fmt: skip
+
+
+def sag_voltage(current, resistance):
+    """Voltage at the motors [V], -resistance (I + I): two equal motors on one supply.
+
+    After the clip and in both stages; the sign of the current counts, so that braking lifts the voltage.
+    """
+    return -resistance * 2 * current
+
+
+supply_sag = Effect(
+    name="supply_sag", adds={"supply": sag_voltage},
+    parameters=(Parameter("resistance", "ohm", 0.0, 0.05, null=0.0, note="of the supply and its cables"),),
+    note="the supply sags under the current of both motors",
+    source="Hughes and Drury, Electric Motors and Drives, chapter 2",
+)  # fmt: skip
+
+
+def voltage_error(voltage, error):
+    """Voltage at the motors on top of the declared one [V], error times it."""
+    return error * voltage
+
+
+supply_error = Effect(
+    name="supply_error", adds={"supply": voltage_error},
+    parameters=(Parameter("error", "1", -0.2, 0.2, null=0.0, note="relative error of the motor voltage"),),
+    note="the motors get more or less voltage than declared",
+    source="Hughes and Drury, Electric Motors and Drives, chapter 2",
+)  # fmt: skip
+
+
+def missing_pressure(deviation):
+    """Pressure [Pa] that the plant's pressure lacks."""
+    return deviation
+
+
+def deviation_rate(n, deviation, squeeze, loss_rate, pressure, p0, compression):
+    """Rate of the deviation d [Pa/s], n d squeeze - loss_rate (p + d - p0 compression)."""
+    return n * (deviation * squeeze) - loss_rate * (pressure + deviation - p0 * compression)
+
+
+gas_heat_loss = Effect(
+    name="gas_heat_loss", adds={"gas": missing_pressure}, states=(State("deviation", "Pa", deviation_rate, zero),),
+    parameters=(Parameter("loss_rate", "1/s", 0.0, 3.0, null=0.0, note="1/tau, tau the thermal time constant"),),
+    note="the gas loses its heat of compression to the vessel",
+    source="Pourmovahed and Otis 1990, J. Dynamic Systems, Measurement, and Control 112",
+)  # fmt: skip
+
+
+def line_pressure(omega, c):
+    """Pressure at the piston over that of the gas [Pa], c omega abs(omega): the oil is pushed in as the arm lowers.
+
+    Turbulent flow: the loss grows with the square of the flow, and the flow with omega.
+    """
+    return c * omega * np.abs(omega)
+
+
+line_loss = Effect(
+    name="line_loss", adds={"gas": line_pressure},
+    parameters=(Parameter("c", "Pa s2/rad2", 0.0, 2e5, null=0.0, note="pressure drop per square of speed"),),
+    note="pressure drop in the oil line", source="Merritt, Hydraulic Control Systems, Wiley 1967, chapter 3",
+)  # fmt: skip
+
+EFFECTS = (
+    drive_gain, drive_lag, drive_saturation, torque_constant_droop, dead_zone, backlash, elastic_drive,
+    coupling_damping, worm_direction, worm_speed, flux_saturation, brush_drop, winding_heating, supply_sag,
+    supply_error, gas_heat_loss, line_loss,
+)  # fmt: skip

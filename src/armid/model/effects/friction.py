@@ -1,5 +1,7 @@
 """Friction and other efforts on the shaft."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from armid.model.effect import Effect, State
@@ -119,8 +121,9 @@ def full_share(omega, width):
     return omega / np.sqrt(omega**2 + width**2)
 
 
-presliding = Effect(
-    name="presliding", adds={"torque": presliding_torque}, states=(State("share", "1", share_rate, full_share),),
+dahl = Effect(
+    name="presliding", form="dahl", adds={"torque": presliding_torque},
+    states=(State("share", "1", share_rate, full_share),),
     parameters=(
         Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction after the way"),
         Parameter("way", "speed*s", 0.001, 0.1, nominal=0.01, note="over which friction builds up to 63 %"),
@@ -128,6 +131,63 @@ presliding = Effect(
     ),
     note="friction that builds up after each reversal", source="doi:10.1016/S0947-3580(98)70113-X",
 )  # fmt: skip
+
+
+def bristle_torque(omega, level, way, excess, fade, damping, share, width):
+    """Effort of the bristles, -level (z + damping dz/dt), z their deflection over that of sliding at speed."""
+    return -level * (share + damping * bristle_rate(omega, way, excess, fade, share, width))
+
+
+def bristle_rate(omega, way, excess, fade, share, width):
+    """Rate of the deflection [1/s], (omega - abs(omega) z / g) / way, g = 1 + excess exp(-(omega/fade)^2)."""
+    g = 1 + excess * np.exp(-((omega / fade) ** 2))
+    return (omega - omega**2 / np.sqrt(omega**2 + width**2) * share / g) / way
+
+
+def full_bristles(omega, excess, fade, width):
+    """Return g sign(omega): what moves at the start has done so for longer than the way."""
+    return (1 + excess * np.exp(-((omega / fade) ** 2))) * omega / np.sqrt(omega**2 + width**2)
+
+
+lugre = Effect(
+    name="presliding", form="lugre", adds={"torque": bristle_torque},
+    states=(State("share", "1", bristle_rate, full_bristles),),
+    parameters=(
+        Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction at speed"),
+        Parameter("way", "speed*s", 0.001, 0.1, nominal=0.01, note="deflection at which the bristles slide at speed"),
+        Parameter("excess", "1", 0.05, 2.0, nominal=0.5, note="friction at rest over that at speed, less 1"),
+        Parameter("fade", "speed", 0.02, 0.5, nominal=0.08, note="speed at which the excess has faded to 1/e"),
+        Parameter("damping", "s", 0.0, 0.02, fixed=0.0, note="of the bristles, over their stiffness"),
+        SIZE_WIDTH,
+    ),
+    note="friction of bristles that build up and break away (LuGre)", source="doi:10.1109/9.376053",
+)  # fmt: skip
+
+
+def hysteresis_rate(omega, share, way, unloading, exponent, width):
+    """Rate of the share z [1/s], (omega - abs(z)^n (unloading abs(omega) sign(z) + (1 - unloading) omega)) / way.
+
+    abs(omega) sign(z) is abs(omega) z / abs(z); abs is smoothed over width, and over 1e-6 for z.
+    """
+    size = np.sqrt(share**2 + 1e-12)
+    against = unloading * omega**2 / np.sqrt(omega**2 + width**2) * share / size
+    return (omega - size**exponent * (against + (1 - unloading) * omega)) / way
+
+
+bouc_wen = Effect(
+    name="presliding", form="bouc_wen", adds={"torque": presliding_torque},
+    states=(State("share", "1", hysteresis_rate, full_share),),
+    parameters=(
+        Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction after the way"),
+        Parameter("way", "speed*s", 0.001, 0.1, nominal=0.01, note="level over the stiffness of the first motion"),
+        Parameter("unloading", "1", 0.5, 1.0, nominal=0.5, note="beta over beta + gamma; 0.5: back on a straight line"),
+        Parameter("exponent", "1", 1.0, 4.0, fixed=2.0, note="how sharply it turns from building up to sliding"),
+        SIZE_WIDTH,
+    ),
+    note="friction with a hysteresis loop (Bouc and Wen)", source="doi:10.1061/JMCEA3.0002106",
+)  # fmt: skip
+# Dahl's stays the first: the loop names a form only where it is not the first.
+presliding = replace(dahl, forms=(lugre, bouc_wen))
 
 
 def seal_torque(omega, l, force, width):
@@ -179,6 +239,28 @@ torque_ripple = Effect(
 )  # fmt: skip
 
 
+def cogging_torque(theta, sine, cosine, waves, second):
+    """Effort of the magnets, wave(waves theta) + second wave(2 waves theta), wave(a) = sine sin a + cosine cos a.
+
+    `waves` from 20, as of `torque_ripple`: a wave as long as the motion could stand for gravity.
+    """
+    a = waves * theta
+    return sine * (np.sin(a) + second * np.sin(2 * a)) + cosine * (np.cos(a) + second * np.cos(2 * a))
+
+
+cogging = Effect(
+    name="cogging", adds={"torque": cogging_torque},
+    parameters=(
+        Parameter("sine", "effort", -0.2, 0.2, null=0.0, note="amplitude of the sine"),
+        Parameter("cosine", "effort", -0.2, 0.2, null=0.0, note="amplitude of the cosine"),
+        Parameter("waves", "1/speed/s", 20.0, 500.0, nominal=50.0, note="least common multiple of slots and poles"),
+        Parameter("second", "1", -1.0, 1.0, fixed=0.0, note="second harmonic as a share of the first"),
+    ),
+    note="magnets pull the rotor toward the teeth, with and without current",
+    source="Islam, Mir, Sebastian 2004, doi:10.1109/TIA.2004.827469",
+)  # fmt: skip
+
+
 def spring_torque(theta, stiffness):
     """Effort of the spring, -stiffness theta; with `torque_offset` it rests elsewhere than at 0."""
     return -stiffness * theta
@@ -192,5 +274,5 @@ position_spring = Effect(
 
 EFFECTS = (
     coulomb, stribeck, viscous, asymmetric_viscous, quadratic_drag, load_friction, presliding, seal_friction,
-    torque_offset, torque_ripple, position_spring,
+    torque_offset, torque_ripple, cogging, position_spring,
 )  # fmt: skip

@@ -1,10 +1,44 @@
-"""The sensor: what is recorded of the motion."""
+"""The sensor: what is recorded of the motion, of a speed at the port `output`, of other outputs at their own."""
+
+from inspect import signature
 
 import numpy as np
 
 from armid.model.effect import Effect, State
 from armid.model.effects.shared import slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
+from armid.model.plant import Output, Plant
+
+# Unit of an output -> unit of its bias; another unit stands for itself.
+SCALES = {"rad/s": "speed", "m/s": "speed", "rad": "speed*s", "m": "speed*s", "N": "effort", "N m": "effort"}
+
+
+def sensor_effects(plant: Plant) -> dict[str, Effect]:
+    """Return name -> bias, scale and lag (`hub_angle_bias`) of each output that has a port of its own.
+
+    Scale and lag need what the sensor sees: the signal is that and the port, and of a lag it is a state.
+    """
+    found = [e for o in plant.outputs if o.port not in ("", "output") for e in effects_at(o, plant)]
+    return {e.name: e for e in found}
+
+
+def effects_at(output: Output, plant: Plant) -> list[Effect]:
+    of, source = f"of {output.name}", "Doebelin, Measurement Systems, chapter 3"
+    bias = Parameter("bias", SCALES.get(output.unit, output.unit), -0.1, 0.1, null=0.0)
+    found = [Effect(f"{output.name}_bias", (bias,), {output.port: bias_error}, note=f"constant error {of}",
+                    source=source)]  # fmt: skip
+    asked = signature(plant.quantities[output.signal]).parameters if output.signal in plant.quantities else ()
+    seen = [plant.aliases.get(name, name) for name in asked if name != output.port]
+    if len(seen) != 1:
+        return found
+    binds = {"omega": seen[0]}
+    found.append(Effect(f"{output.name}_scale", gyro_scale.parameters, {output.port: scale_error}, binds=binds,
+                        note=f"error {of} in proportion to it", source=source))  # fmt: skip
+    if seen[0] in {s.name for s in plant.states}:
+        states = (State("lagging", output.unit, lagging_rate, start_speed),)
+        found.append(Effect(f"{output.name}_lag", output_lag.parameters, {output.port: lag_error}, states, binds=binds,
+                            note=f"{output.name} lags, first order", source=source))  # fmt: skip
+    return found
 
 
 def lag_error(time_constant, lagging, omega):

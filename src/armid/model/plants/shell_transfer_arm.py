@@ -223,7 +223,24 @@ GAS_AND_DRIVE = {
     "R": (0.40, "ohm"), "L_a": (2.0e-3, "H"), "K": (4.5e-5, "Wb/A"), "C_e": (20.0, "1"), "C_T": (20.0, "1"),
     "K_p": (280.0, "V/rad"), "K_d": (70.0, "V s/rad"), "u_th": (0.5, "V"), "delta_E": (25.0 * DEGREE, "rad"),
 }  # fmt: skip
-ESTIMATE = "estimate (REF), not published"
+ESTIMATE, TOLERANCE = "estimate (REF), not published", 0.02
+# What a constant of such a machine can be at all, so that a forgotten factor of its unit is noticed.
+POSSIBLE = {
+    "kg m2": (0.0, 1e4), "kg": (0.0, 1e4), "m": (0.0, 10.0), "m2": (0.0, 0.1), "m3": (0.0, 0.1), "m/s2": (0.0, 30.0),
+    "rad": (-np.pi, np.pi), "ohm": (0.0, 100.0), "H": (0.0, 1.0), "Wb/A": (0.0, 1.0), "1": (0.0, 1e4),
+}  # fmt: skip
+
+
+def possible(name, unit):
+    """Return least and largest possible value of a constant; an efficiency is at most 1."""
+    return (0.0, 1.0) if name.startswith("eta") else POSSIBLE.get(unit, (0.0, np.inf))
+
+
+def estimated(declared):
+    """Return constants that are estimates, from name -> (value, unit)."""
+    return (Constant(name, value, unit, ESTIMATE, TOLERANCE, *possible(name, unit))
+            for name, (value, unit) in declared.items())  # fmt: skip
+
 
 shell_transfer_arm = Plant(
     name="shell_transfer_arm",
@@ -245,11 +262,11 @@ shell_transfer_arm = Plant(
     ),
     quantities={f.__name__: f for f in QUANTITIES},
     constants=(
-        *(Constant(name, *known, ESTIMATE) for name, known in MECHANICAL.items()),
-        Constant("g", 9.81, "m/s2"),
-        *(Constant(name, *known, ESTIMATE) for name, known in GAS_AND_DRIVE.items()),
-        Constant("theta_C", -48.0 * DEGREE, "rad", "start angle of the manoeuvre"),
-        Constant("theta_D", 22.0 * DEGREE, "rad", "target angle of the manoeuvre"),
+        *estimated(MECHANICAL),
+        Constant("g", 9.81, "m/s2", "", 0.0, *POSSIBLE["m/s2"]),
+        *estimated(GAS_AND_DRIVE),
+        Constant("theta_C", -48.0 * DEGREE, "rad", "start angle of the manoeuvre", None, *POSSIBLE["rad"]),
+        Constant("theta_D", 22.0 * DEGREE, "rad", "target angle of the manoeuvre", None, *POSSIBLE["rad"]),
         Constant("shell", 1.0, "1", "1 with the shell, 0 without"),
         Constant("U", 28.0, "V", "supply voltage of the manoeuvre"),
     ),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pandas import DataFrame
+from pandas import DataFrame, Series
 
 from armid.report.document import Column, Part
 from armid.study.outcome import RunTrace
@@ -42,10 +42,12 @@ class Histories:
     values: Small
 
 
-def histories(results: StudyResults, runs: DataFrame, truths: Mapping[str, Mapping[str, float]]) -> Histories:
+def histories(
+    results: StudyResults, runs: DataFrame, truths: Mapping[str, Mapping[str, float]], floors: Mapping[str, float]
+) -> Histories:
     """Read the traces twice, one run at a time: for the first values, then for everything that depends on them.
 
-    runs: outcomes; truths: case -> parameter -> truth, SI.
+    runs: outcomes; truths: case -> parameter -> truth, SI; floors: case -> fitness of the truth, where it is known.
     """
     # from 1 to the most simulations of a run, evenly spread in the logarithm
     most = max(int(runs["used"].max()) if len(runs) else 1, 1)
@@ -56,10 +58,11 @@ def histories(results: StudyResults, runs: DataFrame, truths: Mapping[str, Mappi
         if trace.run in place and trace.values.size:
             firsts[place[trace.run]] = trace.values[0]
     # the way of a run starts at the median of the first values of all runs on the same case, setting and fitness, and
-    # ends at the best fitness that any of them found with the same seed, that is on the same noise
+    # ends at the best fitness that any of them found with the same seed, that is on the same noise, or at the truth's
     problem = ["case", "setting", "fitness"]
     starts = runs.assign(first=firsts).groupby(problem)["first"].transform("median").to_numpy()
-    bests = runs.groupby([*problem, "seed"])["value"].transform("min").to_numpy()
+    found = runs.groupby([*problem, "seed"])["value"].transform("min")
+    bests = runs["case"].map(floors).astype(float).fillna(found).to_numpy()
     cases = runs["case"].to_numpy()
     kept = Histories(grid, *(np.full((len(place), n), np.inf, np.float32)
                              for n in (TARGETS.size, TARGETS.size, grid.size, grid.size)))  # fmt: skip
@@ -128,6 +131,8 @@ PAPER = "the paper's pso"
 MOST_OTHERS = 3
 # The columns by which most tables tell their rows apart.
 SETTING, VARIANT = Column("setting", "noise"), Column("variant", "identifier")
+# The same column in a report of a suite, where budgets take the place of noise levels.
+BUDGET = Column("setting", "budget")
 PARAMETER, N_RUNS = Column("parameter", "parameter"), Column("n", "runs", ".0f")
 
 
@@ -157,9 +162,18 @@ class Evidence:
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
         self.runs = ordered(outcomes(results.runs, self.parameters), self.study)
+        if self.study.get("budget_per_parameter"):
+            texts = Series(budget_texts(self.runs, self.study), index=self.runs.index)
+            as_recorded = self.runs["noise_deg_s"].isna()
+            self.runs["setting"] = texts.where(as_recorded, self.runs["setting"] + ", " + texts)
         keys = ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]
         done = self.runs.loc[self.runs["status"] == "done", keys]
         self.estimates = done.merge(self.parameters, on="run", how="inner", sort=False)
+
+    @property
+    def is_suite(self) -> bool:
+        """Whether every case is a problem of the suite, each with a class of difficulty."""
+        return all("difficulty" in case for case in self.study["cases"])
 
     @cached_property
     def variants(self) -> list[str]:
@@ -169,7 +183,7 @@ class Evidence:
     @cached_property
     def settings(self) -> list[str]:
         """Noise and window, in rising order."""
-        return list(dict.fromkeys(self.runs.sort_values(["noise_deg_s", "window"], kind="stable")["setting"]))
+        return list(dict.fromkeys(self.runs.sort_values(["noise_deg_s", "window", "budget"], kind="stable")["setting"]))
 
     @cached_property
     def cases(self) -> list[str]:
@@ -192,7 +206,8 @@ class Evidence:
     def histories(self) -> Histories:
         """What the traces say."""
         truths = {str(case["name"]): case.get("truth") or {} for case in self.study["cases"]}
-        return histories(self.results, self.runs, truths)
+        floors = {str(case["name"]): float(case["floor"]) for case in self.study["cases"] if "floor" in case}
+        return histories(self.results, self.runs, truths, floors)
 
     @cached_property
     def used(self) -> NDArray[np.float64]:
@@ -257,7 +272,8 @@ def outcomes(runs: DataFrame, parameters: DataFrame) -> DataFrame:
     the study has several. largest_error: max of abs(value - truth)/abs(truth) over the free parameters whose truth is
     known; infinite for a failed run, NaN where no truth is known.
     """
-    several = runs.groupby("identifier")["fitness"].transform("nunique") > 1
+    on_a_case = runs.groupby(["identifier", "case"])["fitness"].transform("nunique")
+    several = on_a_case.groupby(runs["identifier"]).transform("max") > 1
     noise = runs["noise_deg_s"].map(noise_text)
     largest = runs["run"].map(parameters.groupby("run", sort=False)["relative_error"].max())
     return runs.assign(
@@ -265,6 +281,14 @@ def outcomes(runs: DataFrame, parameters: DataFrame) -> DataFrame:
         setting=noise if runs["window"].nunique() < 2 else noise + ", " + runs["window"],
         largest_error=largest.where(runs["status"] == "done", np.inf).astype(float),
     )
+
+
+def budget_texts(runs: DataFrame, study: dict[str, Any]) -> list[str]:
+    """Return the budget of each run in simulations a free parameter; one that was cut counts as the next larger."""
+    n_free = {case["name"]: len(case["bounds"]) for case in study["cases"]}
+    known = study["budget_per_parameter"]
+    return [f"{next((m for m in known if m * n_free[c] >= b), known[-1])} D"
+            for c, b in zip(runs["case"], runs["budget"], strict=True)]  # fmt: skip
 
 
 def noise_text(noise_deg_s: float) -> str:

@@ -10,12 +10,12 @@ from armid.contract.check import parts_of
 from armid.errors import ArmidError
 from armid.report.document import Column, Figure, Part, Section, Table, slug, unlike
 from armid.report.style import pyplot
-from armid.study.analyses.convergence import CONVERGENCE
+from armid.study.analyses.convergence import ANYTIME, CONVERGENCE
 from armid.study.analyses.cramer_rao import CRAMER_RAO
 from armid.study.analyses.errors import ERRORS
 from armid.study.analyses.fitness_quality import FITNESS_QUALITY
 from armid.study.analyses.overview import OVERVIEW, RUNS
-from armid.study.analyses.ranks import RANKS
+from armid.study.analyses.ranks import BY_CLASS, RANKS
 from armid.study.analyses.running_time import BEST_FITNESS, RUNNING_TIME
 from armid.study.analyses.success import SUCCESS
 from armid.study.analyses.table1 import TABLE1
@@ -24,8 +24,10 @@ from armid.study.analyses.table2 import TABLE2
 # A new analysis is a file beside this one, and a name here.
 ANALYSES = (
     OVERVIEW, TABLE1, TABLE2, CRAMER_RAO, FITNESS_QUALITY, SUCCESS, RUNNING_TIME, BEST_FITNESS, CONVERGENCE, ERRORS,
-    RANKS, RUNS,
+    RANKS, BY_CLASS, ANYTIME, RUNS,
 )  # fmt: skip
+# What stands in the report of a suite: no statistic of single parameters, which differ from problem to problem.
+OF_SUITES = (BY_CLASS, ANYTIME, BEST_FITNESS, SUCCESS, RUNNING_TIME, RUNS)
 # name -> function of the runs, see `armid.contract.check`.
 OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
 

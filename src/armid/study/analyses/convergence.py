@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.report.document import Figure, Part, slug
-from armid.report.style import COLOURS, DASHES, PALE, legend_below, panels
-from armid.study.analyses.analysis import Analysis, Evidence
+from armid.report.document import Column, Figure, Part, Table, slug
+from armid.report.style import COLOURS, DASHES, PALE, legend_below, named_lines, panel_height, panels
+from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
+from armid.study.analyses.running_time import share_hit
 
 Array = NDArray[np.floating[Any]]
 QUARTILES = (0.25, 0.5, 0.75)
@@ -20,13 +21,13 @@ LEAST_PERCENT, LEAST_FITNESS = 1e-6, 1e-16
 ERROR_CAPTION = (
     "Largest relative error of the best candidate so far against simulations, over all cases and seeds: median as a "
     "line, quartiles as a band, a colour a noise level. The error may rise, since the fitness decides what is best. "
-    "Pale: the smallest median of all identifiers. Errors below 1e-6 % are drawn there; a run that stops early keeps "
-    "its value."
+    "Pale: the smallest median so far of all identifiers. Errors below 1e-6 % are drawn there; a run that stops early "
+    "keeps its value up to its budget, where its curve ends."
 )
 FITNESS_CAPTION = (
     "Smallest value of the fitness {fitness} so far (of a similarity: 1 minus its degree) against simulations, over "
-    "all cases and seeds: median as a line, quartiles as a band, a colour a noise level. Pale: the smallest median of "
-    "all identifiers."
+    "all cases and seeds: median as a line, quartiles as a band, a colour a noise level. Pale: the smallest median so "
+    "far of all identifiers."
 )
 
 
@@ -72,7 +73,8 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
         for variant, rows in variants.items():
             if own[rows].any():
                 found = band(values[rows[own[rows]]])
-                shown = np.where(np.isfinite(found), np.maximum(found, floor), np.nan)
+                spent = grid > evidence.runs["budget"].to_numpy()[rows[own[rows]]].max()
+                shown = np.where(np.isfinite(found) & ~spent, np.maximum(found, floor), np.nan)
                 bands.setdefault(variant, {})[setting] = shown
     every = np.concatenate([b[np.isfinite(b)] for of in bands.values() for b in of.values()])
     limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
@@ -99,7 +101,73 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
 
 
 def best_of_all(bands: Mapping[str, Mapping[str, Array]], setting: str) -> Array:
-    """Return the smallest median of all variants at each count of simulations, NaN where none has any."""
+    """Return the smallest median of all variants up to each count of simulations, NaN where none has any yet.
+
+    A variant whose budget is spent still holds what it reached.
+    """
     medians = np.array([of[setting][1] for of in bands.values() if setting in of])
-    smallest: Array = np.min(np.where(np.isnan(medians), np.inf, medians), axis=0)
+    smallest: Array = np.minimum.accumulate(np.min(np.where(np.isnan(medians), np.inf, medians), axis=0))
     return np.where(np.isfinite(smallest), smallest, np.nan)
+
+
+ATTAINED_CAPTION = (
+    "Share of all pairs of a run and a target that are hit within so many simulations a parameter: the empirical "
+    "attainment function, mean over targets. The 51 targets are what is left of the way from a first candidate to the "
+    "fitness of the truth, evenly spread in the logarithm from all to 1e-10."
+)
+AREA_CAPTION = (
+    "Area over the convergence curve: mean over the targets of the share of the budget, in its logarithm, that is left "
+    "when the target is first hit; 1 hits all at once, 0 none. Over all cases and seeds, quartiles beside the mean. "
+    "Targets as in the figure."
+)
+
+
+def anytime_parts(evidence: Evidence) -> Sequence[Part]:
+    if not evidence.is_suite or evidence.parameters.empty:
+        return ()
+    return areas(evidence), Figure("attained", "Targets hit at any time", ATTAINED_CAPTION, lambda: attained(evidence))
+
+
+ANYTIME = Analysis("anytime", "At any time", anytime_parts, "area over the convergence curve, empirical attainment")
+
+
+def area_over_curve(hits: Array, budget: Array) -> Array:
+    """Return the area over the convergence curve of each run, (n_runs,), from 0 to 1.
+
+    A = mean over targets of max(0, 1 - ln h / ln B). hits: first hits h, (n_runs, n_targets), infinite for never;
+    budget: B above 1, (n_runs,). Source: Lopez-Ibanez et al. 2024, doi:10.1162/evco_a_00341 (the share of an attainment
+    surface that is covered).
+    """
+    left: Array = np.clip(1.0 - np.log(hits) / np.log(budget)[:, np.newaxis], 0.0, 1.0).mean(axis=1)
+    return left
+
+
+def areas(evidence: Evidence) -> Table:
+    """Return the area of each variant, one line a setting and variant, the best first."""
+    found = area_over_curve(evidence.histories.value_hits, evidence.runs["budget"].to_numpy(float))
+    groups = evidence.runs.assign(area=found).groupby(["setting", "variant"], sort=False)["area"]
+    frame = groups.describe()[["count", "mean", "25%", "50%", "75%"]].reset_index()
+    place = {setting: i for i, setting in enumerate(evidence.settings)}
+    frame = frame.assign(_at=frame["setting"].map(place)).sort_values(["_at", "mean"], ascending=[True, False])
+    columns = (BUDGET, VARIANT, Column("count", "runs", ".0f"), Column("mean", "area", ".3f"),
+               Column("25%", "lower quartile", ".3f"), Column("50%", "median", ".3f"),
+               Column("75%", "upper quartile", ".3f"))  # fmt: skip
+    return Table("anytime", "Area over the convergence curve", AREA_CAPTION, frame.drop(columns="_at"), columns,
+                 grouped=True)  # fmt: skip
+
+
+def attained(evidence: Evidence) -> Any:
+    """Draw the shares of targets hit against simulations a parameter, one panel a setting and one line a variant."""
+    figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
+    per_parameter = evidence.histories.value_hits / evidence.n_free[:, np.newaxis]
+    budget = evidence.runs["budget"].to_numpy(float) / evidence.n_free
+    for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
+        axis.set(xscale="log", ylim=(0.0, 1.0))
+        # a curve ends where the budget of its setting does
+        last = max(float(budget[rows].max()) for rows in variants.values())
+        grid = np.geomspace(1.0 / evidence.n_free.max(), last, 121)
+        lines = {v: share_hit(per_parameter[rows], grid) for v, rows in variants.items()}
+        named_lines(axis, grid, lines, evidence.colours)
+        axis.set(title=setting, xlabel="simulations / free parameters", ylabel="share of (run, target) pairs hit")
+        axis.grid(alpha=0.3)
+    return figure

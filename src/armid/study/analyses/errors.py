@@ -8,7 +8,7 @@ import numpy as np
 from pandas import DataFrame
 
 from armid.report.document import Figure, Part, slug
-from armid.report.style import COLOURS, MARKERS, PALE, pyplot
+from armid.report.style import COLOURS, MARKERS, PALE, no_formulas, pyplot
 from armid.study.analyses.analysis import Analysis, Evidence
 
 # Range of the colours of the map [%]; cells carry numbers up to so many cases.
@@ -69,15 +69,16 @@ def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
     n_columns = max(m.shape[1] for m in maps.values())
     numbers = n_columns <= MOST_NUMBERS
     size = (3.4 + (0.95 if numbers else 0.36) * n_columns, 1.3 * len(maps) + 0.36 * n_rows + 0.4)
-    figure, axes = plt.subplots(len(maps), 1, figsize=size, squeeze=False, layout="constrained")
-    for axis, (setting, errors) in zip(axes.ravel(), maps.items(), strict=True):
-        percent = 100.0 * errors
-        text = percent.map(brief) if numbers else False
-        sns.heatmap(percent.clip(LOWEST, HIGHEST), ax=axis, norm=LogNorm(LOWEST, HIGHEST), cmap="cividis_r",
-                    annot=text, fmt="", cbar=False, linewidths=0.4, annot_kws={"fontsize": 8.5}, xticklabels=True,
-                    yticklabels=True)  # fmt: skip
-        axis.set(title=setting, xlabel="", ylabel="")
-        axis.tick_params(length=0)
+    with no_formulas():
+        figure, axes = plt.subplots(len(maps), 1, figsize=size, squeeze=False, layout="constrained")
+        for axis, (setting, errors) in zip(axes.ravel(), maps.items(), strict=True):
+            percent = 100.0 * errors
+            text = percent.map(brief) if numbers else False
+            sns.heatmap(percent.clip(LOWEST, HIGHEST), ax=axis, norm=LogNorm(LOWEST, HIGHEST), cmap="cividis_r",
+                        annot=text, fmt="", cbar=False, linewidths=0.4, annot_kws={"fontsize": 8.5}, xticklabels=True,
+                        yticklabels=True)  # fmt: skip
+            axis.set(title=setting, xlabel="", ylabel="")
+            axis.tick_params(length=0)
     beside = {"ax": list(axes.ravel()), "pad": 0.02, "fraction": 0.05, "shrink": 1.0 / len(maps), "aspect": 25}
     bar = figure.colorbar(axes[0, 0].collections[0], extend="both", **beside)
     bar.set_label("largest relative error [%]")
@@ -119,14 +120,15 @@ def valley_figure(ends: DataFrame, chosen: list[str]) -> Any:
     there = [v for v in (OTHERS, *chosen) if v in set(shown["shown"])]
     palette = {v: PALE if v == OTHERS else COLOURS[chosen.index(v) % len(COLOURS)] for v in there}
     marks = ["." if v == OTHERS else MARKERS[chosen.index(v) % len(MARKERS)] for v in there]
-    grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=there, palette=palette, corner=True, height=2.9,
-                        hue_kws={"marker": marks})  # fmt: skip
-    grid.map_lower(scatter)
-    grid.map_diag(sns.histplot, element="step", fill=False, bins=30, common_norm=False)
-    for i, name in enumerate(names):
-        grid.axes[i, 0].set_ylabel(f"{name}: deviation [%]" if i else "runs")
-        grid.axes[-1, i].set_xlabel(f"{name}: deviation [%]")
-    grid.add_legend(title="", loc="upper right", bbox_to_anchor=(0.99, 0.98), fontsize=10, markerscale=1.2)
+    with no_formulas():
+        grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=there, palette=palette, corner=True, height=2.9,
+                            hue_kws={"marker": marks})  # fmt: skip
+        grid.map_lower(scatter)
+        grid.map_diag(sns.histplot, element="step", fill=False, bins=30, common_norm=False)
+        for i, name in enumerate(names):
+            grid.axes[i, 0].set_ylabel(f"{name}: deviation [%]" if i else "runs")
+            grid.axes[-1, i].set_xlabel(f"{name}: deviation [%]")
+        grid.add_legend(title="", loc="upper right", bbox_to_anchor=(0.99, 0.98), fontsize=10, markerscale=1.2)
     return grid.figure
 
 

@@ -50,7 +50,6 @@ def verdicts(runs: DataFrame) -> Table:
 
 
 def campaigns(runs: DataFrame) -> Table:
-    """Return one line a campaign."""
     return Table("campaigns", "Campaigns", CAMPAIGNS_CAPTION, runs, CAMPAIGNS_COLUMNS)
 
 

@@ -3,17 +3,16 @@
 Also the last table of every report: what was run, and why runs stopped.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from pandas import DataFrame
 
-from armid.report.document import Column, Part, Table
+from armid.report.document import Column, Table
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VARIANT, Analysis, Evidence
 
 OVERVIEW_CAPTION = (
     "Relative error abs(value - truth)/abs(truth) in %, mean and median over all finished runs (cases and seeds "
-    "together). 'largest' is the largest error among the parameters of one run: its median, 95th percentile and "
+    "together); simulations: median of a run. "
+    "'largest' is the largest error among the parameters of one run: its median, 95th percentile and "
     "worst over the runs; a failed run counts as infinite there."
 )
 PAPER_CAPTION = (
@@ -50,16 +49,10 @@ def main_table(evidence: Evidence) -> Table:
     return overview(evidence.runs, evidence.estimates, evidence.published if is_table1 else evidence.published[:0])
 
 
-def overview_parts(evidence: Evidence) -> Sequence[Part]:
-    return (main_table(evidence),)
-
-
-def runs_parts(evidence: Evidence) -> Sequence[Part]:
-    return runs_table(evidence.runs, evidence.parameters), reasons(evidence.runs)
-
-
-OVERVIEW = Analysis("overview", "Overview", overview_parts, "errors of all identifiers, without truths their values")
-RUNS = Analysis("runs", "Runs", runs_parts, "what was run, and why runs stopped")
+OVERVIEW = Analysis("overview", "Overview", lambda evidence: (main_table(evidence),),
+                    "errors of all identifiers, without truths their values")  # fmt: skip
+RUNS = Analysis("runs", "Runs", lambda found: (runs_table(found.runs, found.parameters), reasons(found.runs)),
+                "what was run, and why runs stopped")  # fmt: skip
 
 
 def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Table:
@@ -74,7 +67,7 @@ def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Tab
     for key, group in runs.groupby(by, sort=False):
         failed = int((group["status"] != "done").sum())
         row: dict[str, object] = {**dict(zip(by, key, strict=True)), "n": len(group), "n_failed_runs": failed}
-        row |= tail(group["largest_error"].to_numpy())
+        row |= {"used": group["used"].median()} | tail(group["largest_error"].to_numpy())
         for name in names:
             there = (*key, name) in groups.index
             both = groups.loc[(*key, name)] if there else {"mean": np.nan, "median": np.nan}
@@ -83,12 +76,14 @@ def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Tab
     frame = DataFrame(rows)
     place = {setting: i for i, setting in enumerate(dict.fromkeys(frame["setting"]))}
     frame = frame.sort_values("setting", key=lambda s: s.map(place), kind="stable")
-    columns = [Column(f"{n}_{kind}", f"{n} {kind}", ".3g", 100.0) for n in names for kind in ("mean", "median")]
+    columns = [Column("used", "simulations", ",.0f")]
     columns += [Column(f"largest_{key}", f"largest {text}", ".3g", 100.0)
-                for key, text in (("median", "median"), ("p95", "95 %"), ("worst", "worst"))]  # fmt: skip
+                for key, text in (("median", "median"), ("worst", "worst"), ("p95", "95 %"))]  # fmt: skip
+    columns += [N_RUNS] + [Column(f"{n}_{kind}", f"{n} {kind}", ".3g", 100.0)
+                           for n in names for kind in ("median", "mean")]  # fmt: skip
     caption = OVERVIEW_CAPTION + (PAPER_CAPTION if len(published) else "")
     return Table("overview", "Relative errors of all identifiers [%]", caption, frame,
-                 (SETTING, VARIANT, N_RUNS, *columns), grouped=True)  # fmt: skip
+                 (SETTING, VARIANT, *columns), grouped=True)  # fmt: skip
 
 
 def tail(errors: np.ndarray) -> dict[str, float]:
@@ -101,7 +96,13 @@ def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
     """Return the paper's line: errors recomputed from its printed values."""
     errors = published.pivot(index="case", columns="parameter", values="relative_error")
     largest = errors.max(axis=1).to_numpy()
-    row: dict[str, object] = {"setting": "", "variant": PAPER, "n": len(errors), "n_failed_runs": 0} | tail(largest)
+    row: dict[str, object] = {
+        "setting": "",
+        "variant": PAPER,
+        "n": len(errors),
+        "n_failed_runs": 0,
+        "used": np.nan,
+    } | tail(largest)
     for name in names:
         if name in errors:
             row |= {f"{name}_mean": errors[name].mean(), f"{name}_median": errors[name].median()}

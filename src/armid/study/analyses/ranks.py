@@ -13,7 +13,7 @@ from pandas import DataFrame, Series
 
 from armid.report.document import Column, Figure, Part, Table, Text, slug
 from armid.report.style import INK, look, pyplot
-from armid.study.analyses.analysis import VARIANT, Analysis, Evidence
+from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
 
 Array = NDArray[np.float64]
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
@@ -220,3 +220,146 @@ def critical_difference_figure(tests: RankTests, setting: str) -> Any:
         )  # fmt: skip
     axis.set_title(f"mean rank over {tests.n_cases} cases, {setting}: 1 is best", fontsize="medium")
     return figure
+
+
+CLASS_CAPTION = (
+    "Rank of the fitness that a run ends with, median over the seeds, among all identifiers on a case; a fitness below "
+    "that of the truth, which fits the noise, counts as equal to it. Mean over the cases, in brackets the 95 % "
+    "interval of a bootstrap over the problems, whose instances are alike. first: cases in which nobody is better. "
+    "Then the mean in each class of difficulty, which was measured before any search."
+)
+CLASSES = ("smooth", "valley", "rugged", "plateau", "stair")
+# A fitness this near to that of the truth is not told from it: [rad/s], or of a similarity 1.
+NEAR_TRUTH = 1e-8
+N_BOOTSTRAP = 1000
+
+
+def class_parts(evidence: Evidence) -> Sequence[Part]:
+    return (class_ranks(evidence), swarm_pairs(evidence), problems(evidence)) if evidence.is_suite else ()
+
+
+BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", class_parts, "who is best on which problems of a suite")
+
+
+def final_values(evidence: Evidence, setting: str) -> DataFrame:
+    """Return the fitness that a variant ends with, one row a case that all ran, one column a variant."""
+    runs = evidence.of(setting)
+    floors = runs["case"].map({c["name"]: c["floor"] for c in evidence.study["cases"]}).astype(float) + NEAR_TRUTH
+    raised = runs.assign(value=np.maximum(runs["value"].where(runs["status"] == "done", np.inf), floors))
+    medians = raised.groupby(["case", "variant"], sort=False)["value"].median().unstack("variant")
+    return medians.reindex(columns=list(dict.fromkeys(runs["variant"]))).dropna(axis=0)
+
+
+def class_ranks(evidence: Evidence) -> Table:
+    """Return mean ranks, over all cases and in each class, one line a setting and variant, the best first."""
+    frame = class_frame(evidence)
+    columns = (BUDGET, VARIANT, Column("n", "cases", ".0f"), Column("text", "mean rank"),
+               Column("first", "first", ".0f"), *(Column(c, c, ".2f") for c in CLASSES if c in frame))  # fmt: skip
+    return Table("by_class", "Ranks by class of difficulty", CLASS_CAPTION, frame, columns, grouped=True)
+
+
+def class_frame(evidence: Evidence) -> DataFrame:
+    problem_of, class_of = ({c["name"]: c[key] for c in evidence.study["cases"]} for key in ("suite", "difficulty"))
+    there, rows = [name for name in CLASSES if name in class_of.values()], []
+    for setting in evidence.settings:
+        ranks = final_values(evidence, setting).rank(axis=1)
+        if ranks.empty:
+            continue
+        problems = ranks.groupby(ranks.index.map(problem_of)).mean()
+        classes = ranks.groupby(ranks.index.map(class_of)).mean().reindex(there)
+        drawn = np.random.default_rng(1).integers(0, len(problems), (N_BOOTSTRAP, len(problems)))
+        best = ranks.min(axis=1)
+        for variant, mean in ranks.mean().sort_values(kind="stable").items():
+            low, high = np.quantile(problems[variant].to_numpy()[drawn].mean(axis=1), [0.025, 0.975])
+            n_first = int((ranks[variant] <= best).sum())
+            text = f"{mean:.2f} ({low:.2f} to {high:.2f})"
+            rows.append((setting, variant, len(ranks), mean, low, high, text, n_first, *classes[variant]))
+    names = ["setting", "variant", "n", "rank", "low", "high", "text", "first", *there]
+    return DataFrame(rows, columns=names)
+
+
+PROBLEMS_CAPTION = (
+    "Measured on the first instance of each problem before any search. valley: condition of the derivatives of the "
+    "residuals at the truth. stair: share of steps of 0.1 % of the range that change nothing. plateau: share of steps "
+    "of 5 % that change next to nothing. minima: on a straight line through the truth, mean. holes: share of the box "
+    "where the simulation diverges."
+)
+
+
+def problems(evidence: Evidence) -> Table:
+    """Return what each problem is and what is hard about it, one line a problem."""
+    firsts = {case["suite"]: case for case in reversed(evidence.study["cases"])}
+    rows = [{"problem": name, "n": len(case["bounds"]), "class": case["difficulty"], **case["landscape"]}
+            for name, case in reversed(firsts.items())]  # fmt: skip
+    columns = (
+        Column("problem", "problem"), Column("n", "parameters", ".0f"), Column("n_records", "records", ".0f"),
+        Column("noise_deg_s", "noise [deg/s]", ".1f"), Column("class", "class"), Column("valley", "valley", ".2g"),
+        Column("stair", "stair", ".2f"), Column("plateau", "plateau", ".2f"), Column("minima", "minima", ".1f"),
+        Column("holes", "holes", ".2f"),
+    )  # fmt: skip
+    return Table("problems", "The problems", PROBLEMS_CAPTION, DataFrame(rows), columns)
+
+
+SWARM_CAPTION = (
+    "The swarm against each other identifier: median over the problems of the ratio of what both leave above 0 of the "
+    "fitness (above 1: the swarm leaves more), and the probability of Wilcoxon's signed-rank test on the problems, "
+    "corrected after Holm within a budget."
+)
+
+
+def swarm_pairs(evidence: Evidence) -> Table:
+    """Return the ratio and the test of the first swarm against each other variant, one line a setting and variant."""
+    columns = (BUDGET, Column("swarm", "swarm"), Column("variant", "against"), Column("ratio", "ratio", ".3g"),
+               Column("p", "p, Holm", ".2g"))  # fmt: skip
+    title = "The paper's swarm against the others"
+    return Table("swarm", title, SWARM_CAPTION, swarm_frame(evidence), columns, grouped=True)
+
+
+def swarm_frame(evidence: Evidence) -> DataFrame:
+    from statsmodels.stats.multitest import multipletests
+
+    problem_of, rows = {c["name"]: c["suite"] for c in evidence.study["cases"]}, []
+    for setting in evidence.settings:
+        values = final_values(evidence, setting)
+        swarm = next((v for v in values.columns if v.startswith("pso") and "+" not in v), None)
+        if swarm is None or values.empty or values.shape[1] < 2:
+            continue
+        logs = DataFrame(np.log(values), index=values.index, columns=values.columns)
+        means = DataFrame(np.exp(logs.groupby(values.index.map(problem_of)).mean()), columns=values.columns)
+        others = [v for v in values.columns if v != swarm]
+        ratios = [float((means[swarm] / means[other]).median()) for other in others]
+        p = [signed_rank(means[swarm].to_numpy(), means[other].to_numpy()) for other in others]
+        corrected = multipletests(p, method="holm")[1]
+        rows += [(setting, swarm, *line) for line in zip(others, ratios, corrected, strict=True)]
+    return DataFrame(rows, columns=["setting", "swarm", "variant", "ratio", "p"])
+
+
+def suite_answer(evidence: Evidence) -> tuple[str, ...]:
+    """Return who is best at each budget, where the paper's swarm wins and loses, and whether the suite is too easy."""
+    ranks, pairs, said = class_frame(evidence), swarm_frame(evidence), []
+    classes, winners = [name for name in CLASSES if name in ranks], set()
+    for setting, own in ranks.groupby("setting", sort=False):
+        for name in classes:
+            winners |= set(own.loc[own[name] <= own[name].min(), "variant"])
+        best, against = own.iloc[0], pairs[pairs["setting"] == setting]
+        line = f"Budget {setting}, {best['n']} cases: best is {best['variant']}, mean rank {best['text']} of {len(own)}"
+        if len(against):
+            swarm = own[own["variant"] == against["swarm"].iloc[0]].iloc[0]
+            place, sure = 1 + int((own["rank"] < swarm["rank"]).sum()), against["p"] < 0.05
+            leads = [name for name in classes if swarm[name] <= own[name].min()]
+            line += (
+                f"; the paper's swarm ({swarm['variant']}) comes {place} with {swarm['text']}: it wins against "
+                f"{with_ratios(against[sure & (against['ratio'] < 1.0)])}, loses against "
+                f"{with_ratios(against[sure & (against['ratio'] > 1.0)])}, cannot be told from the others, and is best "
+                f"{'on ' + ', '.join(leads) if leads else 'in no class'}"
+            )
+        said.append(f"{line}.")
+    easy = "fewer than three: the suite is too easy" if len(winners) < 3 else "so the suite is not too easy"
+    return (*said, f"{len(winners)} identifiers are best in some class at some budget ({', '.join(sorted(winners))}), "
+            f"{easy}.")  # fmt: skip
+
+
+def with_ratios(against: DataFrame) -> str:
+    """Return the variants with the ratio of what the swarm leaves to what they leave."""
+    lines = zip(against["variant"], against["ratio"], strict=True)
+    return ", ".join(f"{variant} (leaves {ratio:.2g} times as much)" for variant, ratio in lines) or "nobody"

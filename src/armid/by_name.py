@@ -1,0 +1,431 @@
+"""Simulate, identify, examine and close the loop by names: a campaign's folder, an identifier, a fitness, effects.
+
+Every name may be the object itself: a Campaign or tables of pandas, a Plant, an Effect, a Fitness or a function, an
+Identifier, an algorithm of pymoo. The commands and `armid` itself call these functions.
+"""
+
+import tomllib
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from copy import deepcopy
+from dataclasses import replace
+from math import inf, isfinite
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.errors import ArmidError, nearest, quoted
+from armid.model import Effect, Manoeuvre, Model, Plant
+from armid.model.effects.sensor import sensor_effects
+from armid.model.parameter import warn_if_far
+from armid.record import Campaign, read_campaign
+from armid.registry import Registry, load_registry, name_of
+
+if TYPE_CHECKING:
+    from armid.estimation.examine import Examination
+    from armid.estimation.identify import Identification
+    from armid.loop import ClosedLoop
+    from armid.problem.meter import Meter
+    from armid.problem.space import Space
+
+Array = NDArray[np.float64]
+Named = Iterable[Any] | str
+Bounds = Mapping[str, tuple[float, float]]
+# Of studies/benchmark.toml (30 arms, 20 identifiers, with and without noise) no identifier ends nearer to the truth
+# than this one on the rmse with 3,000 simulations, and the swarm before it looks at the whole box.
+IDENTIFIER, FITNESS, BUDGET = "pso+least_squares", "rmse", 3_000
+# Where the fitness is no sum of squares: the best of those that need none.
+WITHOUT_RESIDUALS = "cmaes"
+# The paper's section IV: swarm, similarity degree, 150 iterations of 80 particles, the first 0.7 s.
+PAPER_IDENTIFIER, PAPER_FITNESS, PAPER_BUDGET, PAPER_WINDOW = "pso", "similarity", 12_000, (0.0, 0.7)
+
+
+class Opened(NamedTuple):
+    """What a call on a campaign works with: all that is registered, the records, the model, overrides.
+
+    bounds, fixed: name -> (low, high) and value that were given, SI.
+    """
+
+    registry: Registry
+    campaign: Campaign
+    model: Model
+    bounds: Bounds
+    fixed: Mapping[str, float]
+
+    @property
+    def effects(self) -> dict[str, Effect]:
+        """The effects that are registered, and those of the sensors of the plant."""
+        return {**sensor_effects(self.campaign.plant), **self.registry.effects}
+
+    def space(self) -> "Space":
+        """Return the space that is searched."""
+        from armid.problem.space import space_of
+
+        return space_of(self.model, self.campaign.parameters, self.bounds, self.fixed)
+
+
+def opened(
+    campaign: Any, effects: Named = (), plugins: Iterable[str] = (), window: tuple[float, float] | None = None,
+    bounds: Bounds | None = None, fix: Mapping[str, float] | None = None, plant: Any = None, model: Model | None = None,
+) -> Opened:  # fmt: skip
+    """Return what is meant by a campaign, its effects and its overrides; plug-ins run their code.
+
+    Parameters
+    ----------
+    campaign : path, Campaign, or one or several pandas DataFrames
+        Tables have the headers of a campaign's CSV files; `table.attrs` holds the keys of its [[records]] entry.
+    effects : names or Effects
+        To add to those that the campaign declares; NAME:FORM names a form.
+    plugins : FILE.py:attribute
+        Things of the user, whose code is run.
+    window : (begin, end), s
+        What is seen of every record.
+    bounds, fix
+        Name -> (low, high), and value, SI.
+    plant : name or Plant
+        Of tables; or a plant of the user that campaign.toml names.
+    model : Model
+        In place of the declared one.
+
+    Raises
+    ------
+    ArmidError
+        For whatever of them cannot be used.
+    """
+    refuse_others(effects, window, bounds, fix)
+    registry = load_registry(plugins)
+    if isinstance(plant, Plant):
+        registry.plants[plant.name] = plant
+    read = campaign if isinstance(campaign, Campaign) else campaign_of(campaign, plant, registry)
+    if window:
+        read = read.with_window(*window)
+    effects_known = {**sensor_effects(read.plant), **registry.effects}
+    if model is None:
+        for name in read.effects:
+            chosen(name, {**sensor_effects(read.declared), **effects_known}, "effect")
+        model = read.model(registry.effects)
+    given = [effects] if isinstance(effects, str | Effect) else effects
+    for effect in (e for text in given for e in (text.split(",") if isinstance(text, str) else [text])):
+        model = model + effect_of(effect, effects_known)
+    warn_of_far(fix or {}, bounds or {}, model)
+    return Opened(registry, read, model, dict(bounds or {}), dict(fix or {}))
+
+
+def refuse_others(effects: Any, window: Any, bounds: Any, fix: Any) -> None:
+    """Raise ArmidError for what has not the form that `opened` tells."""
+    pair = (list, tuple)
+    forms = {
+        "effects": (effects, isinstance(effects, str | Effect | Iterable), "names or Effects are"),
+        "window": (window, not window or (isinstance(window, pair) and are_numbers(window, 2)), "(begin, end), s, is"),
+        "bounds": (bounds, bounds is None or (isinstance(bounds, Mapping) and all(
+            isinstance(ends, pair) and are_numbers(ends, 2) for ends in bounds.values())), "name -> (low, high) is"),
+        "fix": (fix, fix is None or (isinstance(fix, Mapping) and are_numbers(fix.values())), "name -> value is"),
+    }  # fmt: skip
+    for name, (value, is_right, form) in forms.items():
+        if not is_right:
+            raise ArmidError(f"{name} is {quoted(value)}: {form} expected")
+
+
+def are_numbers(values: Iterable[Any], n: int | None = None) -> bool:
+    found = list(values)
+    return (n is None or len(found) == n) and all(isinstance(v, int | float | np.number) for v in found)
+
+
+def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
+    """Return a campaign that is read from its folder, or made of tables as if they were its files."""
+    if isinstance(given, str | Path):
+        return read_campaign(given, registry.plants, registry.effects)
+    several = given.values() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
+    tables: list[Any] = list(several)
+    if not tables or not all(hasattr(each, "to_csv") for each in tables):
+        raise ArmidError(f"the campaign is a {type(given).__name__}: a folder, a Campaign or pandas DataFrames are "
+                         "expected")  # fmt: skip
+    if plant is None:
+        raise ArmidError("a campaign of tables needs its plant: plant='driven_axis' or another is expected")
+    names = [str(n) for n in given] if isinstance(given, Mapping) else [f"table_{i + 1}" for i in range(len(tables))]
+    lines = ['name = "tables"', f"plant = {toml(plant.name if isinstance(plant, Plant) else plant)}"]
+    with TemporaryDirectory(prefix="armid-") as folder:
+        for name, each in zip(names, tables, strict=True):
+            each.to_csv(Path(folder) / f"{name}.csv", index=False)
+            keys = {"role": "train"} | {str(k): v for k, v in each.attrs.items()} | {"file": f"{name}.csv"}
+            lines += ["[[records]]", *(f"{key} = {toml(value)}" for key, value in keys.items())]
+        (Path(folder) / "campaign.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return read_campaign(folder, registry.plants, registry.effects)
+
+
+def toml(value: Any) -> str:
+    """Return a value of a table's `attrs` as TOML has it."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    text = str(value).lower() if isinstance(value, bool | np.bool_) else repr(getattr(value, "item", lambda: value)())
+    if isinstance(value, str):
+        text = '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    try:
+        tomllib.loads(f"x = {text}")
+    except tomllib.TOMLDecodeError as error:
+        raise ArmidError(f"{text} cannot stand in a campaign: a text, a number, true or false is expected") from error
+    return text
+
+
+def effect_of(given: Any, effects: Mapping[str, Effect]) -> Effect:
+    """Return an effect by its name, which may have a form, or the Effect itself."""
+    if isinstance(given, Effect):
+        return given
+    name, _, form = str(given).strip().partition(":")
+    effect: Effect = chosen(name, effects, "effect")
+    return effect.in_form(form) if form else effect
+
+
+def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
+    """Return what is registered under a name.
+
+    Raises ArmidError with the nearest valid name.
+    """
+    if name not in known:
+        raise ArmidError(f"{what} '{name}' is not known: {nearest(str(name), known)}")
+    return known[name]
+
+
+def warn_of_far(fixed: Mapping[str, float], bounds: Bounds, model: Model) -> None:
+    """Warn of fixed values and bounds far outside the declared range, as a forgotten factor gives."""
+    told = {name: ([v], f"--fix {name}={v:g}") for name, v in fixed.items() if isfinite(v)}
+    told |= {n: ([a, b], f"--bounds {n}={a:g}:{b:g}") for n, (a, b) in bounds.items() if -inf < a < b < inf}
+    for name, (values, text) in told.items():
+        if name in model.parameters:
+            warn_if_far(model.parameters[name], values, text)
+
+
+def identify(
+    campaign: Any, model: Model | None = None, space: "Space | None" = None, fitness: Any = None,
+    identifier: Any = None, budget: int | None = None, seed: int = 1, target: float | None = None,
+    accuracy: str | None = None, progress: "Callable[[Meter], None] | None" = None, *,
+    options: Mapping[str, Any] | None = None, paper: bool = False, **given: Any,
+) -> "Identification":  # fmt: skip
+    """Identify parameters from the train records of a campaign; `armid.identify("folder")` is enough.
+
+    The records are screened first: a sign, unit, clock or manoeuvre that looks wrong is told as a warning.
+
+    Parameters
+    ----------
+    campaign : path, Campaign, or pandas DataFrames
+        The records, see `opened`.
+    model, space : optional
+        The model and the box of its parameters, in place of what `given` says.
+    fitness : name, Fitness or function (measured, simulated), default "rmse"; "rmse:hub_angle" for one output
+        What is minimised.
+    identifier : name, Identifier, pymoo algorithm or function
+        Who searches; by default "pso+least_squares", and "cmaes" for a fitness that is no sum of squares.
+    budget : int
+        Simulations; by default 3,000, and 12,000 (the paper's) for an identifier that is named.
+    seed, target, accuracy, progress
+        As of `armid.estimation.identify.identify`.
+    options
+        Of the identifier.
+    paper : bool
+        The paper's swarm, similarity degree, budget and window, where nothing else is given.
+    **given
+        effects, plugins, window, bounds, fix, plant: see `opened`.
+
+    Returns
+    -------
+    Identification
+        It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
+
+    Raises
+    ------
+    ArmidError
+        For whatever cannot be used.
+    """
+    from armid.estimation.identify import identify as run
+    from armid.estimation.screen import screen
+    from armid.problem.fitness import as_fitness, fitness_of_name
+
+    window = {"window": PAPER_WINDOW} if paper and not given.get("window") else {}
+    there = opened(campaign, model=model, **expected(given) | window)
+    fitness = fitness or (PAPER_FITNESS if paper else FITNESS)
+    distance = (fitness_of_name(fitness, there.registry.fitness) if isinstance(fitness, str) else
+                as_fitness(name_of(fitness, getattr(fitness, "__name__", "own")), fitness))  # fmt: skip
+    by_default = PAPER_IDENTIFIER if paper else IDENTIFIER if distance.weigh is not None else WITHOUT_RESIDUALS
+    searcher = identifier_of(identifier or by_default, there.registry).with_options(options or {})
+    if budget is None:
+        budget = PAPER_BUDGET if paper or identifier is not None else BUDGET
+    space = space or there.space()
+    suspicions = screen(there.campaign, there.model, space)
+    for suspicion in suspicions:
+        warnings.warn(suspicion.sentence, stacklevel=2)
+    found = run(there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, progress)
+    return replace(found, suspicions=suspicions)
+
+
+def expected(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the named arguments of `opened`; refuse another with ArmidError."""
+    known = ("effects", "plugins", "window", "bounds", "fix", "plant")
+    for name in given:
+        if name not in known:
+            raise ArmidError(f"there is no argument '{name}': {nearest(name, known)}")
+    return dict(given)
+
+
+def identifier_of(given: Any, registry: Registry) -> Any:
+    """Return the Identifier of a name, of a function or class, or of an algorithm of pymoo that was not used yet."""
+    from pymoo.core.algorithm import Algorithm
+
+    from armid.identifiers import as_identifier
+
+    if isinstance(given, str):
+        return registry.identifier_of(given)
+    name = getattr(given, "__name__", type(given).__name__)
+    if isinstance(given, Algorithm) and given.problem is None:
+        return as_identifier(name, lambda budget: deepcopy(given))
+    return as_identifier(name_of(given, name), given)
+
+
+def examine(
+    campaign: Any, model: Model | None = None, space: "Space | None" = None, x: Any = None,
+    noise: float | None = None, by: str = "volume", accuracy: str | None = None, *, where: str = "x", **given: Any,
+) -> "Examination":  # fmt: skip
+    """Say what the train records of a campaign tell about the parameters; `armid.examine("folder")` is enough.
+
+    Parameters
+    ----------
+    campaign, model, space, **given
+        As of `identify`.
+    x, noise, by, accuracy
+        As of `armid.estimation.examine.examine`; x may be name -> value, SI.
+    where : str
+        What names x in a refusal.
+
+    Returns
+    -------
+    Examination
+        It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
+
+    Raises
+    ------
+    ArmidError
+        For whatever cannot be used.
+    """
+    from armid.estimation.examine import examine as run
+
+    there = opened(campaign, model=model, **expected(given))
+    box = space or there.space()
+    at = free_values(box, x, where) if isinstance(x, Mapping) else x
+    return run(there.campaign, there.model, box, at, noise, by, accuracy)
+
+
+def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array:
+    """Return the values of the free parameters in order; a fixed one may be named, its value stays as it is fixed."""
+    for name in given:
+        if name not in space.names:
+            raise ArmidError(f"{where}: parameter '{name}' is not in the model: {nearest(name, space.names)}")
+    missing = [name for name in space.free_names if name not in given]
+    if missing:
+        raise ArmidError(f"{where}: parameter '{missing[0]}' is free and has no value there: one is expected")
+    return np.array([given[name] for name in space.free_names])
+
+
+def close_loop(
+    model: Any, campaign: Campaign | None = None, candidates: Any = None, rng: np.random.Generator | None = None,
+    bounds: Bounds | None = None, fixed: Mapping[str, float] | None = None, threads: int = 1,
+    told: Callable[[str], None] = lambda _: None, *, without: Named = (), curve: bool = True, **given: Any,
+) -> "ClosedLoop":  # fmt: skip
+    """Find what a declared model lacks on the train records; `armid.close_loop("folder")` is enough.
+
+    Parameters
+    ----------
+    model : path, Campaign, or pandas DataFrames
+        The campaign, whose declared model is taken; or a Model, with the campaign as second argument.
+    campaign, rng, bounds, fixed, threads, told, curve
+        As of `armid.loop.close_loop`.
+    candidates : names, Effects, or a mapping of name to Effect
+        Effects to look for; None: all that apply.
+    without : names
+        Effects not to look for.
+    **given
+        effects, plugins, window, fix, plant: see `opened`.
+
+    Returns
+    -------
+    ClosedLoop
+        It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
+
+    Raises
+    ------
+    ArmidError
+        For whatever cannot be used.
+    """
+    from armid.loop import close_loop as run
+
+    declared = {"model": model} if campaign is not None else {}
+    there = opened(model if campaign is None else campaign, bounds=bounds, **declared, **expected(given))
+    known = there.effects
+    wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "--candidates")
+    left_out = effects_of(without, known, "--without") if without else {}
+    kept = {name: effect for name, effect in wanted.items() if name not in left_out}
+    found: ClosedLoop = run(
+        there.model, there.campaign, kept, rng, there.bounds, {**(fixed or {}), **there.fixed}, threads, told, curve
+    )
+    return found
+
+
+def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[str, Effect]:
+    """Return name -> Effect of names or Effects, None: all that are known; where: named in a refusal."""
+    if given is None:
+        return known
+    each = [given] if isinstance(given, str | Effect) else given
+    found = {}
+    for one in (e for text in each for e in (text.split(",") if isinstance(text, str) else [text])):
+        effect = one if isinstance(one, Effect) else chosen(one.strip(), known, f"{where}: effect")
+        found[effect.name] = effect
+    return found
+
+
+def simulate(
+    model: Any, manoeuvre: Manoeuvre | None = None, *more: Any, parameters: Mapping[str, float] | None = None,
+    accuracy: str | None = None, **given: Any,
+) -> Any:  # fmt: skip
+    """Simulate every record of a campaign, `armid.simulate("folder", p0=3.1e6)`; or a model through one manoeuvre.
+
+    Parameters
+    ----------
+    model : path, Campaign, or pandas DataFrames
+        The campaign; or a Model.
+    manoeuvre, *more
+        With a Model alone: manoeuvre, population and all else as of `armid.engine.simulate`.
+    parameters
+        Name -> value, SI; names without a dot may be arguments of their own. One that is not given takes the value that
+        the campaign fixes, else its nominal one.
+    accuracy : {"standard", "fine"}
+        Of the engine; None: as the noise of each record asks for.
+    **given
+        Parameters, and effects, plugins, window, plant: see `opened`.
+
+    Returns
+    -------
+    SimulatedCampaign or Simulation
+        It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
+
+    Raises
+    ------
+    ArmidError
+        For whatever cannot be used.
+    """
+    from armid.engine import simulate as run
+    from armid.estimation.simulated import SimulatedCampaign, candidate_of, simulated_table
+
+    if isinstance(model, Model):
+        rest = ((manoeuvre,) if manoeuvre is not None else ()) + more
+        return run(model, *rest, **given)
+    if manoeuvre is not None:
+        raise ArmidError("a manoeuvre is given with a campaign: with a Model it is expected")
+    asked = {name: given.pop(name) for name in tuple(given) if name in ("effects", "plugins", "window", "plant")}
+    there = opened(model, **asked)
+    whole = replace(there.model, plant=there.campaign.declared)
+    candidate = candidate_of(whole, there.campaign, {**given, **(parameters or {})})
+    tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
+    return SimulatedCampaign(there.campaign, whole, candidate, tables)

@@ -1,0 +1,286 @@
+"""The commands on a campaign: `armid simulate`, `identify`, `identifiability` and `close-loop`."""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from armid.cli.options import (
+    accuracy_of,
+    accuracy_option,
+    assignments,
+    campaign_argument,
+    command,
+    effects_option,
+    examples,
+    give,
+    given,
+    number,
+    numbers,
+    out_option,
+    plugin_option,
+    problem_options,
+    say,
+    seed_option,
+    speaks,
+    value_of,
+)
+from armid.cli.report import show_and_save
+from armid.errors import ArmidError, nearest
+from armid.report.result import refuse_unwritable
+
+
+@command("simulate", epilog=examples(
+    "armid simulate studies/campaigns/paper_arm --set p0=3.1e6 --out results/simulated",
+    "armid simulate CAMPAIGN --effects coulomb --set coulomb.level=40 --out DIR",
+))  # fmt: skip
+@campaign_argument
+@out_option("Folder to write to.", required=True)
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, SI. Repeatable.")
+@effects_option
+@accuracy_option
+@plugin_option
+def simulate_command(
+    campaign: Path, out: Path, settings: tuple[str, ...], effects: str, accuracy: str, plugins: tuple[str, ...]
+) -> None:
+    """Simulate every record of a campaign.
+
+    Writes DIR/<record's file name>. Columns: time_s (the record's times from 0 on; the even grid of a record whose
+    times are irregular), the states, and all outputs of the plant, SI. A parameter that is not set takes the value
+    that the campaign fixes, else its nominal one.
+    """
+    from armid.by_name import simulate
+
+    known = given(effects, plugins)
+    found = simulate(campaign, parameters=numbers(settings, "--set"), accuracy=accuracy_of(accuracy),
+                     effects=known["effects"], plugins=known["plugins"])  # fmt: skip
+    files = found.save(out)
+    say(*(f"{name} = {value:.9g} {found.model.parameters[name].unit}" for name, value in found.parameters.items()))
+    for record in found.campaign.records:
+        if record.irregularity is not None:
+            say(f"{record.file}: on its even grid of {record.manoeuvre.interval:.6g} s, as its times are irregular")
+    say(f"wrote {len(files)} files to {out}")
+    give(parameters=found.parameters, folder=out, files=files)
+
+
+DEFAULT = (
+    "pso+least_squares: no other of 20 identifiers ends nearer to the truth in results/benchmark, and its swarm looks "
+    "at the whole box; cmaes for a fitness that is no sum of squares"
+)
+
+
+@command("identify", epilog=examples(
+    "armid identify studies/campaigns/paper_arm --out results/paper_arm",
+    "armid identify studies/campaigns/paper_arm --paper",
+    "armid identify CAMPAIGN --identifier least_squares --fitness likelihood",
+    "armid identify CAMPAIGN --effects coulomb --bounds coulomb.level=0:80 --fix n=1.4",
+))  # fmt: skip
+@problem_options
+@click.option(
+    "--identifier", show_default=DEFAULT,
+    help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.",
+)  # fmt: skip
+@click.option(
+    "--option", "options", multiple=True, metavar="NAME=VALUE",
+    help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
+    "0.5:0.3 for three phases), pso.velocity_limit=0.2; `armid list identifiers --long`. Repeatable.",
+)  # fmt: skip
+@click.option("--fitness", show_default="rmse",
+              help="What is minimised: see `armid list fitness`; rmse:OUTPUT for one output.")  # fmt: skip
+@click.option(
+    "--budget", type=int, show_default="3,000; 12,000 with --paper or --identifier",
+    help="Simulations: one candidate through all train records counts as one.",
+)  # fmt: skip
+@click.option(
+    "--target", type=float,
+    help="Stop when reached: the similarity degree for a similarity, else the value of the fitness.",
+)  # fmt: skip
+@click.option(
+    "--paper", is_flag=True,
+    help="As the paper does, where nothing else is said: pso, similarity, 12,000 simulations, --window 0:0.7.",
+)  # fmt: skip
+@seed_option
+@out_option("Folder for report.html, report.md, result.json and the figures.")
+@accuracy_option
+def identify_command(
+    campaign: Path, identifier: str | None, options: tuple[str, ...], fitness: str | None, effects: str,
+    bounds: tuple[str, ...], fix: tuple[str, ...], window: str, budget: int | None, target: float | None, paper: bool,
+    seed: int, out: Path | None, accuracy: str, plugins: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Identify parameters from the train records.
+
+    The result is judged on train and holdout. Prints parameters with 95 % intervals (from sensitivities and measured
+    noise; one that does not hold is struck), warnings in words, and errors. Without --out nothing is written. Ctrl-C
+    ends the search, judges the best so far, and exits with 130.
+    """
+    from armid.by_name import FITNESS, PAPER_FITNESS
+    from armid.by_name import identify as run
+    from armid.estimation.identify import INTERRUPTED
+    from armid.problem.fitness import SIMILARITIES
+
+    minimised = fitness or (PAPER_FITNESS if paper else FITNESS)
+    goal = 1.0 - target if target is not None and minimised.partition(":")[0] in SIMILARITIES else target
+    named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
+    refuse_unwritable(out)
+    with progress_bar() as update:
+        found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), update,
+                    options=named, paper=paper, **given(effects, plugins, window, bounds, fix))  # fmt: skip
+    show_and_save(found, out)
+    if found.stopped == INTERRUPTED:
+        sys.exit(130)
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[Any], None]]:
+    """Yield what shows the state of a search, with rate and time left, on a terminal; nothing is shown elsewhere."""
+    if not (sys.stderr.isatty() and speaks()):
+        yield lambda meter: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.completed:.0f}/{task.fields[budget]} simulations"), BarColumn(),
+               TextColumn("{task.fields[rate]:.0f}/s"), TimeRemainingColumn(),
+               TextColumn("best {task.fields[best]:.6g}"))  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=None, budget="", best=float("inf"), rate=0.0)
+        # rich does not know a speed until it has seen two steps
+        yield lambda m: bar.update(
+            task, total=m.budget, budget=m.budget, completed=m.used, best=m.best_f, rate=bar.tasks[0].speed or 0.0
+        )
+
+
+# The rounding of a speed is larger.
+LEAST_NOISE = 1e-15
+
+
+@command("identifiability", short_help="Say how well the records pin down the parameters.", epilog=examples(
+    "armid identifiability studies/campaigns/paper_arm --window 0:0.7 --out results/identifiability",
+    "armid identifiability CAMPAIGN --from results/paper_arm/result.json --rank worst",
+))  # fmt: skip
+@problem_options
+@click.option(
+    "--at", default="", metavar="NAME=VALUE,...", help="Examine this point, SI, instead of the least-squares estimate."
+)
+@click.option(
+    "--from", "source", type=click.Path(path_type=Path), metavar="RESULT.json",
+    help="Examine the point that `armid identify` found.",
+)  # fmt: skip
+@click.option(
+    "--noise", type=float, metavar="RMS",
+    help="White noise to assume for every record, rad/s or m/s, in place of what was measured.",
+)  # fmt: skip
+@click.option(
+    "--rank", default="volume", show_default=True, metavar="volume|worst|shrinkage",
+    help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.",
+)  # fmt: skip
+@out_option("Folder for identifiability.html, identifiability.json and the figures.")
+@accuracy_option
+def identifiability_command(
+    campaign: Path, effects: str, bounds: tuple[str, ...], fix: tuple[str, ...], at: str, source: Path | None,
+    window: str, noise: float | None, rank: str, out: Path | None, accuracy: str, plugins: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Say what the train records tell about the parameters, and what one more manoeuvre would buy.
+
+    Cramer-Rao intervals, parameters that move together, the profile likelihood of each parameter. Holdout records are
+    not looked at.
+    """
+    from armid.by_name import examine
+    from armid.estimation.design import SHRINKAGE, VOLUME, WORST
+
+    if rank not in (VOLUME, WORST, SHRINKAGE):
+        raise ArmidError(f"--rank '{rank}': {nearest(rank, (VOLUME, WORST, SHRINKAGE))}")
+    if noise is not None and not LEAST_NOISE <= noise <= 1.0 / LEAST_NOISE:
+        expected = f"a finite number above 0 is expected, {LEAST_NOISE:g} to {1.0 / LEAST_NOISE:g}"
+        raise ArmidError(f"--noise is {noise:g}, {expected}")
+    if at and source is not None:
+        raise ArmidError("--at and --from are both given: one point is expected")
+    refuse_unwritable(out)
+    point, where = None, "--at"
+    if at:
+        point = {n: number(v, f"--at {n}") for n, v in assignments(at.split(","), "--at").items()}
+    elif source is not None:
+        point, where = read_point(source), f"--from {source}"
+    found = examine(campaign, None, None, point, noise, rank, accuracy_of(accuracy), where=where,
+                    **given(effects, plugins, window, bounds, fix))  # fmt: skip
+    show_and_save(found, out)
+
+
+def read_point(path: Path) -> dict[str, float]:
+    """Return name -> value of the result of an identification.
+
+    Raises ArmidError for a file that is none.
+    """
+    try:
+        parameters = json.loads(path.read_text(encoding="utf-8"))["parameters"]
+        return {str(name): float(entry["value"]) for name, entry in parameters.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        raise ArmidError(f"--from {path} holds no parameters with values: a result.json of `armid identify` is "
+                         "expected") from error  # fmt: skip
+
+
+# Where the output is no terminal, so many seconds pass between two lines.
+SILENT_S = 60.0
+
+
+@command("close-loop", short_help="Find the effects that the declared model lacks.", epilog=examples(
+    "armid close-loop studies/campaigns/four_strokes --out results/four_strokes",
+    "armid close-loop CAMPAIGN --out DIR --candidates coulomb,viscous,stribeck",
+    "armid close-loop CAMPAIGN --out DIR --plugin mine.py:my_drag",
+))  # fmt: skip
+@problem_options
+@out_option("Folder for report.html, report.md, report.json and the figures.", required=True)
+@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]")
+@click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
+@click.option("--no-curve", is_flag=True, help="Try no empirical curve where no effect will do.")
+@seed_option
+@click.option("--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations.")
+def close_loop_command(
+    campaign: Path, out: Path, effects: str, candidates: str, without: str, no_curve: bool,
+    bounds: tuple[str, ...], fix: tuple[str, ...], window: str, seed: int, threads: int, plugins: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Find the effects that the declared model lacks, and report the error before and after.
+
+    Identifies the declared model on the train records, tells whether what remains is more than noise, names the effect
+    that is missing (or says that it cannot), adds it and identifies again, until nothing earns its parameters. Records
+    held out are simulated after the last decision. --bounds and --fix may name parameters of candidates too; searches
+    start from evenly spread points, so that nothing is random. Every verdict exits with 0.
+    """
+    from numpy.random import default_rng
+
+    from armid.by_name import close_loop
+
+    named = [name for name in candidates.split(",") if name.strip()] or None
+    refuse_unwritable(out)
+    with status_line() as tell:
+        found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=tell, without=without,
+                           curve=not no_curve, **given(effects, plugins, window, bounds, fix))  # fmt: skip
+    show_and_save(found, out)
+
+
+@contextmanager
+def status_line() -> Iterator[Callable[[str], None]]:
+    """Yield what shows a sentence and the time on a terminal; elsewhere a line is printed once a minute."""
+    if not (sys.stderr.isatty() and speaks()):
+        began = last = time.monotonic()
+
+        def now_and_then(sentence: str) -> None:
+            nonlocal last
+            if speaks() and time.monotonic() - last >= SILENT_S:
+                last = time.monotonic()
+                print(f"{last - began:.0f} s: {sentence}", file=sys.stderr, flush=True)
+
+        yield now_and_then
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("identifying the declared model (compiling at first)", total=None)
+        yield lambda sentence: bar.update(task, description=sentence)

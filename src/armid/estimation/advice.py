@@ -1,0 +1,312 @@
+"""Which manoeuvre would tell rival models apart: the record to make next when the ones there are cannot.
+
+All manoeuvres are predicted (linear in the parameters, see `chance`); for the best of them the whole is simulated: a
+record from each rival in turn, as uncertain as it is known by now, and all rivals fitted again (see `simulate_refits`).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky
+from scipy.stats import norm
+
+from armid.engine import probes, simulate
+from armid.errors import ArmidError
+from armid.estimation.design import BOX, Feasible, Key, Motions, fine_schedule, manoeuvre_grid
+from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords, descend, side_by_side
+
+Array = NDArray[np.float64]
+Whitening = Callable[[Array], Array]
+Pair = tuple[int, int]
+Powers = Mapping[Pair, tuple[float, float]]
+# Difference of the criterion from which on the loop takes one model for better than another.
+THRESHOLD = 6.0
+# Draws of what the parameters may be: in the linear prediction, and of each rival whose record is simulated.
+N_DRAWS, N_REFIT_DRAWS = 512, 4
+# So many fits all simulations may take; it decides how many manoeuvres are simulated, but not below the fewest.
+MOST_FITS, FEWEST = 160, 4
+# Rivals that a manoeuvre tells apart no more often than this are not said to be separated by it.
+OFTEN = 0.5
+TOLERANCE = 1e-5
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Advise a manoeuvre.
+
+    manoeuvre: key -> value as campaign.toml would say it. words: the same for people. separates: names of the rivals
+    that its record is expected to tell apart. power: chance that the right one of any two of them wins by more than the
+    threshold, the lowest of the pairs, whichever of the two is right. delta: distance of their predictions after both
+    were fitted again to old and new records, in standard deviations of the noise, of that pair.
+    """
+
+    manoeuvre: Mapping[str, Key]
+    words: str
+    separates: tuple[str, ...]
+    power: float
+    delta: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Hold a fitted model that others cannot be told from.
+
+    records: the least-squares problem of the records there are. z: its estimate, shares of the range, (n_free,).
+    criterion: what the loop judges it by, smaller is better; differences are those of chi2 plus what parameters cost.
+    trust: what a sample counts, below 1 where more than noise is left.
+    """
+
+    name: str
+    records: LeastSquaresProblem
+    z: Array
+    criterion: float
+    trust: float = 1.0
+
+    @property
+    def candidate(self) -> Array:
+        return np.asarray(self.whole(self.z[np.newaxis])[0])
+
+    def whole(self, Z: Array) -> Array:
+        """Return whole candidates, SI, of shares that may lie outside the box, where they are put onto it."""
+        return self.records.space.complete(self.records.values(Z))
+
+    @cached_property
+    def precision(self) -> Array:
+        """Triangular factor L of the information L L^T of the records about z, the box counting as a first record."""
+        _, slopes = self.records.residual_and_slopes(self.z)
+        return np.asarray(cholesky(self.trust * slopes.T @ slopes + BOX * np.eye(len(self.z)), lower=True))
+
+    @cached_property
+    def root(self) -> Array:
+        """Factor so that root root^T is the covariance of z: each column is a move of one standard deviation."""
+        return np.asarray(np.linalg.inv(self.precision).T)
+
+    def drawn(self, draw: Array) -> Array:
+        move = self.root @ draw[: len(self.z)]
+        both = np.array([self.z + move, self.z - move])
+        return np.asarray(both[int(np.argmin(outside(both)))])
+
+
+def advise(
+    rivals: Sequence[Rival],
+    white: Whitening | None = None,
+    grid: Sequence[Feasible] | None = None,
+    speed_limit: float | None = None,
+    threshold: float = THRESHOLD,
+    threads: int = 1,
+) -> tuple[Advice, ...]:
+    """Rank feasible manoeuvres by how well one record of each would tell the rivals apart, the best first.
+
+    Only manoeuvres that were simulated are returned, ranked by the mean power over pairs, then by the mean distance.
+    rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
+    n_samples), into units of white noise, (n_signals, n), None: the mean weight of the records of one output. grid:
+    None: `manoeuvre_grid`. speed_limit: of the gyro, [unit of the signal]. threshold: difference of the criterion at
+    which one model counts as better. threads: among which rivals and manoeuvres are shared.
+
+    Raises ArmidError for fewer than two rivals.
+    Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
+    """
+    if len(rivals) < 2:
+        raise ArmidError(f"{len(rivals)} model was given to be told apart from others: at least two are expected")
+    first = rivals[0].records
+    if white is None:
+        assert isinstance(first, WeightedRecords)
+        mean_weight = float(np.mean(np.square(1.0 / np.array(first.weights))) ** -0.5)
+        white = lambda signals: mean_weight * np.concatenate(signals, axis=-1)  # noqa: E731
+    grid = grid or manoeuvre_grid(first.model, [r.record for r in first.replays])
+    predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
+    draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
+    possible = [f for f in grid if all(f in known for known in predictions)]
+    ranks = {f: rank(predicted_powers(rivals, [p[f] for p in predictions], draws, threshold)) for f in possible}
+    most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
+    promising = sorted(possible, key=lambda f: ranks[f], reverse=True)[:most]
+    draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
+    powers = side_by_side(lambda f: simulated_powers(rivals, f, white, draws, threshold), promising, threads)
+    ranked = sorted(zip(promising, powers, strict=True), key=lambda pair: rank(pair[1]), reverse=True)
+    return tuple(advice_of(rivals, feasible, found) for feasible, found in ranked)
+
+
+def rank(powers: Powers) -> tuple[float, float]:
+    """Return what manoeuvres are ranked by: mean power in steps of a hundredth, then mean distance."""
+    power, delta = (float(np.mean([p[k] for p in powers.values()])) for k in (0, 1))
+    return round(power, 2), delta
+
+
+def advice_of(rivals: Sequence[Rival], feasible: Feasible, powers: Powers) -> Advice:
+    """Return the advice for one manoeuvre: the largest set of rivals that it often tells apart, or the best pair."""
+    for size in range(len(rivals), 1, -1):
+        weakest = {s: min(powers[pair] for pair in combinations(s, 2)) for s in combinations(range(len(rivals)), size)}
+        best = max(weakest, key=lambda s: weakest[s])
+        if weakest[best][0] >= OFTEN:
+            break
+    return Advice(dict(feasible.keys), feasible.name, tuple(rivals[i].name for i in best), *weakest[best])
+
+
+def normal_draws(n_dimensions: int, n_draws: int) -> Array:
+    """Return evenly spread standard normal draws, (n_draws, n_dimensions): the same at every call."""
+    return np.asarray(norm.ppf(probes(np.zeros(n_dimensions), np.ones(n_dimensions), n_draws)))
+
+
+def outside(Z: Array) -> Array:
+    """Return how far candidates in shares of the range reach out of the box, (n_candidates,)."""
+    return np.asarray(np.abs(Z - np.clip(Z, 0.0, 1.0)).max(axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Hold what one rival predicts for one manoeuvre, whitened: the signal (n_samples,) and its spread.
+
+    spread: (n_samples, n_free) so that spread spread^T is the covariance of the prediction that the uncertainty of the
+    fitted parameters makes.
+    """
+
+    signal: Array
+    spread: Array
+
+
+def predictions_of(
+    rival: Rival, grid: Sequence[Feasible], white: Whitening, speed_limit: float | None
+) -> Mapping[Feasible, Prediction]:
+    """Return what a rival predicts for each manoeuvre that the machine could make if the rival were right.
+
+    The spread comes from differences over a standard deviation to either side, not from derivatives: a switch that
+    moves by many samples does not move in proportion. Of two sides the one that the box cuts off less counts alone: an
+    effect at its null can only grow.
+    """
+    motions = Motions(rival.records.replays, rival.candidate, speed_limit)
+    above, below = rival.z + rival.root.T, rival.z - rival.root.T
+    points = rival.whole(np.concatenate([rival.z[np.newaxis], above, below]))
+    n, found = len(rival.z), {}
+    upward = np.where(outside(above) < outside(below), 1.0, np.where(outside(above) > outside(below), 0.0, 0.5))
+    for feasible, signals in motions.signals(grid, points):
+        seen = white(signals)
+        found[feasible] = Prediction(seen[0], spread_of(seen[0], seen[1 : n + 1], seen[n + 1 :], upward))
+    return found
+
+
+def spread_of(here: Array, above: Array, below: Array, upward: Array) -> Array:
+    """Return what moves of a standard deviation do, (n_samples, n_free); upward: the share of the upper side."""
+    return np.asarray(((above - here).T * upward) + ((here - below).T * (1.0 - upward)))
+
+
+def predicted_powers(
+    rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array, threshold: float
+) -> Powers:
+    found = {}
+    for a, b in combinations(range(len(rivals)), 2):
+        old = rivals[b].criterion - rivals[a].criterion
+        one = chance(predictions[a], predictions[b], old, draws, threshold)
+        other = chance(predictions[b], predictions[a], -old, draws, threshold)
+        found[a, b] = (0.5 * (one[0] + other[0]), float(np.sqrt(0.5 * (one[1] + other[1]))))
+    return found
+
+
+def chance(right: Prediction, wrong: Prediction, old: float, draws: Array, threshold: float) -> tuple[float, float]:
+    """Return the chance that the right model wins by more than a threshold, and the squared distance delta^2.
+
+    After both are fitted again, the criterion of the wrong one less that of the right one is
+    D = old + r_B^T V_B^-1 r_B - r_A^T V_A^-1 r_A, r the new record less the prediction, V = 1 + spread spread^T its
+    covariance; the record comes from A as it is known by now; delta^2 = d^T V_B^-1 d, d the difference of predictions.
+    old: by how much the criterion favours A already. draws: standard normal, (n_draws, at least 1 + n_free of both).
+    All that matters happens in the space of the difference and of both spreads, which has few dimensions.
+    """
+    difference = right.signal - wrong.signal
+    reduced = np.linalg.qr(np.column_stack([difference, right.spread, wrong.spread]), mode="r")
+    ends = np.cumsum([1, right.spread.shape[1]])
+    d, of_right, of_wrong = np.split(reduced, ends, axis=1)
+    one = np.eye(len(reduced))
+    factor = cholesky(one + of_right @ of_right.T, lower=True)
+    # small inverses: solving for many columns would start threads
+    weight = np.linalg.inv(one + of_wrong @ of_wrong.T)
+    normal = draws[:, : len(reduced)]
+    missed = normal @ factor.T + d[:, 0]
+    gained = np.sum(missed @ weight * missed, axis=1) - np.sum(normal**2, axis=1)
+    return float(np.mean(old + gained > threshold)), float(d[:, 0] @ weight @ d[:, 0])
+
+
+@dataclass(frozen=True, eq=False)
+class OldAndNew(LeastSquaresProblem):
+    """Pose the old records, as a parabola about their estimate, and one new record as one least-squares problem.
+
+    rival: fitted to the old records. feasible, white: the new record's manoeuvre and what makes its noise white.
+    seen: the new record, whitened, (n_samples,).
+    """
+
+    rival: Rival = field(kw_only=True)
+    feasible: Feasible = field(kw_only=True)
+    white: Whitening = field(kw_only=True)
+    seen: Array = field(kw_only=True)
+
+    @cached_property
+    def measured(self) -> Array:
+        return np.concatenate([np.zeros(len(self.rival.z)), self.seen])
+
+    def signals(self, Z: Array) -> Array:
+        """Return how far candidates are from the old estimate, in standard deviations, then their new signals."""
+        new = whitened_signals(self.rival, self.feasible, self.white, Z)
+        return np.concatenate([(Z - self.rival.z) @ self.rival.precision, new], axis=1)
+
+
+def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Array) -> Array:
+    """Return the whitened signal of candidates in shares of the range, (n_candidates, n_samples)."""
+    records = rival.records
+    run = simulate(records.model, feasible.manoeuvre, rival.whole(Z), fine_schedule(records.replays))
+    places = sorted({r.place for r in records.replays})
+    return np.asarray(white(run.outputs[places][..., feasible.window]))
+
+
+def simulated_powers(
+    rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array, threshold: float
+) -> Powers:
+    tried = [simulate_refits(rivals, i, feasible, white, draws, threshold) for i in range(len(rivals))]
+    chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
+    return {
+        (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
+        for a, b in combinations(range(len(rivals)), 2)
+    }
+
+
+def simulate_refits(
+    rivals: Sequence[Rival], right: int, feasible: Feasible, white: Whitening, draws: Array, threshold: float
+) -> tuple[Array, Array]:
+    """Return the chance that each other rival loses to the right one by more than a threshold, and its distance.
+
+    The record is simulated without noise from the right model as it is known by now, once for each draw, and every
+    rival is fitted again to old and new. Noise then scatters the difference D of the criteria by twice the distance of
+    the fitted predictions: the chance is Phi((D - threshold)/(2 distance)).
+    draws: standard normal, (n_draws, at least n_free). Returns chances (n_rivals,), of the right one 1, and
+    distances in standard deviations of the noise, (n_rivals,). A draw whose simulation diverges says nothing.
+    """
+    true = rivals[right]
+    chances, distances = [], []
+    for draw in draws:
+        seen = whitened_signals(true, feasible, white, true.drawn(draw)[np.newaxis])[0]
+        if not np.isfinite(seen).all():
+            continue
+        values, signals = zip(*(fitted_again(r, feasible, white, seen) for r in rivals), strict=True)
+        apart = np.array([np.linalg.norm(s - signals[right]) for s in signals])
+        margin = np.array(values) - values[right] - threshold
+        won = norm.cdf(margin / np.maximum(2.0 * apart, 1e-9))
+        won[right] = 1.0
+        chances.append(won)
+        distances.append(apart)
+    if not chances:
+        return np.zeros(len(rivals)), np.zeros(len(rivals))
+    return np.mean(chances, axis=0), np.mean(distances, axis=0)
+
+
+def fitted_again(rival: Rival, feasible: Feasible, white: Whitening, seen: Array) -> tuple[float, Array]:
+    """Return the criterion and the whitened prediction of a rival after a fit to old and new.
+
+    A rival that diverges wherever it starts is as far off as a model can be: the record itself is its distance.
+    """
+    both = OldAndNew((), rival.records.space, rival=rival, feasible=feasible, white=white, seen=seen)
+    start = np.clip(rival.z, 0.0, 1.0)
+    if not np.isfinite(both.chi2(start)[0]):
+        return rival.criterion + float(seen @ seen), np.zeros_like(seen)
+    z = descend(both, [start], TOLERANCE)
+    return rival.criterion + float(both.chi2(z)[0]), whitened_signals(rival, feasible, white, z[np.newaxis])[0]

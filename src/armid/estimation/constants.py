@@ -1,0 +1,170 @@
+"""Constants that are known within tolerances: what they do to the records, and what they leave undetermined.
+
+The whitened signal about an estimate is r = J dz + C c + noise, z the free parameters, c the relative errors of the
+constants, whose prior is a normal distribution with their tolerance as standard deviation. A column C c with prior
+variance t^2 adds t^2 C C^T to the covariance of the noise.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.estimation.least_squares import LeastSquaresProblem
+from armid.model import Plant
+from armid.problem.problem import Replay
+from armid.record import Piece, Record
+
+Array = NDArray[np.float64]
+# Relative step of the differences.
+STEP = 1e-4
+# Columns whose cosine is within this of 1 are one; a column below this share of the longest moves nothing.
+ONE, NOTHING = 1e-6, 1e-7
+# Combinations of relative changes that move the signal by less than this share of what each alone does are not seen.
+UNSEEN = 1e-5
+# Exponents are told as they are where they are whole within this.
+WHOLE = 0.02
+NAMED = "constant:"
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """Hold constants that the records know only as one product.
+
+    names: its members; exponents: of each, the first 1. tolerance: of the product, relative. slope: change of the
+    weighted signal per relative change of the first member, (n_samples,).
+    """
+
+    names: tuple[str, ...]
+    exponents: tuple[float, ...]
+    tolerance: float
+    slope: Array
+
+    @property
+    def public(self) -> str:
+        """Name in reports, such as `constant:L_loaded*m_loaded`; members of a sum stand side by side with `+`."""
+        is_product = all(abs(abs(e) - 1.0) < WHOLE for e in self.exponents)
+        signs = [("*" if e > 0.0 else "/") if is_product else "+" for e in self.exponents[1:]]
+        return NAMED + self.names[0] + "".join(s + n for s, n in zip(signs, self.names[1:], strict=True))
+
+    @property
+    def column(self) -> Array:
+        """Change of the weighted signal by one tolerance, (n_samples,)."""
+        return self.tolerance * self.slope
+
+
+def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> Record:
+    """Return a record of a machine whose constants differ by relative shares, name -> share."""
+    if not shares:
+        return record
+    pieces, whole = (
+        tuple(moved_piece(p, plant, shares) for p in some) for some in (record.pieces, record.whole_pieces)
+    )
+    others = tuple(moved_record(other, plant, shares) for other in record.others)
+    return replace(record, pieces=pieces, whole_pieces=whole, others=others)
+
+
+def moved_replay(replay: Replay, shares: Mapping[str, float]) -> Replay:
+    """Return a replay whose machine's constants differ by relative shares, name -> share."""
+    return replace(replay, pieces=tuple(moved_piece(p, replay.model.plant, shares) for p in replay.pieces))
+
+
+def moved_piece(piece: Piece, plant: Plant, shares: Mapping[str, float]) -> Piece:
+    given = {c.name: c.value for c in plant.constants} | dict(piece.manoeuvre.constants)
+    changed = {name: given[name] * (1.0 + share) for name, share in shares.items()}
+    manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **changed})
+    return replace(piece, manoeuvre=manoeuvre)
+
+
+def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[str]) -> Array:
+    """Return the change of the weighted signal per relative change of each constant, (n_names, n_samples).
+
+    By central differences; a constant whose change makes the simulation diverge has a column of 0.
+    """
+    candidate = records.space.complete(records.values(z)[np.newaxis])
+    found = []
+    for name in names:
+        sides = [records.weighted([moved_replay(r, {name: s}).signal(candidate)[0] for r in records.replays])
+                 for s in (STEP, -STEP)]  # fmt: skip
+        slope = (sides[0] - sides[1]) / (2.0 * STEP)
+        found.append(slope if np.isfinite(slope).all() else np.zeros_like(slope))
+    return np.array(found).reshape(len(names), len(records.measured))
+
+
+def products(records: LeastSquaresProblem, z: Array, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
+    """Return the constants with a tolerance that the records see, those that act as one product together."""
+    names = [name for name, tolerance in tolerances.items() if tolerance > 0.0]
+    if not names:
+        return ()
+    slopes = slopes_of_constants(records, z, names)
+    lengths = np.linalg.norm(slopes, axis=1)
+    left, found = [i for i in range(len(names)) if lengths[i] > NOTHING * lengths.max()], []
+    while left:
+        first = left[0]
+        cosines = {i: float(slopes[first] @ slopes[i]) / (lengths[first] * lengths[i]) for i in left}
+        members = [i for i in left if abs(cosines[i]) > 1.0 - ONE]
+        exponents = tuple(float(np.sign(cosines[i]) * lengths[i] / lengths[first]) for i in members)
+        tolerance = float(np.linalg.norm([e * tolerances[names[i]] for e, i in zip(exponents, members, strict=True)]))
+        found.append(Product(tuple(names[i] for i in members), exponents, tolerance, slopes[first]))
+        left = [i for i in left if i not in members]
+    return tuple(found)
+
+
+def columns_of(found: Sequence[Product], n_samples: int) -> Array:
+    """Return what one tolerance of each product does to the weighted signal, (n_samples, n_products)."""
+    return np.array([p.column for p in found]).reshape(len(found), n_samples).T
+
+
+def common_factors(names: Sequence[str], slopes: Array, found: Sequence[Product]) -> tuple[str, ...]:
+    """Return in words which parameters the records give only together with constants.
+
+    Of each parameter the smallest set of constants and further parameters that makes up for a change of it.
+    names: of the free parameters; slopes: of the weighted signal per relative change of each, (n_samples, n_free).
+    """
+    if not found or not names:
+        return ()
+    every = np.column_stack([slopes, *(p.slope for p in found)])
+    lengths = np.linalg.norm(every, axis=0)
+    labels = [*names, *(p.public.removeprefix(NAMED) for p in found)]
+    seen = [i for i, length in enumerate(lengths) if length > NOTHING * lengths.max()]
+    small: Array = np.asarray(np.linalg.qr(every[:, seen] / lengths[seen], mode="r"))
+    said: dict[frozenset[str], str] = {}
+    for place, i in enumerate(seen):
+        others = [k for k in range(len(seen)) if k != place]
+        members = smallest_span(small, place, others) if i < len(names) else None
+        if members is None:
+            continue
+        weights = np.linalg.lstsq(small[:, members], -small[:, place], rcond=None)[0]
+        powers = {labels[i]: 1.0}
+        powers |= {
+            labels[seen[k]]: float(w * lengths[i] / lengths[seen[k]]) for k, w in zip(members, weights, strict=True)
+        }
+        text = f"these records give {', '.join(powers)} up to a common factor"
+        if any(abs(e - 1.0) > WHOLE for e in powers.values()):
+            changes = ", ".join(f"{label} {e:+.2g} %" for label, e in powers.items())
+            text = f"these records do not tell a change of {changes}, made together"
+        said.setdefault(frozenset(powers), text)
+    return tuple(said.values())
+
+
+def smallest_span(columns: Array, place: int, others: Sequence[int]) -> list[int] | None:
+    """Return a smallest set of other columns in whose span one lies, None where it lies in none of them."""
+
+    def spans(members: Sequence[int]) -> bool:
+        chosen = columns[:, list(members)]
+        rest = columns[:, place] - chosen @ np.linalg.lstsq(chosen, columns[:, place], rcond=None)[0]
+        return float(np.linalg.norm(rest)) < UNSEEN
+
+    for size in (1, 2):
+        for members in combinations(others, size):
+            if spans(members):
+                return list(members)
+    if not spans(others):
+        return None
+    left = list(others)
+    for member in others:
+        rest = [k for k in left if k != member]
+        left = rest if spans(rest) else left
+    return left

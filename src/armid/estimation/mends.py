@@ -1,0 +1,239 @@
+"""Mistakes that records may contain, each with what undoes it: sign, unit, clock, zero, manoeuvre."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.model import Manoeuvre, Plant
+from armid.record import Piece, Record
+from armid.record.start import Track, state_shown
+
+Array = NDArray[np.float64]
+DEGREES, ANGULAR = 180.0 / np.pi, "angular"
+FACTORS = {
+    -1.0: ("sign", "its sign looks inverted: with the other one"),
+    DEGREES: (ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
+    1.0 / DEGREES: (ANGULAR, "57.3 times too large, as degrees under a header in radians are: in the other unit"),
+    30.0 / np.pi: (ANGULAR, "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: so"),
+    np.pi / 30.0: (ANGULAR, "9.55 times too large, as revolutions per minute under a header in rad/s are: so mended"),
+    6.0: (ANGULAR, "6 times too small, as revolutions per minute under a header in deg/s are: so mended"),
+    10.0: ("unit", "10 times too small: ten times as large"),
+    0.1: ("unit", "10 times too large: a tenth as large"),
+    1000.0: ("unit", "1,000 times too small, as thousands under a plain unit are: so mended"),
+    0.001: ("unit", "1,000 times too large, as thousandths (mm, ms) under a plain unit are: so mended"),
+    2.0: ("gain", "half as large as it should be: doubled"),
+    0.5: ("gain", "twice as large as it should be: halved"),
+}
+TURNS = (90.0, -90.0, 180.0)
+TIMES = {
+    0.001: "time_s looks like milliseconds: in seconds",
+    1000.0: "time_s looks like thousands of seconds: in seconds",
+    0.1: "time_s looks ten times too long: a tenth as long",
+    10.0: "time_s looks ten times too short: ten times as long",
+    1.0 / 60.0: "time_s looks sixty times too long: a sixtieth as long",
+    60.0: "time_s looks like minutes: in seconds",
+}
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """Hold one mistake that the records seem to contain.
+
+    kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "input", "bounds", "position",
+    "noise", "rest", "twice" or "unlike". record: file, "" for every train record; other: the second of two files.
+    factor: what the signal or the times are to be multiplied by, for "late" the seconds, for "zero" what is to be added
+    [rad], else NaN. before, after: rms error over rms of the signal, as declared and with the mistake undone, NaN where
+    nothing was simulated.
+    """
+
+    kind: str
+    record: str
+    sentence: str
+    other: str = ""
+    factor: float = np.nan
+    before: float = np.nan
+    after: float = np.nan
+
+    @property
+    def improvement(self) -> float:
+        """By what factor the error falls when the mistake is undone."""
+        return self.before / self.after
+
+
+@dataclass(frozen=True)
+class Mend:
+    """Undo one mistake: `undo` returns a piece as it should have been, `words` begin a sentence about it."""
+
+    kind: str
+    factor: float
+    words: str
+    undo: Callable[[Record], Record]
+    other: str = ""
+
+    def suspicion(self, record: str, before: float, after: float) -> Suspicion:
+        who = record or "every train record"
+        said = f"{who}: {self.words} the error falls from {before:.3g} to {after:.2g} of the signal"
+        return Suspicion(self.kind, record, f"{said}.", self.other, self.factor, before, after)
+
+
+BOUNDS = Mend("bounds", np.nan, "bounds or fixed values that were given look wrong: with those that the model declares",
+              lambda record: record)  # fmt: skip
+
+
+def mends(plant: Plant, record: Record, shift: int) -> Iterator[Mend]:
+    """Yield what may be undone in a record; shift: by how many samples its signal may come too late."""
+    yield from mends_of_sizes(plant, record)
+    yield from mends_of_zeros(plant, record)
+    for a, b in combinations(record.each, 2):
+        if a.unit == b.unit:
+            words = f"its {a.output} and {b.output} look exchanged: the other way round"
+            yield Mend("exchanged", np.nan, words, partial(with_outputs_exchanged, plant=plant, a=a.output, b=b.output))
+            for one, other in ((a, b), (b, a)):
+                words = f"{one.output} looks counted from the ground, {other.output} being in it: without"
+                less = partial(with_other_taken_off, plant=plant, output=one.output, other=other.output)
+                yield Mend("absolute", np.nan, words, less)
+    yield from mends_of_keys(plant, record)
+    if shift:
+        seconds = shift * record.manoeuvre.interval
+        words = f"its clock looks {abs(seconds):.3g} s {'late' if shift > 0 else 'early'}: moved by that"
+        yield Mend("late", seconds, words, of_pieces(moved, shift=shift))
+
+
+def mends_of_sizes(plant: Plant, record: Record) -> Iterator[Mend]:
+    for factor, (kind, words) in FACTORS.items():
+        for one in record.each:
+            if kind != ANGULAR or one.unit.startswith("rad"):
+                signal = f"{one.output} [{one.unit}]" if record.others else f"{one.unit} signal"
+                yield Mend("unit" if kind == ANGULAR else kind, factor, f"the measured {signal}: {words}",
+                           partial(scaled, plant=plant, output=one.output, factor=factor))  # fmt: skip
+        for name in (i.name for i in plant.inputs if kind != ANGULAR):
+            yield Mend("input", factor, f"input '{name}': {words}", of_pieces(with_input, name=name, factor=factor))
+    for factor, words in TIMES.items():
+        yield Mend("time", factor, words, partial(with_interval, plant=plant, factor=factor))
+
+
+def mends_of_zeros(plant: Plant, record: Record) -> Iterator[Mend]:
+    angles = [one.output for one in record.each if one.unit == "rad"]
+    position = record.constants.get("start_position") if record.unit == "rad/s" else None
+    for turn in np.deg2rad(TURNS).tolist():
+        more = f"looks counted from elsewhere: with {np.rad2deg(turn):g} deg more"
+        for output in angles:
+            yield Mend("zero", turn, f"{output} {more}", partial(turned, plant=plant, output=output, turn=turn))
+        if position is not None:
+            start = {"start_position": position + turn}
+            yield Mend("zero", turn, f"the angle {more}", of_pieces(with_constants, constants=start))
+
+
+def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
+    constants = {c.name: c.value for c in plant.constants} | dict(record.constants)
+    for key in plant.keys:
+        if key.boolean:
+            other = 1.0 - constants[key.constant]
+            words = f"{key.key} looks wrong: with {'true' if other else 'false'}"
+            yield Mend("key", np.nan, words, of_pieces(with_constants, constants={key.constant: other}))
+        elif key.unlike:
+            swapped = {key.constant: constants[key.unlike], key.unlike: constants[key.constant]}
+            words = f"start and end ({key.unlike} and {key.constant}) look exchanged: the other way round"
+            yield Mend("key", np.nan, words, of_pieces(with_constants, constants=swapped))
+
+
+def of_pieces(undo: Callable[..., Piece], **told: Any) -> Callable[[Record], Record]:
+    """Return what undoes something in each piece of each output of a file."""
+
+    def undone(record: Record) -> Record:
+        others = tuple(map(undone, record.others))
+        return replace(record, pieces=tuple(undo(p, **told) for p in record.pieces), others=others)
+
+    return undone
+
+
+def scaled(record: Record, plant: Plant, output: str, factor: float) -> Record:
+    return with_measured(record, plant, {n: factor * x for n, x in measured_of(record).items() if n == output}, factor)
+
+
+def turned(record: Record, plant: Plant, output: str, turn: float) -> Record:
+    return with_measured(record, plant, {n: x + turn for n, x in measured_of(record).items() if n == output})
+
+
+def with_outputs_exchanged(record: Record, plant: Plant, a: str, b: str) -> Record:
+    measured = measured_of(record)
+    return with_measured(record, plant, {a: measured[b], b: measured[a]} if {a, b} <= measured.keys() else {})
+
+
+def with_other_taken_off(record: Record, plant: Plant, output: str, other: str) -> Record:
+    measured = measured_of(record)
+    both = {output, other} <= measured.keys()
+    return with_measured(record, plant, {output: measured[output] - measured[other]} if both else {})
+
+
+def measured_of(record: Record) -> dict[str, Array]:
+    return {one.output: one.measured for one in record.each}
+
+
+def with_interval(record: Record, plant: Plant, factor: float) -> Record:
+    def slower(old: Manoeuvre) -> Manoeuvre:
+        return replace(old, interval=factor * old.interval, start_time=factor * old.start_time)
+
+    told = of_pieces(lambda piece: replace(piece, manoeuvre=slower(piece.manoeuvre)))(record)
+    return with_measured(replace(told, manoeuvre=slower(told.manoeuvre)), plant, {})
+
+
+def with_measured(record: Record, plant: Plant, measured: Mapping[str, Array], factor: float = 1.0) -> Record:
+    """Return a file with other signals of some outputs, (n_samples,), and the starts that its outputs then show.
+
+    factor: what the start of a plant that records one speed is multiplied by.
+    """
+    each = []
+    for one in record.each:
+        signal = measured.get(one.output, one.measured)
+        pieces = (replace(p, measured=signal[p.start_index : p.start_index + len(p.measured)]) for p in one.pieces)
+        noise = replace(one.noise, rms=one.noise.rms * rms(signal) / rms(one.measured))
+        each.append(replace(one, measured=signal, noise=noise, pieces=tuple(pieces)))
+    changed = replace(each[0], others=tuple(each[1:]))
+    return replace(
+        changed, pieces=tuple(with_constants(p, start_of(changed, p, plant, factor)) for p in changed.pieces)
+    )
+
+
+def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[str, float]:
+    """Return the start constants of a piece; factor: see `with_measured`."""
+    old = piece.manoeuvre.constants
+    if plant.records_one_speed:
+        return {n: factor * v for n, v in old.items() if n.startswith("start_")}
+    if not piece.start_deviation:
+        return {}
+    given = {n: v for n, v in old.items() if n not in piece.start_deviation}
+    tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.each}
+    return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index)[0]
+
+
+def with_constants(piece: Piece, constants: Mapping[str, float]) -> Piece:
+    manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
+    return replace(piece, manoeuvre=manoeuvre)
+
+
+def with_input(piece: Piece, name: str, factor: float) -> Piece:
+    inputs = {n: factor * v if n == name else v for n, v in piece.manoeuvre.inputs.items()}
+    return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs=inputs))
+
+
+def moved(piece: Piece, shift: int) -> Piece:
+    """Return a piece whose measured signal comes earlier by some samples (later where negative); what is lost goes.
+
+    Where inputs drive the machine they come later instead, so that its measured start stays where it is.
+    """
+    n, window, inputs = len(piece.measured), piece.window, piece.manoeuvre.inputs
+    if inputs:
+        rows = np.clip(np.arange(n) - shift, 0, n - 1)
+        return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs={k: v[rows] for k, v in inputs.items()}))
+    begin, end = max(window.start, -shift), min(window.stop, n - shift)
+    return replace(piece, measured=np.roll(piece.measured, -shift), window=slice(begin, end)).until_window_end()
+
+
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

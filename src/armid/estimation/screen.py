@@ -1,0 +1,373 @@
+"""Whether records are what their campaign says: sign, unit, clock, manoeuvre, told before anything is identified.
+
+A wrong header or an exchanged file does not stop a search: parameters follow, and the misfit reads like physics. Here
+the declared model is fitted roughly to the train records; where it misses more than a tenth of a signal, each of a list
+of mistakes is undone in turn, and one is named only where that takes away most of the misfit.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.engine import Calibration, Schedule, probes
+from armid.estimation.least_squares import WeightedRecords, descend
+from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, of_pieces, rms, with_constants
+from armid.model import Model
+from armid.problem.problem import Replay, signals_of
+from armid.problem.space import Space, space_of
+from armid.record import Campaign, Record
+from armid.record.campaign import scaled as scaled_plant
+from armid.record.noise import correlation_sum
+from armid.record.table import POSITIONS
+
+Array = NDArray[np.float64]
+# An error (rms over the rms of the signal) up to this is the business of missing effects, not of this screen.
+TOLERABLE = 0.1
+# What undoing a mistake must leave of the error, and of what it may be told to be one of several.
+MENDED, LEFT, AS_GOOD = 0.4, 0.5, 1.5
+# An error above this, with no candidate of this cosine to the signal: the model explains nothing of it.
+NOTHING, UNLIKE = 0.95, 0.3
+# A record stands out where its error is so many times that of the others; an error from which on records disagree.
+APART, AGREED = 3.0, 0.05
+# Candidates spread over the box, samples of all records together that are looked at, least of one record.
+N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
+# The mends that leave least are fitted once more, as the declared model is: so many, from how many candidates, of which
+# the best so many.
+N_LIKELY, N_HARD, N_BEST = 5, 512, 8
+MOST_VALUES, MOST_APART = 2**24, 6
+# A clock that is off by fewer samples, or by more than this share of the record, is not looked for.
+LEAST_SHIFT, MOST_SHIFT = 3, 0.3
+# Integration steps between samples, relative fall of squares at which a rough fit has arrived.
+SUBSTEPS, TOLERANCE = 4, 1e-3
+# Successive samples, of so many values, that two recordings do not have in common by chance.
+ALIKE, DIFFERENT = 40, 10
+# Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is no rest.
+RESTLESS, FEWEST_INDEPENDENT, LARGE_MEAN = 0.02, 12.0, 0.2
+
+
+def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, ...]:
+    """Look for mistakes in records: what the files show alone, then against the declared model.
+
+    The model is fitted to train records only; those held out are compared with what that fit predicts.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The records.
+    model : Model
+        The declared model.
+    space : Space
+        The box of its parameters.
+
+    Returns
+    -------
+    tuple of Suspicion
+        What should be looked at, the plainest first; empty where all is as declared.
+    """
+    seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
+    seen += list(given_twice(campaign.records))
+    noise = {s.record for s in seen if s.kind == "noise"}
+    train = [shortened(r, len(campaign.train)) for r in campaign.train if r.file not in noise]
+    if not train:
+        return tuple(seen)
+    trial = Trial(model, space).scaled(train)
+    found, z = mistakes(trial, train)
+    errors = trial.errors(train, z)
+    others = [shortened(r, len(campaign.holdout)) for r in campaign.holdout if r.file not in noise]
+    if not found:
+        found += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))]
+    return (*seen, *found)
+
+
+class Trial:
+    """Fit one model to records, and tell its errors on them, each as rms of the residual over rms of the signal.
+
+    Every step between samples is cut into four: rough enough to be quick, and a clock in another unit costs no more.
+    """
+
+    def __init__(self, model: Model, space: Space) -> None:
+        self.model, self.space = model, space
+
+    def problem(self, records: Sequence[Record]) -> WeightedRecords:
+        rough = Calibration(Schedule(SUBSTEPS), np.nan, True)
+        ready = tuple(one for r in records for one in Replay(r, self.model, r.pieces, (rough,) * len(r.pieces)).each)
+        # of an angle or a position the zero says nothing
+        moved = [r.measured - (np.mean(r.measured) if r.record.unit in ("rad", "m") else 0.0) for r in ready]
+        return WeightedRecords(ready, self.space, tuple(1.0 / max(float(np.linalg.norm(x)), 1e-300) for x in moved))
+
+    def scaled(self, records: Sequence[Record]) -> "Trial":
+        """Return the trial with the scales that other records show, on which the declared bounds depend."""
+        if not self.model.plant.scales_from_records:
+            return self
+        model = replace(self.model, plant=scaled_plant(self.model.plant, records, ""))
+        old, new = space_of(self.model), space_of(model)
+        kept = {n: np.where(getattr(self.space, n) == getattr(old, n), getattr(new, n), getattr(self.space, n))
+                for n in ("low", "high")}  # fmt: skip
+        return Trial(model, replace(self.space, **kept))
+
+    def errors(self, records: Sequence[Record], Z: Array) -> Array:
+        """Return the error of each record at candidates in shares, (n_candidates, n_records), inf where it diverges.
+
+        Of a file with several outputs it is the root of the mean square of theirs.
+        """
+        problem, Z = self.problem(records), np.atleast_2d(Z)
+        signals = signals_of(problem.replays, self.space.complete(problem.values(Z)))
+        squares = [np.sum((w * (signal - r.measured)) ** 2, axis=1)
+                   for w, r, signal in zip(problem.weights, problem.replays, signals, strict=True)]  # fmt: skip
+        counts = np.array([len(r.each) for r in records])
+        means = np.add.reduceat(np.array(squares).T, np.cumsum(counts) - counts, axis=1) / counts
+        return np.asarray(np.nan_to_num(np.sqrt(means), nan=np.inf))
+
+    def spread(self, records: Sequence[Record], most: int = N_SPREAD) -> Array:
+        n_samples, n = sum(r.n_samples for r in records), int(self.space.free.sum())
+        spread = probes(np.zeros(n), np.ones(n), max(min(most, MOST_VALUES // n_samples), 8))
+        # boxes are wide, and most machines lie in their lower part
+        spread[::2] **= 3
+        return spread
+
+    def likeness(self, record: Record) -> float:
+        """Return the largest cosine, either sign, between what was measured and what candidates do."""
+        problem, Z = self.problem([record]), self.spread([record])
+        signals = problem.signals(Z)
+        products, sizes = signals @ problem.measured, np.linalg.norm(signals, axis=1)
+        return float(np.nanmax(np.abs(products) / np.maximum(sizes, 1e-300), initial=0.0))
+
+    def mends(self, record: Record, Z: Array) -> Iterator[Mend]:
+        """Yield what may be undone in a record; Z: candidates in shares at which its clock is looked at."""
+        return mends(self.model.plant, record, self.shift(record, Z))
+
+    def shift(self, record: Record, Z: Array) -> int:
+        """Return by how many samples the first piece comes too late, 0 where no shift makes it more like a simulation.
+
+        The largest cosine between measured and simulated signal over candidates and shifts, by cross-correlation.
+        """
+        piece = record.pieces[0]
+        x, n = piece.measured[piece.window], piece.n_samples
+        problem = self.problem([replace(record, pieces=(piece,), others=())])
+        signals = np.nan_to_num(problem.replays[0].signal(self.space.complete(problem.values(Z))))
+        product = np.fft.irfft(np.fft.rfft(x, 2 * n) * np.conj(np.fft.rfft(signals, 2 * n)), axis=-1)
+        shifts = np.arange(-int(MOST_SHIFT * n), int(MOST_SHIFT * n) + 1)
+        # energy of both in the part that they then have in common
+        mine, other = np.append(0.0, np.cumsum(x**2)), np.cumsum(np.pad(signals**2, ((0, 0), (1, 0))), axis=1)
+        low, high = np.maximum(shifts, 0), np.minimum(n + shifts, n)
+        energy = (mine[high] - mine[low]) * (other[:, high - shifts] - other[:, low - shifts])
+        cosine = np.where(energy > 0.0, product[:, shifts] / np.sqrt(np.maximum(energy, 1e-300)), 0.0)
+        best = int(shifts[np.argmax(cosine.max(axis=0))])
+        return best if abs(best) >= LEAST_SHIFT else 0
+
+    def fit(
+        self, records: Sequence[Record], starts: Array | None = None, below: float = np.inf, n_best: int = 2
+    ) -> tuple[Array, float]:
+        """Return the least-squares estimate, (n_free,), and its rms error, from the best of some candidates.
+
+        starts: None: spread ones. below: only where one of the starts has a smaller error, else the best start is kept.
+        """
+        starts = self.spread(records) if starts is None else starts
+        errors = np.array([rms(e) for e in self.errors(records, starts)])
+        best = np.argsort(errors, kind="stable")[:n_best]
+        if not (self.space.free.any() and errors[best[0]] < below):
+            return np.asarray(starts[best[0]]), float(errors[best[0]])
+        z = descend(self.problem(records), list(starts[best[np.isfinite(errors[best])]]), TOLERANCE)
+        return z, rms(self.errors(records, z))
+
+    def fit_hard(self, records: Sequence[Record], others: Sequence[Array]) -> tuple[Array, float]:
+        """Return what `fit` does from more candidates, those that fit otherwise changed records among them."""
+        spread = self.spread(records, N_HARD)
+        # with other bounds there may be other free parameters
+        others = [z for z in others if len(z) == spread.shape[1]]
+        return self.fit(records, np.vstack([spread, *others]), n_best=N_BEST)
+
+
+def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Array]:
+    """Return what is wrong with the train records, and the candidate that fits those that are right."""
+    z, before = trial.fit(train)
+    if trial.errors(train, z).max() <= TOLERABLE:
+        return [], z
+    tried = []
+    for mend in trial.mends(train[0], np.concatenate([[z], trial.spread(train[:1])])):
+        undone = tuple(map(mend.undo, train))
+        own = trial.scaled(undone)
+        tried.append((*own.fit(undone, below=before), mend, own, undone))
+    declared = space_of(trial.model)
+    if not all(np.array_equal(getattr(declared, n), getattr(trial.space, n), True) for n in ("low", "high", "fixed")):
+        own = Trial(trial.model, declared)
+        tried.append((*own.fit(train), BOUNDS, own, tuple(train)))
+    # a poor fit of the declared model is no mistake of the records, and of two mends the better one is named
+    likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
+    starts = [z, *(t[0] for t in likely)]
+    z, before = trial.fit_hard(train, starts)
+    found = chosen("", before, [(own.fit_hard(undone, starts)[1], mend) for _, _, mend, own, undone in likely])
+    if trial.errors(train, z).max() <= TOLERABLE or any(s.after <= TOLERABLE for s in found):
+        return found, z
+    everywhere = found
+    z = agreed(trial, train, z)
+    errors = trial.errors(train, z)[0]
+    typical = typical_of(errors)
+    outside = [train[i] for i in np.argsort(-errors)[:MOST_APART] if errors[i] > max(TOLERABLE, APART * typical)]
+    found = exchanged(trial, train, outside, before) or [s for r in outside for s in apart(trial, r, z, typical)]
+    if not found and not everywhere and trial.model.plant.from_rest:
+        # a driven machine drifts away from its model for want of friction
+        found = [unlike(r.file, e) for r, e in zip(train, errors, strict=True)
+                 if NOTHING < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
+    return found or everywhere, z
+
+
+def agreed(trial: Trial, train: Sequence[Record], z: Array) -> Array:
+    """Return the candidate on which most records agree, whatever the others say: sum log(1 + (e/e0)^2) is least."""
+    own = [trial.fit([r])[0] for r in train[: 2 * MOST_APART]]
+    candidates = np.concatenate([[z], own, trial.spread(train)])
+    errors = trial.errors(train, candidates)
+    with np.errstate(over="ignore"):
+        best = int(np.argmin(np.sum(np.log1p((errors / AGREED) ** 2), axis=1)))
+    inside = [r for r, e in zip(train, errors[best], strict=True) if e <= APART * typical_of(errors[best])]
+    return trial.fit(inside, candidates[best : best + 1])[0] if inside else candidates[best]
+
+
+def typical_of(errors: Array) -> float:
+    """Return the median error of the better half of the records: half of them may be wrong."""
+    return float(np.median(np.sort(errors)[: (len(errors) + 1) // 2]))
+
+
+def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[Suspicion]:
+    """Return the mistake of one record, judged at a candidate that is not fitted to it, none where it is as others."""
+    before = float(trial.errors([record], z)[0, 0])
+    if before <= max(TOLERABLE, APART * typical):
+        return []
+    undone = [(m, m.undo(record)) for m in trial.mends(record, z[np.newaxis])]
+    return chosen(record.file, before, [(float(trial.errors([r], z)[0, 0]), m) for m, r in undone])
+
+
+def chosen(record: str, before: float, tried: Iterable[tuple[float, Mend]]) -> list[Suspicion]:
+    """Return the mend that leaves least, with those that do as well; none where none takes most of the error away."""
+    most = min(MENDED * before, LEFT)
+    good = sorted((pair for pair in tried if pair[0] <= most), key=lambda pair: pair[0])
+    if not good:
+        return []
+    first = good[0][1].suspicion(record, before, good[0][0])
+    equal = [m.words for e, m in good[1:3] if e <= AS_GOOD * good[0][0]]
+    also = f" As well explained by: {'; or '.join(equal)}." if equal else ""
+    return [replace(first, sentence=f"{first.sentence}{also}")]
+
+
+def unlike(file: str, error: float) -> Suspicion:
+    said = (f"{file}: the declared model explains nothing of it, whatever its parameters (error {error:.3g} of the "
+            "signal), and no other sign, unit, clock or manoeuvre that was tried does.")  # fmt: skip
+    return Suspicion("unlike", file, said, before=error)
+
+
+def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[Suspicion]:
+    """Return the two records of which each fits the manoeuvre of the other, none where no exchange mends much."""
+    tried = []
+    for a, b in combinations(outside, 2):
+        as_other = {a.file: told_as(b), b.file: told_as(a)}
+        undone = [as_other[r.file].undo(r) if r.file in as_other else r for r in train]
+        tried.append((trial.fit(undone)[1], as_other[a.file], a.file))
+    best = min(tried, key=lambda t: t[0], default=None)
+    return [] if best is None else chosen(best[2], before, [best[:2]])
+
+
+def told_as(other: Record) -> Mend:
+    """Return what gives a record the manoeuvre of another, but for the state from which it starts."""
+    constants = {n: v for n, v in other.pieces[0].manoeuvre.constants.items() if not n.startswith("start_")}
+    words = f"it and {other.file} look exchanged: each with the manoeuvre of the other"
+    return Mend("exchanged", np.nan, words, of_pieces(with_constants, constants=constants), other.file)
+
+
+def shortened(record: Record, n_records: int) -> Record:
+    """Return a record cut to what is looked at; whole where most of its motion comes later."""
+    most = max(MOST_SAMPLES // n_records, FEWEST_SAMPLES)
+    pieces, left = [], most
+    for piece in record.pieces:
+        if left < min(FEWEST_SAMPLES, piece.n_samples):
+            break
+        stop = min(piece.window.stop, piece.window.start + left)
+        pieces.append(replace(piece, window=slice(piece.window.start, stop)).until_window_end())
+        left -= pieces[-1].n_samples
+    kept, whole = (np.concatenate([p.measured[p.window] for p in ps]) for ps in (pieces, record.pieces))
+    if rms(kept) <= 0.5 * rms(whole):
+        return record
+    windows = [p.window for p in pieces]
+    return replace(record, pieces=tuple(pieces), others=tuple(cut(one, windows) for one in record.others))
+
+
+def cut(record: Record, windows: Sequence[slice]) -> Record:
+    pairs = zip(record.pieces, windows, strict=False)
+    return replace(record, pieces=tuple(replace(p, window=w).until_window_end() for p, w in pairs))
+
+
+def noise_or_rest(record: Record) -> Iterator[Suspicion]:
+    """Yield what the speed of one file shows alone: no motion but noise, or motion where there should be rest."""
+    x = np.concatenate([p.measured[p.window] for p in record.pieces])
+    n, deviations = len(x), x - np.mean(x)
+    lags = range(1, min(20, n // 2))
+    correlation = [float(deviations[k:] @ deviations[:-k]) / float(deviations @ deviations) for k in lags]
+    if np.max(np.abs(correlation)) < 4.0 / np.sqrt(n):
+        yield Suspicion("noise", record.file, f"{record.file}: the measured {record.output or 'speed'} is noise, no "
+                        "sample of it is related to the next: a recorded motion is expected.")  # fmt: skip
+        return
+    rest = record.rest
+    if rest.size < 2 or record.is_noise_free:
+        return
+    scatter, mean = float(np.std(rest)) / rms(x), abs(float(np.mean(rest))) / rms(x)
+    independent = rest.size / (1.0 + 2.0 * correlation_sum(rest - np.mean(rest)))
+    if mean > LARGE_MEAN or (scatter > RESTLESS and independent < FEWEST_INDEPENDENT):
+        yield Suspicion("rest", record.file, f"{record.file}: the machine is not at rest before t = 0, its speed has a "
+                        f"mean of {mean:.2g} and scatters by {scatter:.2g} of the motion's rms there: samples at rest, "
+                        "or a clock that begins with the motion, are expected.")  # fmt: skip
+
+
+def of_position(record: Record) -> Iterator[Suspicion]:
+    """Yield a position column that is not the integral of the speed: another sign, unit or clock."""
+    for header, (unit, factor) in POSITIONS.items():
+        if unit != record.unit or header not in record.columns:
+            continue
+        position = factor * record.columns[header]
+        integral = np.cumsum(record.measured) * record.manoeuvre.interval
+        position, integral = position - np.mean(position), integral - np.mean(integral)
+        size = float(position @ integral) / max(float(integral @ integral), 1e-300)
+        alike = abs(size) * float(np.linalg.norm(integral)) / max(float(np.linalg.norm(position)), 1e-300)
+        if alike > 0.9 and not 0.6 < size < 1.6:
+            said = f"{record.file}: {header} moves {size:.3g} times as far as the speed says"
+            wrong = f"{said}: the sign or unit of one of them, or time_s, looks wrong."
+            yield Suspicion("position", record.file, wrong, factor=size)
+
+
+def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
+    """Yield the pairs of records, no repeats of each other, that hold the same samples: one recording given twice.
+
+    Compared are fingerprints of `ALIKE` successive samples in the windows, where these take enough different values.
+    Simulations without noise may well agree.
+    """
+    records = [r for r in records if not r.is_noise_free]
+    if len(records) < 2:
+        return
+    prints = [fingerprints(np.concatenate([p.measured[p.window] for p in r.pieces])) for r in records]
+    owner = np.concatenate([np.full(len(p), i) for i, p in enumerate(prints)])
+    _, place, counts = np.unique(np.concatenate(prints), return_inverse=True, return_counts=True)
+    shared = np.flatnonzero(counts[place] > 1)
+    pairs: dict[tuple[int, int], int] = {}
+    for group in np.split(owner[shared][np.argsort(place[shared], kind="stable")], np.cumsum(counts[counts > 1])[:-1]):
+        for pair in combinations(np.unique(group).tolist(), 2):
+            pairs[pair] = pairs.get(pair, 0) + 1
+    for (i, j), n in sorted(pairs.items()):
+        a, b = records[i], records[j]
+        if (a.repeat_of or a.file) == (b.repeat_of or b.file):
+            continue
+        yield Suspicion("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE - 1} samples: one recording "
+                        "is given twice, records that do not overlap are expected.", b.file)  # fmt: skip
+
+
+def fingerprints(values: Array) -> NDArray[np.uint64]:
+    """Return a number for each run of `ALIKE` samples that takes `DIFFERENT` values or more, each run once."""
+    n = len(values) - ALIKE + 1
+    if n < 1:
+        return np.empty(0, dtype=np.uint64)
+    bits, found = np.ascontiguousarray(values + 0.0).view(np.uint64), np.zeros(n, dtype=np.uint64)
+    changes = np.append(0, np.cumsum(values[1:] != values[:-1]))
+    for i in range(ALIKE):
+        found = found * np.uint64(0x100000001B3) + bits[i : i + n]
+        found ^= found >> np.uint64(29)
+    return np.unique(found[changes[ALIKE - 1 :] - changes[:n] >= DIFFERENT])

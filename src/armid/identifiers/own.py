@@ -1,0 +1,151 @@
+"""How a user's own becomes an identifier: a class or a function of pymoo, or any function that searches by itself."""
+
+import inspect
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pymoo.core.algorithm import Algorithm
+
+from armid.errors import ArmidError
+from armid.identifiers.identifier import Identifier, accepts, refuse_unknown
+from armid.identifiers.pymoo_adapter import SearchAlgorithm
+from armid.identifiers.search import Array, Asker, Search, SearchTask, in_thread
+from armid.problem.meter import PENALTY
+
+SEARCH_ARGUMENTS = {
+    "value": "function of a candidate, (n_parameters,), that returns its fitness as a number; or of several at once, "
+             "(n_candidates, n_parameters), that returns (n_candidates,)",
+    "low": "lower bounds, SI, (n_parameters,)", "high": "upper bounds, SI, (n_parameters,)",
+    "budget": "simulations; armid counts them and ends the search there",
+    "random": "numpy.random.Generator, from which all that is random is drawn",
+    "start": "where to start, SI, (n_parameters,): the best so far in a chain, else a random point of the box",
+}  # fmt: skip
+
+
+def as_identifier(name: str, obj: Any) -> Identifier:
+    """Return an Identifier as it is, or make one of what a user has.
+
+    Parameters
+    ----------
+    name : str
+        Of the identifier.
+    obj : Identifier, class or function
+        A subclass of pymoo's Algorithm; a function of the budget that returns an algorithm; or a function that searches
+        by itself: `value` in its arguments is what it minimises, and it may name the others of `SEARCH_ARGUMENTS`.
+        Arguments with a default are options.
+
+    Returns
+    -------
+    Identifier
+
+    Raises
+    ------
+    ArmidError
+        For anything else, and for an algorithm that was built already: it keeps the state of its run.
+
+    >>> def halves(value, low, high):
+    ...     value((low + high) / 2)
+    >>> as_identifier("halves", halves).note
+    'a search of the user'
+    """
+    if isinstance(obj, Identifier):
+        return obj
+    expected = (
+        "expected a subclass of pymoo's Algorithm, a function of the budget that returns one, or a function that "
+        "searches by itself, whose first argument is `value`"
+    )
+    if isinstance(obj, Algorithm):
+        raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} built already, {expected}")
+    if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
+        return Identifier(name, partial(without_budget, obj), "a class of the user")
+    if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
+        refuse_unknown(needed(obj), SEARCH_ARGUMENTS, f"what is given to a search such as '{name}'")
+        return Identifier(name, partial(searching, name, obj), "a search of the user",
+                          is_global="start" not in arguments_of(obj))  # fmt: skip
+    if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
+        return Identifier(name, partial(built, name, obj), "a function of the user")
+    raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
+
+
+def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
+    """Return a fresh algorithm of a class, which is not told its budget."""
+    return algorithm()
+
+
+def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:
+    """Return what a user's function makes; refuse with ArmidError anything but an algorithm."""
+    algorithm = factory(budget)
+    if not isinstance(algorithm, Algorithm):
+        raise ArmidError(f"identifier '{name}' returned a {type(algorithm).__name__}, expected an Algorithm of pymoo")
+    return algorithm
+
+
+def arguments_of(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    try:
+        return dict(inspect.signature(function).parameters)
+    except (TypeError, ValueError):
+        return {}
+
+
+def needed(function: Callable[..., Any]) -> list[str]:
+    """Return the arguments that have no default."""
+    return [name for name, p in arguments_of(function).items() if p.default is p.empty]
+
+
+def searching(name: str, function: Callable[..., Any], budget: int, **options: Any) -> SearchAlgorithm:
+    """Return a user's search as an algorithm; refuse with ArmidError an option that it does not take."""
+    refuse_unknown(options, [a for a in arguments_of(function) if a not in SEARCH_ARGUMENTS], f"'{name}'")
+
+    def method(task: SearchTask) -> Search:
+        low, high = task.problem.xl, task.problem.xu
+        cube = task.cube
+        start = cube.candidates(cube.drawn(task.random))[0] if task.start is None else task.start
+
+        def attempt(ask: Asker) -> bool:
+            value = Value(ask, low, high)
+            given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": budget, "random": task.random,
+                     "start": start.copy()}  # fmt: skip
+            try:
+                function(**{key: given[key] for key in arguments_of(function) if key in given}, **options)
+            except Exception:
+                # compiled libraries turn an error of a call into one of their own
+                if value.error is None:
+                    raise
+            if value.error is not None:
+                raise value.error
+            return True
+
+        return attempt(task.ask) if task.ask is not None else (yield from in_thread(attempt))
+
+    return SearchAlgorithm(method, budget)
+
+
+class Value:
+    """Answer what a search asks; after an error, such as the end of the budget, raise it at every call.
+
+    A failed candidate gets a value above all that was seen, since few libraries can live with infinity.
+    """
+
+    def __init__(self, ask: Asker, low: Array, high: Array) -> None:
+        self.ask, self.low, self.high = ask, low, high
+        self.error: BaseException | None = None
+        self.least, self.most = np.inf, -np.inf
+
+    def __call__(self, x: ArrayLike) -> float | Array:
+        """Return the fitness of a candidate, (n_parameters,), or of several, (n_candidates, n_parameters)."""
+        if self.error is not None:
+            raise self.error
+        asked = np.asarray(x, dtype=np.float64)
+        try:
+            told = self.ask(np.clip(np.atleast_2d(asked), self.low, self.high)).F
+        except BaseException as error:
+            self.error = error
+            raise
+        finite = told[told < PENALTY]
+        self.least, self.most = min([self.least, *finite]), max([self.most, *finite])
+        failed = 2.0 * self.most - self.least if self.most > -np.inf else PENALTY
+        told = np.where(told < PENALTY, told, failed)
+        return float(told[0]) if asked.ndim < 2 else told

@@ -1,0 +1,184 @@
+"""Could constants within their tolerances do what an effect is to explain? One product of them alone, or all together.
+
+Before a name is believed, the declared model is fitted with its constants free, each drawn to its declared value by its
+tolerance (a ridge). Constants that do as well as an effect stand beside it; those that do better take its place.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.estimation.constants import NAMED, Product, columns_of, moved_replay
+from armid.estimation.least_squares import LeastSquaresProblem, descend
+from armid.loop.candidates import Library
+from armid.loop.diagnose import is_significant
+from armid.loop.equivalence import MOST as TOO_MANY
+from armid.loop.equivalence import WITHIN, EffectGroup, Likeness
+from armid.loop.fit import Fit, beyond
+from armid.loop.search import Search, unless_diverged
+from armid.loop.whitening import WhiteRecords
+
+Array = NDArray[np.float64]
+# So many single products are refitted, of those that take away this share of what is no noise.
+MOST, HALF = 6, 0.5
+# In tolerances: how far a fit may go, and what is no answer any more.
+FARTHEST, PLAUSIBLE = 4.0, 3.0
+# Relative fall of chi2 in one step at which their fit stops: a constant costs a simulation of its own.
+SETTLED = 1e-6
+# Of all constants together those are told that are off by more than this share of their tolerance.
+TOLD = 0.5
+# A constant has to be known to this part of what it would be off, to tell; of so many that is said.
+SURE, MOST_TOLD = 3.0, 3
+TOGETHER = f"{NAMED}all"
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantModel:
+    """Hold a model fitted with some of its constants free.
+
+    fit: at the constants that were found. off: name of each product -> by how many tolerances. scale: by what factor
+    those constants that the records tell of are off more than their tolerances say, at least 1.
+    """
+
+    fit: Fit
+    off: dict[str, float]
+    scale: float
+
+    @property
+    def name(self) -> str:
+        return next(iter(self.off)) if len(self.off) == 1 else TOGETHER
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """By which share of its value each product is off, those left out that hardly moved."""
+        pairs = zip(self.off, self.fit.constants.values(), strict=True)
+        return {n.removeprefix(NAMED): share for n, share in pairs if n in self.moved}
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """Names of the products, those that hardly moved left out where there are many."""
+        least = min(TOLD, *sorted(map(abs, self.off.values()))[-MOST_TOLD:])
+        return tuple(n for n, u in self.off.items() if abs(u) >= least)
+
+    @property
+    def explains(self) -> bool:
+        """Whether it leaves noise, no constant far outside its tolerance."""
+        return max(map(abs, self.off.values())) < PLAUSIBLE and not is_significant(self.fit)
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares, that of the ridge included."""
+        return self.fit.chi2 + sum(u * u for u in self.off.values())
+
+
+@dataclass(frozen=True, eq=False)
+class FreedConstants(LeastSquaresProblem):
+    """Pose records with some products of constants free as min |r(z, u)|^2 + |u|^2, u in tolerances.
+
+    Candidates are shares of a range: free parameters first, then u between -FARTHEST and FARTHEST.
+    """
+
+    records: WhiteRecords = field(kw_only=True)
+    chosen: Sequence[Product] = field(kw_only=True)
+
+    @cached_property
+    def measured(self) -> Array:
+        return np.concatenate([self.records.measured, np.zeros(len(self.chosen))])
+
+    def off(self, Z: Array) -> Array:
+        """Return by how many tolerances candidates let constants be off, (n_candidates, n_products)."""
+        return FARTHEST * (2.0 * Z[:, -len(self.chosen) :] - 1.0)
+
+    def signals(self, Z: Array) -> Array:
+        """Return weighted signals of candidates, then what the ridge weighs; constants are one to a simulation."""
+        found = np.empty((len(Z), len(self.measured)))
+        found[:, -len(self.chosen) :] = self.off(Z)
+        each, groups = np.unique(self.off(Z), axis=0, return_inverse=True)
+        for i, off in enumerate(each):
+            rows = np.flatnonzero(groups.ravel() == i)
+            signals = self.moved(off).signals(Z[rows, : -len(self.chosen)])
+            found[rows, : -len(self.chosen)] = signals
+        return found
+
+    def moved(self, off: Array) -> WhiteRecords:
+        shares = self.shares_at(off)
+        return replace(self.records, replays=tuple(moved_replay(r, shares) for r in self.records.replays))
+
+    def shares_at(self, off: Array) -> dict[str, float]:
+        """Return by which share of its value the first member of each product is off."""
+        return {p.names[0]: float(u) * p.tolerance for p, u in zip(self.chosen, off, strict=True)}
+
+
+def freed_constants(base: Fit, chosen: Sequence[Product]) -> ConstantModel:
+    """Fit a model with some products of constants free, from where it stands.
+
+    Raises ArmidError where the simulation diverges there.
+    """
+    posed = FreedConstants((), base.records.space, records=base.records, chosen=chosen)
+    z = descend(posed, [np.concatenate([base.z, np.full(len(chosen), 0.5)])], SETTLED)
+    off = posed.off(z[np.newaxis])[0]
+    records, at = posed.moved(off), z[: -len(chosen)]
+    fit = Fit(base.active, records, at, *records.residual_and_slopes(at), constants=posed.shares_at(off))
+    columns = beyond(base.basis, columns_of(chosen, len(base.residual)))
+    told = len(chosen) - np.trace(np.linalg.inv(columns.T @ columns + np.eye(len(chosen))))
+    names = (p.public for p in chosen)
+    return ConstantModel(
+        fit, dict(zip(names, map(float, off), strict=True)), max(1.0, float(np.sqrt(off @ off / told)))
+    )
+
+
+def constant_models(base: Fit, found: Sequence[Product], library: Library) -> list[ConstantModel]:
+    """Return a model fitted with single products free, and with all of them, those that explain the records.
+
+    Of single products those are fitted that to first order take away half of what is more than noise.
+    """
+    if not found:
+        return []
+    columns = beyond(base.basis, columns_of(found, len(base.residual)))
+    drops = (columns.T @ base.residual) ** 2 / (1.0 + np.sum(columns**2, axis=0))
+    needed = HALF * (base.chi2 - len(base.residual))
+    sets = [[found[i]] for i in np.argsort(-drops, kind="stable")[:MOST] if drops[i] > needed]
+    sets += [list(found)] if len(found) > 1 else []
+    library.say("fitting the declared model with its constants free within their tolerances")
+    models = library.each(unless_diverged, [partial(freed_constants, base, chosen) for chosen in sets])
+    return [m for m in models if m is not None and m.explains]
+
+
+def answer_of_constants(models: Sequence[ConstantModel], named: Fit) -> ConstantModel | None:
+    """Return the constants that explain the records as well as a model with effects does, None where none do.
+
+    A single effect that leaves noise and fits clearly better is the answer; sets of effects are not, as enough of them
+    imitate everything. Constants are known within tolerances whether or not an effect is there, so that they cost no
+    parameters.
+    """
+    best = min(models, key=lambda m: (len(m.off) > 1, m.chi2), default=None)
+    if best is None or len(named.active) != 1 or is_significant(named):
+        return best
+    return next((m for m in models if m.chi2 < named.chi2 + WITHIN), None)
+
+
+def constants_beside(models: Sequence[ConstantModel]) -> tuple[str, ...]:
+    """Return the names of the constants that explain what an effect does, single products before all."""
+    single = [m for m in models if len(m.off) == 1]
+    return tuple(dict.fromkeys(n for m in single or models for n in m.moved))
+
+
+def measurements(models: Sequence[ConstantModel]) -> list[str]:
+    """Return which constants to measure, and how well, to tell whether they are what the records show."""
+    said = []
+    for model in models[:MOST_TOLD]:
+        largest = sorted(model.shares.items(), key=lambda pair: -abs(pair[1]))[:MOST_TOLD]
+        said += [f"Measure {name} to {abs(share) / SURE:.1%}: off by {share:+.1%}, it would explain these records"
+                 f"{'' if len(model.off) == 1 else ' together with others'}." for name, share in largest]  # fmt: skip
+    return list(dict.fromkeys(said))
+
+
+def group_beside(constants: ConstantModel, search: Search) -> EffectGroup:
+    """Return the constants with the single effects that do as well, none where they are too many to say anything."""
+    fits = [f for f in search.of_size(1) if f.chi2 < constants.chi2 + WITHIN]
+    near = dict.fromkeys(f.active[0].public for f in fits)
+    alike = tuple(Likeness(name, 0.0, 1.0) for name in near) if len(near) < TOO_MANY else ()
+    return EffectGroup(constants.name, alike, ())

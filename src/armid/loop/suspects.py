@@ -1,0 +1,505 @@
+"""Does one record disagree with the others? Before any effect: late, clock, offset, drift, gain, start, another load.
+
+Each is undone in one record, by the size that fits best together with the free parameters; what then leaves noise is a
+suspect. One effect explains all records with one strength, a fault one record: where both do, the record is suspected.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.errors import ArmidError
+from armid.estimation.information import NORMAL_95, start_changes
+from armid.loop.candidates import Library
+from armid.loop.diagnose import diagnose, holdout_residuals, is_significant
+from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
+from armid.loop.search import unless_diverged
+from armid.loop.whitening import WhiteRecords
+from armid.model import Model, Plant
+from armid.problem.problem import Replay, signals_of
+from armid.record import Piece, Record
+from armid.record.broken import broken_samples
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+FREED, LEFT_OUT, REPORTED = "freed", "left_out", "reported"
+# Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),
+# as a share, in radians or metres.
+PLAUSIBLE = {"late": 0.05, "clock": 0.02, "offset": 0.05, "drift": 0.1, "gain": 0.1, "start": 0.1}
+# Faults of a sensor, and of the times; all but those of a sensor are of the whole file.
+OF_SENSOR, OF_TIMES = ("offset", "drift", "gain"), ("late", "clock")
+# Those are fitted that to first order take away this share of what is more than noise, at most so many, in so many
+# steps; each begins from differences of this share of the largest size.
+HALF, MOST, N_STEPS, STEP = 0.4, 6, 8, 1e-3
+# Of a record without which the others leave more than this share of what is more than noise, none is tried.
+DISAGREE = 0.5
+# Another load is tried for records that hold more than this share of what is more than noise.
+SHARE = 0.2
+# A fault that moves the record by less than this many times its noise accuses nobody.
+MOVES = 0.7
+# Of held-out records a fault is told that leaves noise, or so little of what was more than noise.
+LEFT = 0.01
+# Samples on either side from which one between them is made.
+REACH = 32
+# A push lasts for less than this share of a record, and holds this share of what is more than noise in it.
+PUSHED, NEARLY = 0.3, 0.9
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """Say how one record differs.
+
+    kind: "late", "clock" (fast by a share), "offset", "drift", "gain", "start", "label" (another load or key than
+    told), "push", or of samples "gap", "clipped", "stuck", "spikes". value, low, high: size with its 95 % interval
+    [unit]; from_s, to_s: where it is [s]; None where there is no such thing. action: "freed" (undone), "left_out" or
+    "reported". output: whose sensor it is, "" where the plant has but one, and of the whole file.
+    """
+
+    record: str
+    role: str
+    kind: str
+    action: str
+    value: float | None = None
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    from_s: float | None = None
+    to_s: float | None = None
+    output: str = ""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Name what may be wrong in a file: a kind, and of a start or a label the constant of the record that is."""
+
+    kind: str
+    constant: str = ""
+
+    def largest(self, record: Record) -> float:
+        of_signal = float(np.abs(record.measured).max()) if self.kind in ("offset", "drift") else 1.0
+        return PLAUSIBLE[self.kind] * of_signal
+
+    def unit(self, record: Record, plant: Plant) -> str:
+        units = {"late": "s", "clock": "1", "offset": record.unit, "drift": f"{record.unit}/s", "gain": "1"}
+        return units.get(self.kind) or next((c.unit for c in plant.constants if c.name == self.constant), "1")
+
+    def touches(self, record: Record, other: Record) -> bool:
+        """Tell whether what is wrong in one record is so in another: its own sensor, or all of its file."""
+        return other.file == record.file and (self.kind not in OF_SENSOR or other.output == record.output)
+
+    def undone(self, record: Record, value: float, plant: Plant) -> Record:
+        """Return the record as it would be without the fault."""
+        measured = self.measured(record.measured, record, value)
+        pieces, whole = (tuple(self.undone_piece(p, measured, value, plant) for p in some)
+                         for some in (record.pieces, record.whole_pieces))  # fmt: skip
+        return replace(record, measured=measured, pieces=pieces, whole_pieces=whole)
+
+    def trimmed(self, record: Record, value: float, plant: Plant, faulty: Record | None = None) -> Record:
+        """Return a file without the fault, and without the samples that were not measured at their new time.
+
+        faulty: the record of that of its outputs in which the fault is, None: the first.
+        """
+        each = [self.trimmed_output(r, value, plant) if self.touches(faulty or record, r) else r for r in record.each]
+        return replace(each[0], others=tuple(each[1:]))
+
+    def trimmed_output(self, record: Record, value: float, plant: Plant) -> Record:
+        there, (first, last) = self.undone(record, value, plant), self.lost(record, value)
+        low, high = first, record.measured.size - last
+        pieces = [replace(p, window=slice(max(p.window.start, low - p.start_index),
+                                          min(p.window.stop, high - p.start_index))) for p in there.pieces]  # fmt: skip
+        return replace(there, pieces=tuple(p for p in pieces if p.n_samples > 0))
+
+    def lost(self, record: Record, value: float) -> tuple[int, int]:
+        """Return how many samples at either end of a record have no measured value once its times are mended."""
+        if self.kind not in OF_TIMES:
+            return (0, 0)
+        places = self.places(record, value)
+        return (int(np.ceil(max(-places[0], 0.0))) + 2 * (places[0] < 0.0),
+                int(np.ceil(max(places[-1] - len(places) + 1, 0.0))) + 2 * (places[-1] > len(places) - 1))  # fmt: skip
+
+    def places(self, record: Record, value: float) -> Array:
+        """Return where in its samples a record holds those of its true times, (n_samples,)."""
+        own = np.arange(record.measured.size, dtype=np.float64)
+        return own + value / record.manoeuvre.interval if self.kind == "late" else own * (1.0 + value)
+
+    def undone_piece(self, piece: Piece, measured: Array, value: float, plant: Plant) -> Piece:
+        """Return a piece without the fault; measured: the whole record without it."""
+        if not self.constant:
+            return replace(piece, measured=measured[piece.start_index :][: piece.measured.size])
+        given = {c.name: c.value for c in plant.constants} | dict(piece.manoeuvre.constants)
+        changed = value if self.kind == "label" else given[self.constant] + value
+        constants = {**piece.manoeuvre.constants, self.constant: changed}
+        return replace(piece, manoeuvre=replace(piece.manoeuvre, constants=constants))
+
+    def measured(self, signal: Array, record: Record, value: float) -> Array:
+        if self.kind in OF_TIMES:
+            return resampled(signal, self.places(record, value))
+        if self.kind == "gain":
+            return signal / (1.0 + value)
+        if self.constant:
+            return signal
+        return signal - value * (np.maximum(record.times, 0.0) if self.kind == "drift" else 1.0)
+
+
+def resampled(signal: Array, places: Array) -> Array:
+    """Return a signal between its samples, (n_places,), by windowed cardinal sines: white noise in it stays white.
+
+    A spline would smooth it, and what is left would no longer look like the noise of the sensor. places: in samples.
+    """
+    padded = np.pad(signal, REACH, mode="reflect", reflect_type="odd")
+    inside = np.clip(places, 0.0, len(signal) - 1.0)
+    first = np.minimum(np.floor(inside), len(signal) - 2.0).astype(np.int64) - REACH + 1
+    near = first[:, np.newaxis] + np.arange(2 * REACH)
+    away = inside[:, np.newaxis] - near
+    weights = np.sinc(away) * np.cos(0.5 * np.pi * away / REACH) ** 2
+    return np.asarray(np.sum(padded[near + REACH] * weights, axis=1) / np.sum(weights, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Mended:
+    """Hold a model fitted with one fault of one record undone.
+
+    index: of the record. chi2: with the square of the size over the largest plausible one.
+    """
+
+    fit: Fit
+    index: int
+    fault: Fault
+    value: float
+    deviation: float
+    chi2: float
+
+    def suspect(self, record: Record, plant: Plant, action: str) -> Suspect:
+        fault = self.fault
+        if fault.kind == "label":
+            return Suspect(record.file, record.role, "label", action, self.value, fault.unit(record, plant))
+        half = NORMAL_95 * self.deviation
+        output = record.output if fault.kind in OF_SENSOR and len(plant.outputs) > 1 else ""
+        return Suspect(record.file, record.role, fault.kind, action, self.value, fault.unit(record, plant),
+                       self.value - half, self.value + half, output=output)  # fmt: skip
+
+
+def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
+    """Yield what may be wrong in a record; what is of its whole file is told of the first of its outputs."""
+    model, record = base.model, base.data.records[index]
+    yield from (Fault(kind) for kind in OF_SENSOR)
+    if index != of_file(base, index)[0]:
+        return
+    yield from (Fault(kind) for kind in OF_TIMES)
+    keys = [key for key in model.plant.keys if key.constant in record.constants]
+    starts = {name for node in model.graph.of_kind("initial") for name in leaves_of(model, node.key)}
+    yield from (Fault("start", key.constant) for key in keys if key.constant in starts and not key.boolean)
+    yield from (Fault("label", key.constant) for key in keys if key.boolean)
+
+
+def leaves_of(model: Model, key: str) -> set[str]:
+    needs = model.graph.nodes[key].needs
+    return {key}.union(*(leaves_of(model, k) for k in needs)) if needs else {key}
+
+
+def with_record(base: WhiteRecords, index: int, fault: Fault, value: float) -> WhiteRecords:
+    """Return a problem in which one record, or its whole file, is replaced by itself without a fault."""
+    faulty, edges = base.data.records[index], base.data.edges
+    sound = np.ones(edges[-1]) if base.data.sound is None else base.data.sound.copy()
+    records, replays = list(base.data.records), list(base.replays)
+    inside = of_file(base, index)
+    for i in inside:
+        old = records[i]
+        if not fault.touches(faulty, old):
+            continue
+        first, last = fault.lost(old, value)
+        sound[edges[i] : edges[i] + first] = sound[edges[i + 1] - last : edges[i + 1]] = 0.0
+        records[i] = fault.undone(old, value, base.model.plant)
+        pieces = tuple(fault.undone_piece(p, records[i].measured, value, base.model.plant) for p in replays[i].pieces)
+        replays[i] = replace(replays[i], record=records[i], pieces=pieces)
+    data = replace(base.data, records=tuple(records), sound=sound)
+    return replace(base, replays=with_shared_starts(replays, inside), data=data)
+
+
+def with_measured(base: WhiteRecords, index: int, changes: Sequence[Array]) -> WhiteRecords:
+    """Return a problem in which the outputs of the file of one record were measured so much larger."""
+    replays, inside = list(base.replays), of_file(base, index)
+    for i, change in zip(inside, changes, strict=True):
+        pieces, first = [], 0
+        for piece in replays[i].pieces:
+            measured = piece.measured.copy()
+            measured[piece.window] += change[first : first + piece.n_samples]
+            pieces.append(replace(piece, measured=measured))
+            first += piece.n_samples
+        replays[i] = replace(replays[i], pieces=tuple(pieces))
+    return replace(base, replays=with_shared_starts(replays, inside))
+
+
+def with_shared_starts(replays: Sequence[Replay], inside: Sequence[int]) -> tuple[Replay, ...]:
+    """Return replays of which some are outputs of one file: these share manoeuvres, and starts fitted to all of them.
+
+    A simulation is shared by its manoeuvres, and a start is corrected by what all outputs show.
+    """
+    found = list(replays)
+    for i in inside:
+        pieces = []
+        for several in zip(*(replays[k].pieces for k in inside), strict=True):
+            piece = several[inside.index(i)]
+            shown = np.concatenate([p.measured[p.window] for p in several])
+            correction = None if piece.correction is None else replace(piece.correction, measured=shown)
+            pieces.append(replace(piece, manoeuvre=several[0].manoeuvre, correction=correction))
+        found[i] = replace(found[i], pieces=tuple(pieces))
+    return tuple(found)
+
+
+def of_file(base: WhiteRecords, index: int) -> list[int]:
+    """Return the records that are outputs of the same file."""
+    return [i for i, r in enumerate(base.data.records) if r.file == base.data.records[index].file]
+
+
+def residual_of(posed: WhiteRecords, index: int, z: Array) -> Array:
+    """Return the whitened residual of the file of one record, the others' at 0, (n_samples,)."""
+    measured = [posed.replays[i].measured for i in of_file(posed, index)]
+    pairs = zip(measured, simulated_file(posed, index, z), strict=True)
+    return alone(posed, index, [x - y for x, y in pairs])
+
+
+def simulated_file(posed: WhiteRecords, index: int, z: Array) -> list[Array]:
+    """Return the simulated signals of the outputs of the file of one record, each (n_samples of it,)."""
+    replays = [posed.replays[i] for i in of_file(posed, index)]
+    return [signal[0] for signal in signals_of(replays, posed.space.complete(posed.values(z)[np.newaxis]))]
+
+
+def alone(posed: WhiteRecords, index: int, signals: Sequence[Array]) -> Array:
+    """Return signals of the outputs of the file of one record, those of others at 0, whitened, (n_samples,)."""
+    known = dict(zip(of_file(posed, index), signals, strict=True))
+    return posed.data.white([known[i] if i in known else np.zeros(r.record.n_samples)
+                             for i, r in enumerate(posed.replays)])  # fmt: skip
+
+
+def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Array]:
+    """Return by how much a unit of a fault of times changes the signals of a file.
+
+    From the simulated slope: that of the measured signal is mostly noise.
+    """
+    found = []
+    for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
+        replay, step = base.replays[i], base.data.records[i].manoeuvre.interval
+        samples = np.concatenate([p.start_index + np.arange(p.window.start, p.window.stop) for p in replay.pieces])
+        found.append(-np.gradient(simulated, step) * (1.0 if fault.kind == "late" else step * samples))
+    return found
+
+
+def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: float) -> Array:
+    """Return what one unit of a fault does to the whitened signal, (n_samples,), about a size of it."""
+    if fault.kind in OF_TIMES:
+        moved = with_measured(base, index, delayed(base, index, z, fault))
+        return residual_of(moved, index, z) - residual_of(base, index, z)
+    step = STEP * fault.largest(base.data.records[index])
+    sides = [residual_of(with_record(base, index, fault, value + s), index, z) for s in (step, -step)]
+    return np.asarray(sides[1] - sides[0]) / (2.0 * step)
+
+
+def mended_records(declared: Fit, library: Library) -> list[Mended]:
+    """Return the declared model with one fault of one record undone, those that leave noise, the best fit first."""
+    base, n = declared.records, len(declared.residual)
+    if len(base.replays) < 2:
+        return []
+    tried: list[tuple[float, int, Fault]] = []
+    excess = [max(float(part @ part) - len(part), 0.0) for part in base.data.by_record(declared.residual)]
+    for index, record in enumerate(base.data.records):
+        own = sum(excess[i] for i in of_file(base, index))
+        for fault in faults_of(base, index) if others_agree(declared, index) else ():
+            if fault.kind == "label":
+                tried += [(np.inf, index, fault)] if own > SHARE * sum(excess) else []
+                continue
+            column = beyond(declared.basis, column_of(base, index, declared.z, fault, 0.0))
+            square = float(column @ column) + fault.largest(record) ** -2.0
+            tried.append((float(column @ declared.residual) ** 2 / square, index, fault))
+    needed = HALF * (declared.chi2 - n)
+    sized = sorted((t for t in tried if needed < t[0] < np.inf), key=lambda t: -t[0])[:MOST]
+    library.say("asking whether one record disagrees with the others")
+    found = library.each(lambda t: unless_diverged(lambda: mended(declared, *t[1:])),
+                         [*sized, *(t for t in tried if t[0] == np.inf)])  # fmt: skip
+    good = [m for m in found if m is not None and not is_significant(m.fit)]
+    return sorted(good, key=lambda m: m.chi2)
+
+
+def others_agree(declared: Fit, index: int) -> bool:
+    """Tell whether a fit to all records but one leaves little, to first order: else no fault of that one mends them."""
+    own, edges = of_file(declared.records, index), declared.records.data.edges
+    others = np.repeat([i not in own for i in range(len(edges) - 1)], np.diff(edges))
+    left = beyond(decomposed(declared.jacobian[others])[0], declared.residual[others])
+    return float(left @ left) - len(left) < DISAGREE * (declared.chi2 - len(declared.residual))
+
+
+def mended(declared: Fit, index: int, fault: Fault) -> Mended:
+    """Fit the declared model and the size of one fault of one record together, by Gauss-Newton steps.
+
+    Raises ArmidError where the simulation diverges, and for a size that is lost in the noise.
+    """
+    base = declared.records
+    record = base.data.records[index]
+    if fault.kind == "label":
+        value = 1.0 - record.constants[fault.constant]
+        posed = with_record(base, index, fault, value)
+        fit = fit_from(posed, declared.active, [declared.z, np.full(declared.n_free, 0.5)])
+        return Mended(fit, index, fault, value, 0.0, fit.chi2)
+    largest, value, fit = fault.largest(record), 0.0, declared
+    for _ in range(N_STEPS):
+        column = beyond(fit.basis, column_of(base, index, fit.z, fault, value))
+        square = float(column @ column) + largest**-2.0
+        step = (float(column @ fit.residual) - value / largest**2) / square
+        value += float(np.clip(step, -largest, largest))
+        fit = with_own_starts(fit_from(with_record(base, index, fault, value), declared.active, [fit.z]))
+        if abs(step) * np.sqrt(square) < 0.1:
+            break
+    if moved_by(base, index, fit.z, fault, value) < MOVES:
+        raise ArmidError(f"{record.file}: a fault that is lost in the noise is none")
+    # Samples that nobody measured must not speak for the fault.
+    lost = len(of_file(base, index)) * sum(fault.lost(record, value))
+    return Mended(fit, index, fault, value, square**-0.5, fit.chi2 + (value / largest) ** 2 + lost)
+
+
+def moved_by(base: WhiteRecords, index: int, z: Array, fault: Fault, value: float) -> float:
+    """Return the rms by which a fault moves its record, of several outputs the most, in units of the noise there."""
+    inside = of_file(base, index)
+    if fault.kind in OF_TIMES:
+        changes = [value * change for change in delayed(base, index, z, fault)]
+    else:
+        there = with_record(base, index, fault, value)
+        before, after = (simulated_file(posed, index, z) for posed in (base, there))
+        changes = [there.replays[i].measured - base.replays[i].measured - y + x
+                   for i, x, y in zip(inside, before, after, strict=True)]  # fmt: skip
+    levels = [base.data.levels[i].rms for i in inside]
+    return max(float(np.sqrt(np.mean(c**2))) / rms for c, rms in zip(changes, levels, strict=True))
+
+
+def suspect_held_out(
+    fit: Fit, records: Sequence[Record], library: Library
+) -> tuple[tuple[Record, ...], Suspect | None]:
+    """Return the held-out records with one fault of one of them undone that leaves noise, and the suspect.
+
+    The model stays as it is. Records as they are, and None, where none is at fault alone, or where the model leaves
+    more than noise on train: then what it misses elsewhere is its own.
+    """
+    plant = fit.model.plant
+    least, best, suspect = np.inf, tuple(records), None
+    if is_significant(fit):
+        return best, None
+    unseen = holdout_residuals(fit, tuple(records), library)
+    if unseen is None or not diagnose(unseen).significant:
+        return best, None
+    few = LEFT * (float(unseen.residual @ unseen.residual) - len(unseen.residual))
+    base = WhiteRecords(unseen.replays, fit.records.space, unseen.data)
+    files = [record.file for record in records]
+    for index, record in enumerate(base.data.records):
+        place = files.index(record.file)
+        for fault in faults_of(base, index):
+            value, deviation = fitted_size(base, index, fit.z, fault)
+            if not np.isfinite(value):
+                continue
+            there = fault.trimmed(records[place], value, plant, record)
+            changed = (*records[:place], there, *records[place + 1 :])
+            left = holdout_residuals(fit, changed, library)
+            assert left is not None
+            chi2 = float(left.residual @ left.residual) - len(left.residual)
+            if chi2 < least and (chi2 < few or not diagnose(left).significant):
+                suspect = Mended(fit, index, fault, value, deviation, chi2).suspect(record, plant, REPORTED)
+                least, best = chi2, changed
+    return best, suspect
+
+
+def disagreeing_record(fits: Sequence[Fit]) -> Suspect | None:
+    """Return the one record without which what a model leaves is noise, None where there is none or several.
+
+    fits: models to try, the smallest first. Where what it leaves there is in one stretch, that is a push.
+    """
+    for fit in fits:
+        base = fit.records
+        first_of = {r.file: i for i, r in reversed([*enumerate(base.data.records)])}
+        found = []
+        for index in first_of.values() if len(first_of) > 2 else ():
+            rest = without_record(base, index)
+            again = unless_diverged(partial(fit_from, rest, fit.active, [fit.z]))
+            if again is not None and not is_significant(again):
+                found.append((index, again))
+        if len(found) == 1:
+            index, again = found[0]
+            record, parts = base.data.records[index], base.data.by_record(residual_of(base, index, again.z))
+            times = base.replays[index].times
+            first, last = stretch_of(np.sum([parts[i] ** 2 for i in of_file(base, index)], axis=0))
+            kind = "push" if last - first < PUSHED * len(times) else "label"
+            ends = (float(times[first]), float(times[last])) if kind == "push" else (None, None)
+            return Suspect(record.file, record.role, kind, LEFT_OUT, from_s=ends[0], to_s=ends[1])
+    return None
+
+
+def without_record(base: WhiteRecords, index: int) -> WhiteRecords:
+    """Return a problem without the file of one record."""
+    data, out = base.data, of_file(base, index)
+    samples = np.concatenate([np.arange(data.edges[i], data.edges[i + 1]) for i in out])
+
+    def rest(several: tuple[T, ...]) -> tuple[T, ...]:
+        return tuple(each for i, each in enumerate(several) if i not in out)
+
+    sound = None if data.sound is None else np.delete(data.sound, samples)
+    fewer = replace(data, records=rest(data.records), levels=rest(data.levels), kept=np.delete(data.kept, samples),
+                    sound=sound)  # fmt: skip
+    return replace(base, replays=rest(base.replays), data=fewer)
+
+
+def stretch_of(squares: Array) -> tuple[int, int]:
+    """Return first and last sample of the stretch that holds nearly all of what is more than noise."""
+    energy = np.cumsum(np.maximum(squares - 1.0, 0.0))
+    first, last = np.searchsorted(energy, energy[-1] * np.array([0.5 - 0.5 * NEARLY, 0.5 + 0.5 * NEARLY]))
+    return int(first), min(int(last), len(squares) - 1)
+
+
+def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
+    """Return the samples that are no data, which were left out."""
+    return [
+        Suspect(record.file, record.role, b.kind, LEFT_OUT, float(b.count), "samples", None, None, b.from_s, b.to_s)
+        for record in (one for r in records for one in r.each) for b in broken_samples(record)
+    ]  # fmt: skip
+
+
+def suspect_sentence(suspect: Suspect, units: Mapping[str, tuple[str, float]]) -> str:
+    """Return a suspect in words; units: SI unit -> how it is shown and by what factor."""
+    s, unit, factor = suspect, *units.get(suspect.unit, (suspect.unit, 1.0))
+    if s.kind in ("gap", "clipped", "stuck", "spikes"):
+        words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
+        where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"
+        return f"{s.record}: {s.value:.0f} samples are {words}, {where}: they count as no data."
+    if s.kind == "push":
+        return f"{s.record}: pushed from {s.from_s:.3g} to {s.to_s:.3g} s; it is left out."
+    if s.kind == "label" or s.value is None or s.low is None or s.high is None:
+        return f"{s.record} looks like a record of another load{'; it is left out' if s.action == LEFT_OUT else ''}."
+    done = {FREED: "; so it is taken", LEFT_OUT: ", or another fault of it is; it is left out"}.get(s.action, "")
+    if s.kind == "late":
+        word = "late" if s.value > 0.0 else "early"
+        low, high = sorted((1e3 * abs(s.low), 1e3 * abs(s.high)))
+        return f"{s.record}: starts {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}){done}."
+    words = {"start": "starts elsewhere than told, by", "offset": "its sensor is off by", "gain": "its gain is off by",
+             "drift": "its sensor drifts by", "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
+    where = f"{s.record}, {s.output}" if s.output else s.record
+    return f"{where}: {words} {factor * s.value:.3g} {unit} ({factor * s.low:.3g} to {factor * s.high:.3g}){done}."
+
+
+def fitted_size(base: WhiteRecords, index: int, z: Array, fault: Fault) -> tuple[float, float]:
+    """Return the size of a fault of a record with its deviation, the model as it is; NaN where it is beyond reason."""
+    record, value = base.data.records[index], 0.0
+    if fault.kind == "label":
+        return 1.0 - record.constants[fault.constant], 0.0
+    largest, square = fault.largest(record), 1.0
+    spent = [*start_changes(base, z)] if any(p.n_spent for p in base.replays[index].pieces) else []
+    starts = np.linalg.qr(np.reshape(spent, (len(spent), base.data.edges[-1])).T)[0]
+    for _ in range(N_STEPS):
+        column = beyond(starts, column_of(base, index, z, fault, value))
+        square = float(column @ column) + largest**-2.0
+        here = residual_of(with_record(base, index, fault, value), index, z)
+        step = (float(column @ here) - value / largest**2) / square
+        if not np.isfinite(step):
+            return np.nan, np.nan
+        value += float(np.clip(step, -largest, largest))
+    is_told = abs(value) < largest and moved_by(base, index, z, fault, value) >= MOVES
+    return (value, square**-0.5) if is_told else (np.nan, np.nan)

@@ -1,0 +1,218 @@
+"""Starts of records in motion, fitted beside the parameters: nuisances of each piece that cost a search no dimension.
+
+About one start the signals answer to its constants next to linearly, so that the best start of each candidate is had by
+a projection (`StartCorrection`), and a fit sees what no start could make up for. What is to be done beforehand is to
+find a start about which that holds: `with_starts` does, about one candidate.
+Source of the projection: Golub, Pereyra 1973, doi:10.1137/0710036.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.engine import probes
+from armid.problem.problem import Replay
+from armid.problem.space import Space
+from armid.record import Piece
+from armid.record.record import StartCorrection
+
+Array = NDArray[np.float64]
+# Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
+MOVE = 1e-4
+# So many steps to the start at most; a step ends them that lowers chi2 by less than this. Steps that do not are halved.
+MOST_STEPS, ARRIVED, MOST_HALVINGS = 10, 1e-3, 6
+N_PROBES = 48
+# What the reader saw of a start holds it with so many times its deviation: the fit sees the same samples again.
+WIDER = 3.0
+# The noise counts as at least this share of the size of an output, where a simulation has none.
+LEAST_NOISE = 1e-6
+
+
+def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ...]:
+    """Return replays whose pieces start where one whole candidate fits best, ready to correct others about there.
+
+    Pieces whose start is not to be fitted stay as they are. Gauss and Newton's steps from the start that the piece has,
+    J(s) = |x - y(s)|^2 / max(1, m) + |(s - s_reader) / 3 deviations|^2 with squares over those of the noise and m the
+    mean square that no start brings down: a model that lacks something must not be made up for by a start that the
+    first samples rule out.
+    candidate: whole, SI, (n_parameters,).
+    """
+    found: list[Replay] = []
+    for outputs in by_file(replays):
+        starts = [Start(outputs, k) for k in range(len(outputs[0].pieces))]
+        fitted = [start.fitted(candidate) for start in starts]
+        each = [replace(r, pieces=tuple(piece[i] for piece in fitted)) for i, r in enumerate(outputs)]
+        records = [replace(r.record, pieces=r.pieces, others=()) for r in each]
+        records[0] = replace(records[0], others=tuple(records[1:]))
+        found += [replace(r, record=record) for r, record in zip(each, records, strict=True)]
+    return tuple(found)
+
+
+def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
+    """Return the whole candidate of 48 spread over the box that comes nearest to the records, each from its best start.
+
+    Each start by one linear step from that of the reader. Returns SI, (n_parameters,).
+    """
+    spread = space.complete(probes(space.low[space.free], space.high[space.free], N_PROBES))
+    chi2 = np.zeros(len(spread))
+    for outputs in by_file(replays):
+        for k in range(len(outputs[0].pieces)):
+            start = Start(outputs, k)
+            signals, answers = start.linear(start.constants, spread)
+            residual, slopes = start.residual(signals), start.seen_slopes(answers)
+            for i in np.flatnonzero(np.isfinite(chi2)):
+                chi2[i] += start.left(residual[i], slopes[:, i])
+    return np.asarray(spread[int(np.argmin(chi2))])
+
+
+def fits_starts(replays: Sequence[Replay]) -> bool:
+    """Tell whether the start of any piece is to be fitted."""
+    return any(piece.shown_start for r in replays for piece in r.pieces)
+
+
+def by_file(replays: Sequence[Replay]) -> list[list[Replay]]:
+    groups: dict[tuple[int, ...], list[Replay]] = {}
+    for replay in replays:
+        groups.setdefault(replay.simulated, []).append(replay)
+    return list(groups.values())
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Fit the start of one piece. outputs: the replays of its file; index: which piece."""
+
+    outputs: Sequence[Replay]
+    index: int
+
+    @property
+    def pieces(self) -> list[Piece]:
+        return [r.pieces[self.index] for r in self.outputs]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the constants that are fitted, none where none is."""
+        return list(self.pieces[0].shown_start)
+
+    @property
+    def constants(self) -> Array:
+        given = self.pieces[0].manoeuvre.constants
+        return np.array([given[name] for name in self.names])
+
+    @property
+    def size(self) -> float:
+        return self.outputs[0].model.plant.scales.speed
+
+    @cached_property
+    def weights(self) -> Array:
+        """1/noise of each sample in the windows, the outputs one behind the other, (n_seen,)."""
+        sizes = self.outputs[0].model.plant.sizes
+        noise = [max(r.record.noise.rms, LEAST_NOISE * sizes[r.place]) for r in self.outputs]
+        return np.repeat(1.0 / np.array(noise), [p.n_samples for p in self.pieces])
+
+    @cached_property
+    def measured(self) -> Array:
+        return np.concatenate([p.measured[p.window] for p in self.pieces])
+
+    def signals(self, starts: Array, population: Array) -> Array:
+        """Return the outputs of the file, each candidate from its own start, (n_outputs, n_candidates, n_samples).
+
+        starts: (n_candidates, n_constants).
+        """
+        first, prepared = self.outputs[0], self.outputs[0].prepared[self.index]
+        whole = np.tile(prepared.starts, (len(starts), 1))
+        whole[:, [first.model.starts.index(name) for name in self.names]] = starts
+        outputs = prepared.run(population, first.threads, whole).outputs
+        return np.asarray(outputs[[r.place for r in self.outputs]])
+
+    def seen(self, signals: Array) -> Array:
+        """Return what is seen in the windows over the noise, the outputs one behind the other, (n_candidates, n)."""
+        pairs = zip(signals, self.pieces, strict=True)
+        return np.asarray(self.weights * np.concatenate([signal[:, piece.window] for signal, piece in pairs], axis=1))
+
+    def residual(self, signals: Array) -> Array:
+        """Return what is measured minus what is simulated, over the noise, (n_candidates, n_seen)."""
+        return np.asarray(self.weights * self.measured - self.seen(signals))
+
+    def linear(self, constants: Array, population: Array) -> tuple[Array, Array]:
+        """Return signals and d signal / d constant about one start, all in one population, by central differences.
+
+        Their shapes: (n_outputs, n_candidates, n_samples) and (n_constants, n_outputs, n_candidates, n_samples).
+        """
+        n, moves = len(constants), MOVE * self.size * np.eye(len(constants))
+        starts = np.concatenate([constants[np.newaxis], constants + moves, constants - moves])
+        found = self.signals(np.repeat(starts, len(population), axis=0), np.tile(population, (len(starts), 1)))
+        each = found.reshape(len(found), len(starts), len(population), -1).swapaxes(0, 1)
+        return each[0], (each[1 : 1 + n] - each[1 + n :]) / (2.0 * MOVE * self.size)
+
+    @cached_property
+    def shown(self) -> tuple[Array, Array]:
+        """The start that the reader saw, and how far from it the fit may go, SI, both (n_constants,)."""
+        piece = self.pieces[0]
+        deviations = np.array([piece.start_deviation[name] for name in self.names])
+        return np.array(list(piece.shown_start.values())), WIDER * deviations
+
+    def left(self, residual: Array, slopes: Array) -> float:
+        """Return the sum of squares that no start brings down, infinite where the simulation diverges."""
+        if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
+            return np.inf
+        scale = np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300)
+        return float(np.sum((residual - np.linalg.lstsq((slopes / scale).T, residual)[0] @ (slopes / scale)) ** 2))
+
+    def answer(self, constants: Array, slopes: Array, misfit: float) -> tuple[Array, Array]:
+        """Return gain and offset of a step, (n_constants, n_seen) and (n_constants,); misfit: mean square that is left.
+
+        slopes: over the noise, (n_constants, n_seen).
+        """
+        shown, width = self.shown
+        held = misfit / width**2
+        normal = slopes @ slopes.T + np.diag(held)
+        both = np.linalg.solve(normal, np.column_stack([slopes, held * (shown - constants)]))
+        return np.asarray(both[:, :-1]), np.asarray(both[:, -1])
+
+    def fitted(self, candidate: Array) -> list[Piece]:
+        """Return the piece of each output from the best start of a candidate, ready to correct those of others.
+
+        Where the candidate diverges from the start that there is, the pieces stay as they are.
+        """
+        pieces, constants, population = self.pieces, self.constants, candidate[np.newaxis]
+        if not self.names:
+            return pieces
+        signals, slopes = self.linear(constants, population)
+        for _ in range(MOST_STEPS):
+            residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
+            if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
+                return pieces
+            misfit = max(self.left(residual, seen) / len(residual), 1.0)
+            gain, offset = self.answer(constants, seen, misfit)
+            shorter = constants + (gain @ residual + offset) / 2.0 ** np.arange(MOST_HALVINGS)[:, np.newaxis]
+            tried = self.residual(self.signals(shorter, np.repeat(population, MOST_HALVINGS, axis=0)))
+            before, costs = self.cost(constants, residual, misfit), self.cost(shorter, tried, misfit)
+            better = np.flatnonzero(costs < before)
+            if not len(better):
+                break
+            constants = shorter[better[0]]
+            signals, slopes = self.linear(constants, population)
+            if before - costs[better[0]] < ARRIVED:
+                break
+        if not np.isfinite(slopes).all():
+            return pieces
+        gain, offset = self.answer(constants, self.seen_slopes(slopes)[:, 0], misfit)
+        places, window = tuple(r.place for r in self.outputs), pieces[0].window
+        correction = StartCorrection(places, slopes[:, :, 0], gain * self.weights, offset, self.measured, window)
+        start = dict(zip(self.names, map(float, constants), strict=True))
+        manoeuvre = replace(pieces[0].manoeuvre, constants={**pieces[0].manoeuvre.constants, **start})
+        return [replace(piece, manoeuvre=manoeuvre, correction=correction) for piece in pieces]
+
+    def seen_slopes(self, slopes: Array) -> Array:
+        """Return what is seen of slopes, as `seen` does, (n_constants, n_candidates, n_seen)."""
+        shape = (len(slopes), slopes.shape[2], len(self.weights))
+        return np.array([self.seen(slope) for slope in slopes]).reshape(shape)
+
+    def cost(self, constants: Array, residual: Array, misfit: float) -> Any:
+        """Return J of `with_starts`, of one start and its residual or of many."""
+        shown, width = self.shown
+        return np.sum(residual**2, axis=-1) / misfit + np.sum(((constants - shown) / width) ** 2, axis=-1)

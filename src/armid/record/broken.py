@@ -1,0 +1,90 @@
+"""Samples of a record that are no data: gaps that were bridged, clipped stretches, repeated samples, spikes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.record.record import Record
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# So many equal samples in a row are no chance where the noise exceeds half a step of the values; so many lie on one
+# straight line only where a gap was bridged; a sensor at its limit shows as many in all.
+REPEATED, BRIDGED, CLIPPED = 8, 4, 8
+# A sample that is so many times the noise away from the median of its five neighbours, and this many times what nearly
+# all samples of the record are.
+ABOVE_NOISE, ABOVE_OTHERS, USUAL = 10.0, 6.0, 0.95
+# Rounding of a value, relative to the largest.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Broken:
+    """Hold samples of one kind: "gap", "clipped", "stuck" or "spikes".
+
+    samples: of the record's grid, (n_samples,), True where it is broken. from_s, to_s: the first and the last [s].
+    """
+
+    kind: str
+    samples: Mask
+    from_s: float
+    to_s: float
+
+    @property
+    def count(self) -> int:
+        """How many samples are no data."""
+        return int(self.samples.sum())
+
+
+def broken_samples(record: Record) -> tuple[Broken, ...]:
+    """Return the broken samples of a record by kind, found in its signal alone; one sample is of one kind."""
+    found, taken = [], np.zeros(record.measured.size, dtype=np.bool_)
+    for kind, samples in kinds_of(record):
+        own = samples & ~taken
+        if own.any():
+            taken |= own
+            times = record.times[own]
+            found.append(Broken(kind, own, float(times[0]), float(times[-1])))
+    return tuple(found)
+
+
+def kinds_of(record: Record) -> Iterator[tuple[str, Mask]]:
+    signal, noise = record.measured, record.noise.rms
+    rounding = ROUNDING * max(float(np.abs(signal).max()), 1e-300)
+    level = np.abs(np.diff(signal)) <= rounding
+    if record.irregularity is not None:
+        straight = np.abs(np.diff(signal, 2)) <= rounding
+        yield (
+            "gap",
+            in_runs(np.concatenate([[False], straight, [False]]), BRIDGED - 2, 1)
+            & ~in_runs(np.append(level, False), REPEATED, 0),
+        )
+    steps = np.unique(np.abs(np.diff(signal)))
+    smallest = float(steps[steps > rounding].min(initial=np.inf))
+    # A quiet sensor of coarse steps repeats itself.
+    if noise > 0.5 * smallest:
+        equal = in_runs(np.append(level, False), REPEATED - 1, 0)
+        equal = equal | np.append(False, equal[:-1] & level)
+        # A sensor that tells a standstill by an exact 0 is not stuck.
+        equal &= signal != 0.0
+        for end in (signal.max(), signal.min()):
+            at_end = np.abs(signal - end) <= rounding
+            if int(at_end.sum()) >= CLIPPED and (at_end & equal).any():
+                yield "clipped", at_end
+        yield "stuck", equal
+    padded = np.pad(signal, 2, mode="edge")
+    around = np.median(np.stack([padded[i : i + signal.size] for i in (0, 1, 3, 4)]), axis=0)
+    away = np.abs(signal - around)
+    yield "spikes", away > max(ABOVE_NOISE * noise, ABOVE_OTHERS * float(np.quantile(away, USUAL)))
+
+
+def in_runs(true: Mask, shortest: int, wider: int) -> Mask:
+    """Return the runs of a mask that are so long or longer, each wider by so many samples on either side."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
+    found = np.zeros(true.size, dtype=np.bool_)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin >= shortest:
+            found[max(begin - wider, 0) : end + wider] = True
+    return found

@@ -1,0 +1,210 @@
+"""From which state a record or a piece of it is simulated: what its outputs show at its first sample, smoothed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.model import Model, Plant
+from armid.record.noise import noise_of, quantisation_step
+from armid.record.resample import Timing, moved_onto_grid
+
+Array = NDArray[np.float64]
+State = tuple[dict[str, float], dict[str, float]]
+# Of a record that is held out, the start comes from this share of its first samples, at most so long [s], at least so
+# many samples; they do not judge.
+SHARE, LONGEST_S, FEWEST = 0.05, 0.5, 5
+STEPS, TINY = 4, 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Hold a signal from which a start is taken.
+
+    values: [SI], (n_samples,). noise: standard deviation of one sample [SI]. step: of the sensor [SI], 0: a fine one.
+    """
+
+    values: Array
+    noise: float
+    step: float = 0.0
+
+
+def track_of(values: Array, times: Array, timing: Timing) -> Track:
+    """Return a column on the even grid, with its noise from the differences of what is in the file.
+
+    values: [SI], (n_rows,). times: [s], (n_rows,).
+    """
+    irregular = times if timing.irregularity else None
+    noise = noise_of(np.empty(0), values, timing.interval, irregular)
+    return Track(moved_onto_grid(values, times, timing), noise.rms, quantisation_step(values))
+
+
+def state_at(tracks: Mapping[str, Track], index: int) -> State:
+    """Return constants (`start_position`, `start_speed`) and their standard deviations (SI) at one sample.
+
+    A step of the sensor that no motion averages out is counted in full.
+    """
+    found = {name: smoothed(t.values, index, t.noise) for name, t in tracks.items()}
+    deviations = {name: float(max(d, tracks[name].step / np.sqrt(12.0))) for name, (_, d) in found.items()}
+    return {name: value for name, (value, _) in found.items()}, deviations
+
+
+def n_spent(n_samples: int, interval: float) -> int:
+    """Return from how many first samples of a record (or piece) that is held out its start is taken."""
+    return max(int(np.ceil(min(SHARE * n_samples, LONGEST_S / interval))), FEWEST)
+
+
+def state_shown(
+    plant: Plant, given: Mapping[str, float], tracks: Mapping[str, Track], interval: float, index: int
+) -> State:
+    """Return the start constants that are not given, and their standard deviations, SI, as the outputs show them.
+
+    The outputs are functions h of the states, so that at the start h(x) is what they are and dh/dx f(x) how fast they
+    change, where f, the rates of x, asks for states and constants alone (a position's rate is a speed). Values and
+    slopes of the smoothed outputs, each weighed by its deviation, are met by least squares. What no output shows keeps
+    its default, with the plant's own size for its deviation.
+
+    given: constants of the record. tracks: output -> its signal. interval: [s]. index: sample at which it starts.
+    """
+    outputs = VisibleOutputs(plant, given)
+    names = [c for c in plant.start_constants.values() if c not in given]
+    units = {c.name: c.unit for c in plant.constants}
+    sizes = np.array([plant.scales.effort if units[n] in ("N", "N m") else plant.scales.speed for n in names])
+    values, rates = [], []
+    for output in (o for o in plant.outputs if o.name in tracks):
+        track, floor = tracks[output.name], 1e-9 * plant.scales.speed
+        value, deviation = smoothed(track.values, index, track.noise)
+        values.append((value, max(deviation, track.step / np.sqrt(12.0), floor), output.signal))
+        slope, deviation = smoothed(track.values, index, track.noise, slope=True)
+        rates.append((slope / interval, max(deviation / interval, floor), output.signal))
+    shown = [(v, d, key, outputs.value) for v, d, key in values if outputs.shows(key)]
+    shown += [(v, d, key, outputs.rate) for v, d, key in rates if outputs.shows_rate(key)]
+    start = np.array([outputs.constants[n] for n in names])
+
+    def missed(constants: Array) -> Array:
+        states = outputs.states(dict(zip(names, constants, strict=True)))
+        return np.array([(value - function(key, states)) / deviation for value, deviation, key, function in shown])
+
+    slopes = np.zeros((len(shown), len(names)))
+    for _ in range(STEPS if names and shown else 0):
+        moves = TINY * np.diag(sizes)
+        slopes = np.array([(missed(start - m) - missed(start + m)) / (2.0 * TINY) for m in moves]).T
+        # in shares of the sizes; of what is not shown the least change
+        start = start + sizes * np.linalg.lstsq(slopes, missed(start), rcond=1e-12)[0]
+    covariance = np.linalg.inv(slopes.T @ slopes + np.eye(len(names)))
+    deviations = sizes * np.sqrt(np.diag(covariance))
+    return dict(zip(names, map(float, start), strict=True)), dict(zip(names, map(float, deviations), strict=True))
+
+
+class VisibleOutputs:
+    """Evaluate those outputs of a plant, and how fast they change, that states and constants alone decide.
+
+    given: constants that replace the plant's defaults, SI.
+    """
+
+    def __init__(self, plant: Plant, given: Mapping[str, float]) -> None:
+        self.graph, self.plant = Model(plant).graph, plant
+        self.constants: dict[str, Any] = {c.name: c.value for c in plant.constants} | dict(given)
+        self.known = [s.name for s in plant.states if self.leaves(f"initial__{s.name}") <= set(self.constants)]
+
+    def leaves(self, key: str) -> set[str]:
+        """Return the leaves of the graph on which a node depends."""
+        node = self.graph.nodes[key]
+        if node.function is None and node.kind != "port":
+            return {key}
+        return {leaf for needed in node.needs for leaf in self.leaves(needed)}
+
+    def shows(self, key: str) -> bool:
+        return self.leaves(key) <= {*self.known, *self.constants}
+
+    def shows_rate(self, key: str) -> bool:
+        moving = self.leaves(key) & {s.name for s in self.plant.states}
+        return self.shows(key) and all(self.shows(f"rate__{name}") for name in moving)
+
+    def states(self, start: Mapping[str, float]) -> dict[str, Any]:
+        known = self.graph.values([f"initial__{n}" for n in self.known], self.constants | dict(start))
+        return self.constants | {n: known[f"initial__{n}"] for n in self.known}
+
+    def value(self, key: str, states: Mapping[str, Any]) -> float:
+        return float(self.graph.values([key], states)[key])
+
+    def rate(self, key: str, states: Mapping[str, Any]) -> float:
+        moving = sorted(self.leaves(key) & set(self.known))
+        rates = self.graph.values([f"rate__{n}" for n in moving], states)
+        later, earlier = ({n: states[n] + side * TINY * rates[f"rate__{n}"] for n in moving} for side in (1.0, -1.0))
+        return (self.value(key, {**states, **later}) - self.value(key, {**states, **earlier})) / (2.0 * TINY)
+
+
+# A window of smoothing holds only what a polynomial of one of these degrees describes ...
+DEGREES = (1, 2)
+# ... and its value is taken from one of so many degrees more, whose bias is of a higher order.
+HIGHER = 2
+# Standard deviations by which squares may exceed those of the noise.
+CHANCE = 3.0
+GROWTH, LONGEST = 1.25, 400
+
+
+def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tuple[float, float]:
+    """Return the value of a signal at one sample and its standard deviation, both in the unit of the signal.
+
+    A polynomial of degree 1 or 2 is fitted to a window around the sample (at the ends of a record beside it), which
+    grows from 5 to 400 samples until its squares are more than noise: sum r^2 > noise^2 (f + 3 sqrt(2 f)) with f
+    degrees of freedom, or the same for what the next two degrees explain. The value is that of the polynomial with
+    these two degrees more on the last window that held, so that its bias is small against its deviation. The window of
+    the smallest deviation wins; a signal without noise is not smoothed.
+
+    values: (n_samples,). noise: standard deviation of one sample, taken for white. slope: return the change from sample
+    to sample instead.
+    Source of the higher degree: Calonico, Cattaneo, Titiunik 2014, doi:10.3982/ECTA11757.
+    """
+    best = float(values[index]), noise
+    if slope:
+        low, n = window_at(index, FEWEST, values.size), min(FEWEST, values.size)
+        row = polynomials(n, n - 1, slope)[index - low] @ polynomials(n, n - 1).T
+        best = float(row @ values[low : low + n]), noise * float(np.sqrt(row @ row))
+    for degree in DEGREES:
+        n = degree + HIGHER + 2
+        while n <= min(values.size, LONGEST):
+            low = window_at(index, n, values.size)
+            found = fitted(values[low : low + n], index - low, degree, noise, slope)
+            if found is None:
+                break
+            best = min(best, found, key=lambda pair: pair[1])
+            n = int(n * GROWTH) + 1
+    return best
+
+
+def window_at(index: int, n: int, n_samples: int) -> int:
+    """Return the first sample of a window of n samples around one, at the ends of the signal beside it."""
+    return max(min(max(index - (n - 1) // 2, 0), n_samples - n), 0)
+
+
+def fitted(window: Array, place: int, degree: int, noise: float, slope: bool) -> tuple[float, float] | None:
+    """Return value and standard deviation at one place of a window, None where it holds more than a polynomial."""
+
+    def exceeds(squares: float, freedom: int) -> bool:
+        return bool(squares > noise**2 * (freedom + CHANCE * np.sqrt(2.0 * freedom)))
+
+    basis, mean = polynomials(window.size, degree + HIGHER), float(np.mean(window))
+    centred = window - mean
+    parts = basis.T @ centred
+    inside, beyond = parts[: degree + 1], parts[degree + 1 :]
+    left = float(centred @ centred - inside @ inside)
+    if exceeds(left, window.size - degree - 1) or exceeds(float(beyond @ beyond), HIGHER):
+        return None
+    row = polynomials(window.size, degree + HIGHER, slope)[place]
+    return (0.0 if slope else mean) + float(row @ parts), noise * float(np.sqrt(row @ row))
+
+
+@cache
+def polynomials(n: int, degree: int, slope: bool = False) -> Array:
+    """Return orthonormal polynomials on n even samples, lowest degree first, (n, degree + 1); slope: their slopes."""
+    powers = np.vander(np.linspace(-1.0, 1.0, n), degree + 1, increasing=True)
+    basis, triangle = np.linalg.qr(powers)
+    if not slope:
+        return np.asarray(basis)
+    rises = np.hstack([np.zeros((n, 1)), powers[:, :-1] * np.arange(1.0, degree + 1.0)]) * 2.0 / (n - 1)
+    return np.asarray(np.linalg.solve(triangle.T, rises.T).T)

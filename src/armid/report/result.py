@@ -1,0 +1,302 @@
+"""What every result shows of itself: a few lines, a table, a figure, its page and files; and results read back."""
+
+import json
+import os
+import platform
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from importlib import import_module
+from pathlib import Path
+from shutil import disk_usage, rmtree
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+from armid.errors import ArmidError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from armid.report.document import Document
+
+DETAILS, MANIFEST = "details.json", "manifest.json"
+# Room on a disk without which no search is begun: results take some MB.
+LEAST_ROOM = 1_000_000
+# Letters of a result's `repr`.
+MOST_LETTERS = 1_500
+Draw = Callable[[], Any]
+
+
+class Parts(NamedTuple):
+    """What is stored of a result: what its JSON holds, what its page needs beside, and name -> what draws a figure."""
+
+    result: dict[str, Any]
+    details: dict[str, Any]
+    figures: dict[str, Draw]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of result of a command on a campaign.
+
+    file : of the result, JSON. page, markdown : names of its page and of its Markdown.
+    module, function : of what makes its document of (result, details, SVG by name, command); imported when asked for,
+    as every other command starts faster without it. The module's FIGURES names the SVG files that are on the page, the
+    first of them is the one that `plot` draws; its `parts_of` makes the Parts of a result.
+    """
+
+    command: str
+    file: str
+    page: str
+    markdown: str
+    module: str
+    function: str
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        return tuple(import_module(self.module).FIGURES)
+
+    @property
+    def document(self) -> "Callable[..., Document]":
+        made: Callable[..., Document] = getattr(import_module(self.module), self.function)
+        return made
+
+    def parts_of(self, found: object) -> Parts:
+        made: Parts = import_module(self.module).parts_of(found)
+        return made
+
+
+IDENTIFICATION = Kind("armid identify", "result.json", "report.html", "report.md",
+                      "armid.estimation.identify_document", "identify_document")  # fmt: skip
+IDENTIFIABILITY = Kind("armid identifiability", "identifiability.json", "identifiability.html", "identifiability.md",
+                       "armid.estimation.identifiability_document", "identifiability_document")  # fmt: skip
+LOOP = Kind("armid close-loop", "report.json", "report.html", "report.md", "armid.loop.document", "loop_document")
+
+
+class Shown:
+    """Show a document in Python and in a notebook; a subclass says which document."""
+
+    def document(self) -> "Document":
+        """Return what the result says: the answer, tables, figures."""
+        raise NotImplementedError
+
+    @property
+    def table(self) -> "DataFrame":
+        """The first table, with the units and digits that people read; numbers in SI are in `to_dict`."""
+        from armid.report.files import frame_of
+
+        return frame_of(self.document().main_tables[0])
+
+    def __repr__(self) -> str:
+        text = "\n".join(self.document().said)
+        return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]} ..."
+
+    def _repr_html_(self) -> str:
+        from armid.report.html import fragment
+
+        return fragment(self.document())
+
+
+class Result(Shown):
+    """Show and store the result of a command on a campaign, the same way from Python and from the command."""
+
+    kind: ClassVar[Kind]
+
+    @property
+    def parts(self) -> Parts:
+        """What is stored of it; made once."""
+        kept: dict[str, Any] = self.__dict__
+        if "_parts" not in kept:
+            kept["_parts"] = self.kind.parts_of(self)
+        return kept["_parts"]  # type: ignore[no-any-return]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as the command stores it as JSON, SI throughout; what is not known is None."""
+        return self.parts.result
+
+    def document(self) -> "Document":
+        """Return what its page says, without stored figures."""
+        return self.kind.document(self.parts.result, self.parts.details, {}, "")
+
+    def plot(self, name: str = "") -> Any:
+        """Draw one figure and return it, matplotlib's. name: which, "" for the first.
+
+        Raises ArmidError for a name that it does not have.
+        """
+        figures = self.parts.figures
+        if name and name not in figures:
+            raise ArmidError(f"there is no figure '{name}': {', '.join(figures)} are known")
+        return figures[name or next(iter(figures))]()
+
+    def save(self, folder: str | Path, made_by: Mapping[str, Any] | None = None) -> list[str]:
+        """Write JSON, figures, page and Markdown to a folder, all or none, and return their names.
+
+        made_by: the command that is running and its settings, for the page.
+        Raises ArmidError for a place that is no folder.
+        """
+        from armid.report.html import html
+        from armid.report.markdown import markdown
+        from armid.report.style import save
+
+        kind, (result, details, figures) = self.kind, self.parts
+        with NewFiles(Path(folder), MANIFEST) as files:
+            files.path(kind.file).write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            for name, draw in figures.items():
+                endings = ("png", "svg") if name in kind.figures else ("png",)
+                save(draw(), *(files.path(f"{name}.{ending}") for ending in endings))
+            if details:
+                stored = {"made_by": dict(made_by or {}), **details}
+                files.path(DETAILS).write_text(json.dumps(stored, allow_nan=False) + "\n", encoding="utf-8")
+            document = document_of(files.place, kind, str(folder))
+            files.path(kind.markdown).write_text(markdown(document), encoding="utf-8")
+            files.path(kind.page).write_text(html(document), encoding="utf-8")
+        return files.names
+
+
+def document_of(folder: Path, kind: Kind, name: str) -> "Document":
+    """Return the document of what a folder holds.
+
+    folder: where the files are. name: of the folder, in the command that makes the page again.
+
+    Raises ArmidError for files that are not what the command writes, or that two runs of it wrote.
+    """
+    result = read_json(folder / kind.file, kind.command)
+    refuse_mixed(folder, kind)
+    has_details = (folder / DETAILS).is_file() and kind is not IDENTIFIABILITY
+    details = read_json(folder / DETAILS, kind.command) if has_details else {}
+    files = {figure: folder / f"{figure}.svg" for figure in kind.figures}
+    try:
+        svgs = {figure: path.read_text(encoding="utf-8") for figure, path in files.items() if path.is_file()}
+    except UnicodeDecodeError as error:
+        raise ArmidError(f"{folder} holds a figure that is no text: the SVG of `{kind.command}` is expected") from error
+    with refuse_damaged(folder, kind):
+        return kind.document(result, details, svgs, f"armid report {name}")
+
+
+@contextmanager
+def refuse_damaged(folder: Path, kind: Kind) -> Iterator[None]:
+    """Tell in one sentence that stored JSON cannot be shown: what makes a document of it, or draws its figures."""
+    try:
+        yield
+    except ArmidError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise ArmidError(
+            f"{folder / kind.file}, or details.json beside it, is not what `{kind.command}` writes "
+            f"({type(error).__name__}: {error}): a folder that it wrote is expected"
+        ) from error
+
+
+def refuse_mixed(folder: Path, kind: Kind) -> None:
+    """Refuse files of which some are of another run than the manifest; an earlier version wrote none."""
+    if not (folder / MANIFEST).is_file():
+        return
+    digests = read_json(folder / MANIFEST, kind.command)
+    for name in (kind.file, DETAILS, *(f"{figure}.svg" for figure in kind.figures)):
+        if name in digests and (folder / name).is_file() and digest_of(folder / name) != digests[name]:
+            raise ArmidError(f"{folder} holds the files of two runs, as one killed while it wrote leaves them: "
+                             f"{name} is not that of {MANIFEST}; `{kind.command}` once more is expected")  # fmt: skip
+
+
+def digest_of(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()
+
+
+def read_json(path: Path, command: str) -> dict[str, Any]:
+    """Return a stored JSON table.
+
+    Raises ArmidError for a file that is none.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ArmidError(f"{path} is no JSON ({error}): what `{command}` wrote is expected") from error
+    if not isinstance(found, dict):
+        raise ArmidError(f"{path} holds no table: what `{command}` wrote is expected")
+    return found
+
+
+class NewFiles:
+    """Write files beside a folder and move them in when all are there, so that nothing half-written is found.
+
+    names: the files so far. A folder that is made for them goes again when nothing comes into it. manifest: name of a
+    file that tells the digest of each, "" for none; it comes in first, so that who is killed in between leaves files
+    that it does not fit. What a process of this machine left beside them when it was killed goes.
+    """
+
+    def __init__(self, folder: Path, manifest: str = "") -> None:
+        self.folder, self.manifest = folder, manifest
+        self.names: list[str] = []
+
+    def __enter__(self) -> "NewFiles":
+        if self.folder.exists() and not self.folder.is_dir():
+            raise ArmidError(f"--out {self.folder} is a file: a folder is expected")
+        self._is_new = not self.folder.exists()
+        self.folder.mkdir(parents=True, exist_ok=True)
+        sweep(self.folder)
+        self._beside = TemporaryDirectory(dir=self.folder, prefix=f"{beside()}{os.getpid()}-")
+        return self
+
+    @property
+    def place(self) -> Path:
+        """Where the files are until all are there."""
+        return Path(self._beside.name)
+
+    def path(self, name: str) -> Path:
+        """Return where to write a file for now.
+
+        Raises ArmidError when a folder has its name.
+        """
+        if (self.folder / name).is_dir():
+            raise ArmidError(f"--out {self.folder} holds a folder {name}: a place for a file of that name is expected")
+        self.names.append(name)
+        path = self.place / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def __exit__(self, kind: object, error: object, *_: object) -> None:
+        if isinstance(error, OSError) and error.filename is None and self.names:
+            # a disk that is full does not say which file it had no room for
+            error.filename = str(self.folder / self.names[-1])
+        if kind is None:
+            if self.manifest:
+                digests = {name: digest_of(self.place / name) for name in self.names}
+                (self.place / self.manifest).write_text(json.dumps(digests, indent=2) + "\n", encoding="utf-8")
+            for name in ([self.manifest] if self.manifest else []) + self.names:
+                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+                os.replace(self.place / name, self.folder / name)
+        self._beside.cleanup()
+        if self._is_new:
+            with suppress(OSError):
+                self.folder.rmdir()
+
+
+def beside() -> str:
+    """Return how folders of files on their way in begin, of any process of this machine."""
+    return f".armid-{sha256(platform.node().encode()).hexdigest()[:8]}-"
+
+
+def sweep(folder: Path) -> None:
+    """Remove what processes of this machine that have ended left on its way into a folder."""
+    for path in folder.glob(f"{beside()}*-*") if os.name == "posix" else ():
+        pid = path.name.removeprefix(beside()).partition("-")[0]
+        try:
+            os.kill(int(pid), 0)
+        except ProcessLookupError:
+            rmtree(path, ignore_errors=True)
+        except (ValueError, OSError):
+            continue
+
+
+def refuse_unwritable(folder: Path | None) -> None:
+    """Refuse a folder before the work, not after it.
+
+    Raises ArmidError for a file and for a disk that is full, OSError for a place where nothing can be written.
+    """
+    if folder is not None:
+        with NewFiles(folder):
+            left = disk_usage(folder).free
+        if left < LEAST_ROOM:
+            least = f"{LEAST_ROOM / 1e6:.0f} MB"
+            raise ArmidError(f"--out {folder}: {left / 1e6:.1f} MB are left on its disk, at least {least} are expected")

@@ -1,0 +1,229 @@
+"""What closed loops said of campaigns as real ones are: a faulty record, constants that are off, sets of effects.
+
+The truth is the key of `studies/stand/families.py`. Claimed names count, those of groups with all of their members.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from pandas import DataFrame
+
+from blind import tables
+from stand.score.judge import LARGEST_GROUP, PARAMETERS
+from stand.score.targets import Target, least, most, share
+
+Row = dict[str, Any]
+Show = dict[str, str | tuple[str, str]]
+WORDS = (
+    "Shares with their 95 % Wilson interval; `n` counts campaigns, of parameters: values. A fault that moves its "
+    "record by no more than twice the noise may pass unseen. A name stands alone when no other effect and no constant "
+    "is told beside it. Intervals count that the loop says hold; they count the tolerances of the constants. Lines "
+    "without a target inform."
+)
+BY_KIND = (
+    "Campaigns in which one record is at fault, by kind. Seen: record and kind are right. Intervals: those with "
+    "the constants as declared that are said to hold."
+)
+BY_FAMILY = "Time of the processor to close one campaign, and what was withdrawn, by family."
+MISSES = "Every campaign that speaks against a target, and why."
+CONSTANT, SAMPLES = "constant:", ("gap", "clipped", "stuck", "spikes")
+# A fault counts that moves its record by so many times the noise; held-out is at the noise within this factor of it.
+MOVES, AT_NOISE = 2.0, 1.1
+# Held-out is worse that is by more than this share, and above the noise.
+WORSE = 1.02
+# A parameter is wrong that is off by more than this share.
+OFF = 0.01
+
+
+def parts(
+    key: Mapping[str, Any], reports: Mapping[str, Any], times: Mapping[str, tuple[float, float]], out: Path
+) -> tuple[list[Target], dict[str, list["tables.Table | str"]]]:
+    """Return targets and sections of a suite of families; a file with a line a campaign is written."""
+    rows = [
+        judged(campaign, key[campaign], reports[campaign]) | {"cpu_seconds": times.get(campaign, (None, None))[1]}
+        for campaign in key if campaign in reports
+    ]  # fmt: skip
+    targets = targets_of(rows, len(key) - len(rows))
+    sections: dict[str, list[tables.Table | str]] = {"Targets": [tables.targets_table(targets, WORDS)]}
+    if rows:
+        frame = DataFrame(rows)
+        (out / "campaigns.csv").write_text(frame.to_csv(index=False, lineterminator="\n"))
+        sections["Campaigns"] = [by_kind(frame), by_family(frame), misses(frame)]
+    return targets, sections
+
+
+def judged(campaign: str, entry: Mapping[str, Any], report: Mapping[str, Any]) -> Row:
+    """Return one row: what was planted, what was said, and what of it is wrong."""
+    truths, fault = {e["name"] for e in entry["effects"]}, entry["fault"]
+    claims = {s["effect"]: {s["effect"], *s["alternatives"]} for s in report["steps"]
+              if s["claimed"] and not s["empirical"] and not s["effect"].startswith(CONSTANT)}  # fmt: skip
+    beside = {s["effect"]: s["constants"] for s in report["steps"]}
+    held = {t for t in truths if any(t in g and len(g) <= LARGEST_GROUP for g in claims.values())}
+    wrong = [name for name, group in claims.items() if not group & truths]
+    accused = [s for s in report["suspects"] if entry["dirt"] != "gap" or s["kind"] != "gap"]
+    before, after = (report["error"][when]["holdout"]["rmse"] for when in ("before", "after"))
+    floor, found = entry["floor"]["holdout"], report["parameters"]["after"]
+    row = {
+        "campaign": campaign, "family": entry["class"], "truth": " + ".join(sorted(truths)), "dirt": entry["dirt"],
+        "fault": fault.get("kind", ""), "size": fault.get("size"), "record": fault.get("record", ""),
+        "moves": fault.get("moves"), "constants": ", ".join(f"{n} {v:+.1%}" for n, v in entry["constants"].items()),
+        "verdict": report["verdict"],
+        "said": "; ".join([" or ".join([n, *sorted(g - {n}), *beside[n]]) for n, g in claims.items()]
+                          + [f"({n})" for n in report["effects"] if n not in claims]),
+        "suspects": "; ".join(f"{s['record']} {s['kind']}" for s in report["suspects"]),
+        "seen": any((s["record"], s["kind"]) == (fault.get("record"), fault.get("kind")) for s in report["suspects"]),
+        "accused": bool(accused), "all_named": held == truths, "wrong": ", ".join(wrong),
+        "wrong_alone": any(len(claims[n]) == 1 and not beside[n] for n in wrong),
+        "withdrawn": report["withdrawn"] is not None, "before_over_floor": before / floor,
+        "after_over_floor": after / floor, "worse": after > max(WORSE * before, AT_NOISE * floor),
+    }  # fmt: skip
+    for name in PARAMETERS:
+        truth, p = entry["parameters"][name], found[name]
+        row |= {
+            f"off_{name}": p["value"] / truth - 1.0,
+            f"holds_{name}": p["low"] <= truth <= p["high"] if p["interval_holds"] else None,
+            f"given_{name}": p["given_low"] <= truth <= p["given_high"] if p["interval_holds"] else None,
+            f"trusted_{name}": p["trusted"],
+            f"narrow_{name}": p["trusted"] and 0.5 * (p["high"] - p["low"]) < OFF * abs(p["value"]),
+        }
+    return row
+
+
+def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
+    """Reckon the targets of the families, each for those campaigns that tell of it."""
+    family = {name: [r for r in rows if r["family"] == name] for name in dict.fromkeys(r["family"] for r in rows)}
+    faults, one, controls = (family.get(name, []) for name in ("fault", "constant", "control"))
+    constants = [*one, *family.get("constants", [])]
+    moved = [r for r in faults if r["moves"] > MOVES]
+    of_record = f"one faulty record, moved by more than {MOVES:g} times its noise"
+    found = [
+        Target("campaigns without a report", missing, len(rows) + missing, "= 0", missing == 0),
+        least(f"{of_record}: record and kind are right", moved, lambda r: r["seen"], 0.90),
+        most("one faulty record: a physical name is claimed", faults, lambda r: bool(r["wrong"]), 0.01),
+        least("one faulty record: parameters inside their interval", values(faults, "holds"), is_true, 0.93),
+        least(
+            "one faulty record: inside their interval with the constants as declared, which they are here",
+            values(faults, "given"),
+            is_true,
+            0.93,
+        ),
+        share("one faulty record: parameters with an interval that is said to hold", every(faults), is_held),
+        most("constants off: a wrong physical name alone", constants, lambda r: r["wrong_alone"], 0.01),
+        share("constants off: a wrong physical name, alone or beside others", constants, lambda r: bool(r["wrong"])),
+        most("constants off: trusted parameters off by more than 1 %", trusted(constants), is_off, 0.01),
+        least("constants off: parameters inside their interval", values(constants, "holds"), is_true, 0.93),
+        least("one constant off: held-out error up to 1.1 of the noise", one, is_at_noise, 0.90),
+    ]
+    for word, limit in (("two", 0.95), ("three", 0.85)):
+        some = family.get(word, [])
+        found += [
+            least(f"{word} effects: all named, alone or in a group", some, lambda r: r["all_named"], limit),
+            most(f"{word} effects: a wrong name is claimed", some, lambda r: bool(r["wrong"]), 0.01),
+        ]
+    found += [
+        most("controls: false claims", controls, lambda r: bool(r["wrong"]), 0.005),
+        most("controls: unexplained", controls, lambda r: r["verdict"] == "unexplained", 0.02),
+        most("controls: a record is accused", controls, lambda r: r["accused"], 0.02),
+        share("controls: anything but `no_discrepancy`", controls, lambda r: r["verdict"] != "no_discrepancy"),
+        share("all: trusted parameters off by more than 1 %", trusted(rows), is_off),
+        most("all: of these with an interval below 1 %", values(rows, "off", "narrow"), is_off, 0.01),
+        share("all: parameters inside their interval", values(rows, "holds"), is_true),
+        share("all but constants off: inside their interval with the constants as declared",
+              values([r for r in rows if not r["constants"]], "given"), is_true),
+        most("all: additions withdrawn", rows, lambda r: r["withdrawn"], 0.02),
+        most("all: held-out error of the model in force worse than of the declared", rows, lambda r: r["worse"], 0.0),
+    ]  # fmt: skip
+    seconds = [r["cpu_seconds"] for r in rows if r["cpu_seconds"] is not None]
+    for word, limit, of in (("median", 6.0, median), ("worst", 60.0, max)):
+        value = of(seconds) if seconds else None
+        met = None if value is None else value <= limit
+        found.append(Target(f"CPU time of a campaign, {word} [s]", value, len(seconds), f"<= {limit:g}", met))
+    return found
+
+
+def every(rows: Sequence[Row]) -> list[Row]:
+    return [{"value": r[f"holds_{name}"]} for r in rows for name in PARAMETERS]
+
+
+def values(rows: Sequence[Row], what: str, where: str = "") -> list[Row]:
+    """Return a column of every parameter, where it has a value; where: only those for which this column is true."""
+    return [{"value": r[f"{what}_{name}"]} for r in rows for name in PARAMETERS
+            if r[f"{what}_{name}"] is not None and (not where or r[f"{where}_{name}"])]  # fmt: skip
+
+
+def trusted(rows: Sequence[Row]) -> list[Row]:
+    return values(rows, "off", "trusted")
+
+
+def is_true(value: Row) -> bool:
+    return bool(value["value"])
+
+
+def is_held(value: Row) -> bool:
+    return value["value"] is not None
+
+
+def is_off(value: Row) -> bool:
+    return abs(value["value"]) > OFF
+
+
+def is_at_noise(row: Mapping[Any, Any]) -> bool:
+    return bool(row["after_over_floor"] <= AT_NOISE)
+
+
+def by_kind(frame: DataFrame) -> tables.Table:
+    lines = []
+    for kind, part in frame[frame["fault"] != ""].groupby("fault"):
+        rows = part.to_dict("records")
+        held = [bool(v["value"]) for v in values(rows, "given")]
+        lines.append({"kind": kind, "n": len(part), "moves": part["moves"].median(),
+                      "large": (part["moves"] > MOVES).sum(), "seen": part["seen"].mean(),
+                      "wrong": (part["wrong"] != "").mean(),
+                      "holds": sum(held) / len(held) if held else None, "n_held": len(held),
+                      "after": part["after_over_floor"].median()})  # fmt: skip
+    show: Show = {"kind": "kind", "n": ("n", ".0f"), "moves": ("moves its record, median [noise]", ".3g"),
+            "large": (f"more than {MOVES:g}", ".0f"), "seen": ("seen [%]", "%"),
+            "wrong": ("physical name claimed [%]", "%"), "holds": ("interval holds the truth [%]", "%"),
+            "n_held": ("of", ".0f"), "after": ("held-out error/noise", ".3g")}  # fmt: skip
+    return tables.Table("faults", "Faults of one record", BY_KIND, DataFrame(lines, columns=list(show)), show)
+
+
+def by_family(frame: DataFrame) -> tables.Table:
+    lines = [
+        {"family": name, "n": len(part), "withdrawn": part["withdrawn"].mean(), "median": part["cpu_seconds"].median(),
+         "most": part["cpu_seconds"].max()} for name, part in frame.groupby("family", sort=False)
+    ]  # fmt: skip
+    show: Show = {"family": "family", "n": ("n", ".0f"), "withdrawn": ("withdrawn [%]", "%"),
+            "median": ("CPU median [s]", ".3g"), "most": ("CPU most [s]", ".3g")}  # fmt: skip
+    return tables.Table("by_family", "Families", BY_FAMILY, DataFrame(lines), show)
+
+
+def misses(frame: DataFrame) -> tables.Table:
+    lines = [{**row, "why": "; ".join(why)} for row in frame.to_dict("records") if (why := faults_found(row))]
+    show: Show = {"campaign": "campaign", "family": "family", "why": "why", "truth": "effects", "fault": "fault",
+            "record": "record", "size": ("size", ".3g"), "moves": ("moves [noise]", ".3g"),
+            "constants": "constants off", "dirt": "dirt", "verdict": "verdict",
+            "said": "said", "suspects": "suspects"}  # fmt: skip
+    return tables.Table("misses", "Misses", MISSES, DataFrame(lines, columns=list(show)), show)
+
+
+def faults_found(row: Mapping[Any, Any]) -> list[str]:
+    """Return in words what of a campaign speaks against a target."""
+    family = row["family"]
+    outside = [n for n in PARAMETERS if row[f"given_{n}" if not row["constants"] else f"holds_{n}"] is False]
+    off = [n for n in PARAMETERS if row[f"trusted_{n}"] and abs(row[f"off_{n}"]) > OFF]
+    said = {
+        "not seen": family == "fault" and row["moves"] > MOVES and not row["seen"],
+        f"claimed {row['wrong']}": bool(row["wrong"]),
+        "not all named": not row["all_named"],
+        f"outside: {', '.join(outside)}": bool(outside),
+        f"trusted and off: {', '.join(off)}": bool(off),
+        "accused": family == "control" and row["accused"],
+        "unexplained": family == "control" and row["verdict"] == "unexplained",
+        "held-out above the noise": family == "constant" and not is_at_noise(row),
+        "withdrawn": row["withdrawn"],
+        "worse than declared": row["worse"],
+    }
+    return [words for words, holds in said.items() if holds]

@@ -1,0 +1,145 @@
+"""Close the loop on the measured machines, one command each without a hint, and print one table.
+
+    python studies/measured/run.py --data FOLDER --out DIR
+
+FOLDER holds a folder for each machine, as named below; a machine whose files are not there is named and left out. DIR
+gets campaigns, reports and table.md. A report that DIR holds already is not made again: delete it to run it again.
+"""
+
+import argparse
+import json
+import math
+import resource
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+DEG = 180.0 / math.pi
+Report = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """Hold one line of the table.
+
+    machine: folder of its maker, and of its data. options: of the maker. plant: attribute of the folder's plant.py.
+    role, unit, factor: which rmse is shown, of every record of the role, and in which unit.
+    published: what others reached on the same records, in that unit.
+    """
+
+    name: str
+    machine: str
+    judged: str
+    role: str
+    unit: str
+    factor: float
+    published: str
+    options: tuple[str, ...] = ()
+    plant: str = ""
+
+
+CASES = (
+    Case("emps", "emps", "velocity held out", "holdout", "mm/s", 1e3, "4.45 (a direct fit)"),
+    Case("dfki", "dfki_simple_pendulum", "speed, both records fitted", "train", "rad/s", 1.0, "0.18 (a direct fit)"),
+    *(Case(f"dfki_without_{record}", "dfki_simple_pendulum", f"speed, {record} held out", "holdout", "rad/s", 1.0, "",
+           ("--holdout", record)) for record in ("direct_collocation", "ddp")),
+    Case("quarter_drone", "quarter_drone", "angle held out: multisine, steps, swept sine", "holdout", "deg", DEG,
+         "grey box 2.16, 4.08, 3.18; best Neural ODE 1.55, 4.00, 2.56", plant="quarter_drone"),
+    Case("quanser_flexible_link", "quanser_flexible_link", "held out: hub angle, deflection", "holdout", "deg", DEG,
+         "1.2, 0.18 (a direct fit)"),
+)  # fmt: skip
+HEADING = ("| machine | judged | unit | declared | after | published or found elsewhere | named | verdict | CPU, s |",
+           "|---|---|---|---|---|---|---|---|---|")  # fmt: skip
+
+
+def closed(case: Case, data: Path, out: Path) -> tuple[Report, float]:
+    """Make the campaign, close the loop, and return its report with the processor time [s]; stored ones are read."""
+    campaign, result = out / "campaigns" / case.name, out / case.name
+    cost = result / "cpu_s.txt"
+    if not cost.is_file():
+        if not campaign.is_dir():
+            call(str(HERE / case.machine / "make_campaign.py"), "--data", str(data / case.machine), "--out",
+                 str(campaign), *case.options)  # fmt: skip
+        plugin = ("--plugin", f"{HERE / case.machine / 'plant.py'}:{case.plant}") if case.plant else ()
+        before = spent()
+        call("-m", "armid", "close-loop", str(campaign), "--out", str(result), *plugin)
+        cost.write_text(f"{spent() - before:.0f}\n", encoding="utf-8")
+    return json.loads((result / "report.json").read_text(encoding="utf-8")), float(cost.read_text(encoding="utf-8"))
+
+
+def call(*words: str) -> None:
+    """Run Python with some words; a failure ends the program."""
+    done = subprocess.run([sys.executable, *words], stdout=subprocess.DEVNULL, check=False)
+    if done.returncode:
+        sys.exit(f"run.py: python {' '.join(words)} ended with {done.returncode}")
+
+
+def spent() -> float:
+    """Return the processor time of all programs that were run [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def row(case: Case, report: Report, cpu: float, roles: Mapping[str, str]) -> str:
+    """Return one line of the table."""
+    shown = [" ".join(f"{value * case.factor:.3g}" for value in errors_of(report, case, when, roles)) for when in
+             ("before", "after")]  # fmt: skip
+    named = [
+        " or ".join((s["effect"], *s["alternatives"])) + ("" if s.get("claimed", True) else " (candidate)")
+        for s in report["steps"]
+        if s["effect"] in report["effects"]
+    ]
+    return (f"| {case.name} | {case.judged} | {case.unit} | {' | '.join(shown)} | {case.published} | "
+            f"{'; '.join(named) or 'nothing'} | {report['verdict']} | {cpu:.0f} |")  # fmt: skip
+
+
+def errors_of(report: Report, case: Case, when: str, roles: Mapping[str, str]) -> Iterator[float]:
+    """Yield the rmse (SI) of each output of each record of the role; of several train records of all together."""
+    error = report["error"][when]
+    if case.role == "train":
+        yield error["train"]["rmse"]
+        return
+    for file, of_record in error["records"].items():
+        if roles[file] == case.role:
+            yield from (each["rmse"] for each in of_record.get("outputs", {"": of_record}).values())
+
+
+def roles_of(campaign: Path) -> dict[str, str]:
+    """Return file -> role of a campaign."""
+    sheet = tomllib.loads((campaign / "campaign.toml").read_text(encoding="utf-8"))
+    return {entry["file"]: entry["role"] for entry in sheet["records"]}
+
+
+def table(data: Path, out: Path, only: Sequence[str], told: Callable[[str], None]) -> list[str]:
+    """Return the lines of the table, as far as the data is there; only: names of lines, none for all."""
+    lines = list(HEADING)
+    for case in (c for c in CASES if not only or c.name in only):
+        if not (data / case.machine).is_dir():
+            told(f"{case.name}: {data / case.machine} is not there, left out")
+            continue
+        told(f"{case.name}: closing the loop")
+        report, cpu = closed(case, data, out)
+        lines.append(row(case, report, cpu, roles_of(out / "campaigns" / case.name)))
+    return lines
+
+
+def main() -> None:
+    """Print the table and write it to table.md."""
+    parser = argparse.ArgumentParser(description="Close the loop on the measured machines.", allow_abbrev=False)
+    parser.add_argument("--data", type=Path, required=True, help="holds a folder for each machine")
+    parser.add_argument("--out", type=Path, required=True, help="campaigns, reports, table.md")
+    parser.add_argument("--only", nargs="+", default=(), choices=[c.name for c in CASES], help="lines of the table")
+    options = parser.parse_args()
+    lines = table(options.data, options.out, options.only, lambda said: print(said, file=sys.stderr, flush=True))
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / "table.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    print("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()

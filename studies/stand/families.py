@@ -1,0 +1,200 @@
+"""Make campaigns as real ones are: one record that differs, constants that are off, broken samples, sets of effects.
+
+    python studies/stand/families.py OUT_FOLDER --seed 1 --suite studies/blind.toml fault=200 constant=100 constants=100
+
+The truth lies in OUT_FOLDER.key.json, in the form of a blind suite: `class` is the family, `fault` tells the record and
+what was done to it, `constants` by how much they are off. Sizes are drawn; all of them are estimates of what happens.
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from copy import deepcopy
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import numpy as np
+
+from stand import RefusalError
+from stand.arm import Arm
+from stand.blind.campaign import (
+    SUITE,
+    Entry,
+    _pooled,
+    _record,
+    _told,
+    campaign_text,
+    key_path,
+    make_as_told,
+    measure_stroke,
+    suite_parser,
+    write_campaigns,
+)
+from stand.blind.draw import Drawn, _arm, _run, six_strokes
+from stand.blind.suite import Case, Suite, _signed, read_suite
+from stand.campaign import record_text
+from stand.gyro import Gyro
+from stand.motion import Motion
+
+FAULTS = ("late", "start", "offset", "drift", "gain", "label", "clipped", "gap", "spikes", "stuck")
+DIRT = ("none", "jitter", "hum", "gap")
+FIXED = ("p0", "k", "eta3", "n", "travel")
+# Sets of three effects of different ports, which are told apart on six strokes.
+THREE = (
+    ("coulomb", "flux_saturation", "tachometer_lag"), ("viscous", "gas_heat_loss", "tilt"),
+    ("quadratic_drag", "supply_sag", "controller_delay"), ("shell_rocking", "brush_drop", "gas_heat_loss"),
+    ("stribeck", "flux_saturation", "gyro_lag"),
+)  # fmt: skip
+FAMILIES = ("control", "fault", "constant", "constants", "two", "three")
+
+
+def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, bytes], Entry]:
+    """Make the files of one campaign of a family, and its entry in the key."""
+    family, index = case
+    rng = np.random.default_rng([seed, FAMILIES.index(family), index])
+    sets = {"two": suite.pairs, "three": THREE}.get(family, ((),))
+    planted = tuple(_signed(suite.kind(name), len(suite.kind(name).sizes), rng) for name in sets[index % len(sets)])
+    truth = Case(index, family, planted, bool(index % 2))
+    gyro = Gyro(round(float(rng.uniform(*suite.noise_deg_s)), 4), 0.001, suite.bandwidth_hz if index % 2 else 0.0)
+    fault = {"kind": FAULTS[index // 2 % len(FAULTS)]} if family == "fault" else {}
+    while True:
+        arm, off = off_constants(_arm(suite, rng), family, rng)
+        strokes, duration = six_strokes(rng), round(float(rng.uniform(*suite.duration_s)), 2)
+        place = int(rng.integers(len(strokes)))
+        moved = [differing(m, fault, rng) if i == place else m for i, (m, _) in enumerate(strokes)]
+        found = [_run(Motion(arm, m, truth.effects()), duration) for m in moved]
+        told = _run(Motion(arm, strokes[place][0], truth.effects()), duration)
+        if told is not None and all(found):
+            break
+    drawn = Drawn(arm, strokes, duration, gyro, tuple(f for f in found if f is not None))
+    rest = round(suite.rest_s * 1000)
+    measured = [measure_stroke(drawn, i, truth.effects(), rest, rng) for i in range(len(strokes))]
+    dirt = DIRT[index // 2 % len(DIRT)] if family == "control" else "none"
+    files = {"campaign.toml": campaign_text(f"{family} {index}", drawn, measured, ())}
+    for i, each in enumerate(measured):
+        table = np.column_stack([each.record.time_s, each.record.speed_deg_s])
+        if i == place and fault:
+            fault |= {"record": each.record.file, "role": each.record.role}
+            shown, real = (np.degrees(t.gyro) for t in (told, drawn.trajectories[i]))
+            clean = np.concatenate([np.zeros(rest), real])
+            there = broken(np.column_stack([table[:, 0], clean]), clean, dict(fault), deepcopy(rng))
+            change = np.interp(table[rest:, 0], *there.T) - shown
+            table = broken(table, clean, fault, rng)
+            fault["moves"] = float(np.sqrt(np.mean(change**2))) / gyro.noise_deg_s
+        if dirt != "none":
+            table = dirtied(table, dirt, rng)
+        record = replace(each.record, time_s=table[:, 0], speed_deg_s=table[:, 1])
+        text = record_text(record, gyro.decimals)
+        files[each.record.file] = text if dirt != "jitter" else jittered(table)
+    floor = {role: _pooled([m.noise for m in measured if m.record.role == role]) for role in ("train", "holdout")}
+    entry = {
+        "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
+        "effects": [_told(p, None, None) for p in planted], "noise": {"kind": "coloured" if index % 2 else "white"},
+        "floor": floor, "records": [_record(m, 0.0) for m in measured], "declared_fit": None, "fault": fault,
+        "constants": off, "dirt": dirt,
+    }  # fmt: skip
+    return {file: text.encode() for file, text in files.items()}, entry
+
+
+def off_constants(arm: Arm, family: str, rng: np.random.Generator) -> tuple[Arm, dict[str, float]]:
+    """Return the arm with one constant, or with all, off by 2 to 5 %; and by how much."""
+    if not family.startswith("constant"):
+        return arm, {}
+    plain = [name for name, value in vars(arm).items() if isinstance(value, float) and name not in FIXED]
+    names = [*plain, *(f"{load}.{part}" for load in ("loaded", "empty") for part in ("mass", "lever", "inertia"))]
+    chosen = names if family == "constants" else [names[int(rng.integers(len(names)))]]
+    off = {name: float(rng.uniform(0.02, 0.05) * rng.choice([-1.0, 1.0])) for name in chosen}
+    for name, share in off.items():
+        load, dot, part = name.partition(".")
+        if dot:
+            old = getattr(arm, load)
+            arm = replace(arm, **{load: replace(old, **{part: getattr(old, part) * (1.0 + share)})})
+        else:
+            arm = replace(arm, **{name: getattr(arm, name) * (1.0 + share)})
+    return arm, off
+
+
+def differing(manoeuvre: Any, fault: dict[str, Any], rng: np.random.Generator) -> Any:
+    """Return what the arm really did in the record at fault, where that is not what was told."""
+    if fault.get("kind") == "start":
+        fault["size"] = float(rng.uniform(0.5, 2.0) * rng.choice([-1.0, 1.0]))
+        return replace(manoeuvre, start_deg=manoeuvre.start_deg + fault["size"])
+    return replace(manoeuvre, shell=not manoeuvre.shell) if fault.get("kind") == "label" else manoeuvre
+
+
+def broken(table: Any, clean: Any, fault: dict[str, Any], rng: np.random.Generator) -> Any:
+    """Return the samples of the record at fault, times [s] and speeds [deg/s]; clean: the speeds without noise."""
+    kind, time, speed = fault["kind"], table[:, 0], table[:, 1].copy()
+    sign, moving = float(rng.choice([-1.0, 1.0])), np.flatnonzero(time >= 0.0)
+    first = int(rng.integers(moving[0], moving[len(moving) * 3 // 4]))
+    if kind == "late":
+        fault["size"] = sign * float(rng.uniform(0.002, 0.01))
+        speed += np.interp(time - fault["size"], time, clean) - clean
+    elif kind in ("offset", "drift"):
+        fault["size"] = sign * float(rng.uniform(0.5, 2.0))
+        speed += fault["size"] * (1.0 if kind == "offset" else np.maximum(time, 0.0))
+    elif kind == "gain":
+        fault["size"] = sign * float(rng.uniform(0.01, 0.04))
+        speed *= 1.0 + fault["size"]
+    elif kind == "clipped":
+        fault["size"] = float(rng.uniform(0.6, 0.9)) * float(np.abs(speed).max())
+        speed = np.clip(speed, -fault["size"], fault["size"])
+    elif kind == "spikes":
+        places = rng.choice(moving, int(rng.integers(3, 12)), replace=False)
+        speed[places] += rng.uniform(20.0, 120.0, len(places)) * rng.choice([-1.0, 1.0], len(places))
+        fault["size"] = len(places)
+    elif kind == "stuck":
+        fault["size"] = int(rng.integers(20, 80))
+        speed[first : first + fault["size"]] = speed[first]
+    elif kind == "gap":
+        fault["size"] = int(rng.integers(30, 120))
+        return np.delete(np.column_stack([time, speed]), slice(first, first + fault["size"]), axis=0)
+    return np.column_stack([time, speed])
+
+
+def dirtied(table: Any, dirt: str, rng: np.random.Generator) -> Any:
+    """Return samples of a sound record as bad cables and clocks make them."""
+    time, speed = table[:, 0].copy(), table[:, 1].copy()
+    if dirt == "hum":
+        speed += 0.15 * np.sin(2.0 * math.pi * (50.0 * time + rng.random()))
+    if dirt == "gap":
+        lost = rng.choice(len(time), 15, replace=False)
+        return np.delete(table, lost, axis=0)
+    return np.column_stack([time + (rng.normal(0.0, 2e-5, len(time)) if dirt == "jitter" else 0.0), speed])
+
+
+def jittered(table: Any) -> str:
+    lines = [f"{t:.6f},{v:.3f}" for t, v in table]
+    return "\n".join(["time_s,angular_velocity_deg_s", *lines, ""])
+
+
+def main(words: Sequence[str]) -> int:
+    """Make the campaigns of some families as the command line says; give the exit code, 2 when refused."""
+    parser = suite_parser("families.py", "Make campaigns as real ones are.", SUITE)
+    parser.add_argument("families", nargs="+", metavar="FAMILY=N", help=", ".join(FAMILIES))
+    return make_as_told(_make_families, words, parser)
+
+
+def _make_families(options: argparse.Namespace) -> str:
+    wanted = [_counted(text) for text in options.families]
+    # In turn, so that a study that is cut short has seen all families alike.
+    parts = [((index + 0.5) / count, family, index) for family, count in wanted for index in range(count)]
+    named = {f"c{place:03d}": (family, index) for place, (_, family, index) in enumerate(sorted(parts))}
+    making = partial(make, read_suite(options.suite), options.seed)
+    write_campaigns(options.folder, named, making, {"seed": options.seed}, options.processes)
+    return f"{options.folder}: {len(named)} campaigns, SYNTHETIC; key: {key_path(options.folder)}"
+
+
+def _counted(text: str) -> tuple[str, int]:
+    family, _, count = text.partition("=")
+    if family not in FAMILIES or not count.isdecimal():
+        raise RefusalError(f"{text!r} is no FAMILY=N: one of {', '.join(FAMILIES)} with a whole number is expected")
+    return family, int(count)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

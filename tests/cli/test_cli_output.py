@@ -1,0 +1,194 @@
+"""What every command prints: tables that fit, one JSON object, nothing, and whether all is well."""
+
+import json
+import logging
+from threading import Thread
+
+import pytest
+from click.testing import CliRunner
+
+from armid.cli.main import app
+from armid.cli.options import command
+from armid.report import files, html, style
+from armid.report.document import Column, Struck, Table, table
+from armid.report.terminal import print_table
+
+QUICK = ("--budget", "80", "--window", "0:0.4")
+# A call of each command that needs no long work; OUT stands for a new folder, CAMPAIGN for a campaign of two records.
+CALLS = (
+    "simulate CAMPAIGN --out OUT",
+    "identify CAMPAIGN --budget 80",
+    "identify CAMPAIGN --paper --budget 80",
+    "identifiability CAMPAIGN",
+    "list identifiers",
+    "list effects --long",
+    "list fitness",
+    "list plants",
+    "list analyses",
+    "check CAMPAIGN",
+    "check CAMPAIGN --time-limit 5",
+    "doctor",
+    "new effect my_drag --out OUT",
+    "new campaign my_axis --out OUT",
+)
+SLOW = ("report STUDY", "export ioh STUDY OUT", "close-loop CAMPAIGN --out OUT --candidates viscous")  # fmt: skip
+WIDE = table(
+    "Wide", ["name", Column("a", "largest median error", ".3g"), Column("b", "worst", ".3g"), "note", "last"],
+    [("a long name of an identifier, with options", 4.32e-6, 1.24e-5, Struck("3.1 to 3.2"), "x" * 30)] * 2, name="wide",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A small study that was run."""
+    folder = tmp_path_factory.mktemp("study")
+    text = """
+name = "small"
+question = "Which is nearer?"
+plant = "shell_transfer_arm"
+report = "table1"
+seeds = 1
+budget = 40
+windows_s = [[0.0, 0.3]]
+bounds = { p0 = [2.6e6, 3.5e6], k = [0.6, 1.1], eta3 = [0.45, 0.70], n = [0.9, 1.5] }
+[[identifiers]]
+name = "pso"
+label = "pso, the literal limit of the paper"
+[[identifiers]]
+name = "de"
+[[cases]]
+name = "row 1"
+truth = { p0 = 3.20e6, k = 1.00, eta3 = 0.62, n = 1.00 }
+published = { p0 = 3.2114e6, k = 1.0026, eta3 = 0.6213, n = 1.0124 }
+manoeuvres = [{ start_angle_deg = -48.0, target_angle_deg = 22.0, shell = true, supply_V = 28.0, duration_s = 0.3 }]
+"""
+    (folder / "small.toml").write_text(text, encoding="utf-8")
+    ran = CliRunner().invoke(app, ["study", str(folder / "small.toml"), "--jobs", "1", "--out", str(folder / "out")])
+    assert ran.exit_code == 0, ran.output
+    return folder / "out"
+
+
+def not_drawn(figure, *paths):
+    """Take the place of what turns a figure into SVG or files."""
+    style.pyplot().close(figure)
+    for path in paths:
+        path.write_text("<svg/>")
+    return "<svg/>"
+
+
+@pytest.fixture
+def called(run, small_folder, study, tmp_path, monkeypatch):
+    """Return a function that runs each call with more words, no figure drawn: (its words, what it left)."""
+    for module, name in ((files, "save"), (style, "save"), (html, "svg_text")):
+        monkeypatch.setattr(module, name, not_drawn)
+
+    def all_of(lines, *more):
+        for i, line in enumerate(lines):
+            words = [
+                {"CAMPAIGN": small_folder, "STUDY": study, "OUT": tmp_path / f"{i}{more}"}.get(w, w)
+                for w in line.split()
+            ]
+            yield line, run(*words, *more)
+
+    return all_of
+
+
+@pytest.mark.parametrize(("width", "lines"), [
+    (80, CALLS), (120, CALLS[1:4]), pytest.param(80, SLOW, marks=pytest.mark.slow),
+])  # fmt: skip
+def test_no_table_is_wider_than_the_screen_and_nothing_in_it_is_cut(called, monkeypatch, width, lines):
+    monkeypatch.setenv("COLUMNS", str(width))
+    for line, ran in called(lines):
+        assert (ran.code, ran.err) == (0, ""), line
+        assert "…" not in ran.out, line
+        drawn = [text for text in ran.out.splitlines() if text[:1] in "┏┃┡│└┌"]
+        assert max(map(len, drawn), default=0) <= width, line
+
+
+@pytest.mark.parametrize("width", [20, 40, 60, 80, 120, 300])
+def test_a_number_is_whole_or_not_there(width):
+    from rich.console import Console
+
+    console = Console(width=width, record=True)
+    print_table(WIDE, console)
+    text = console.export_text()
+    assert "…" not in text
+    assert ("4.32e-06" in text) or width < 60
+    assert ("x" * 30 in text) == (width >= 120) == ("in wide.csv" not in text)
+    empty = Table("", "Empty", "", [], (Column("a", "a"), Column("b", "b", ".1f")))
+    print_table(empty, console)
+
+
+@pytest.mark.parametrize("lines", [CALLS, pytest.param(SLOW, marks=pytest.mark.slow)])
+def test_json_is_one_object_and_quiet_prints_nothing(called, lines):
+    for line, ran in called(lines, "--json"):
+        assert ran.code == 0, line
+        assert isinstance(json.loads(ran.out), dict), line
+    for line, ran in called(lines, "--quiet"):
+        assert (ran.code, bool(ran.out)) == (0, line.startswith("list")), line
+
+
+@pytest.mark.slow
+def test_the_answer_comes_first_and_is_that_of_the_page(run, study, small_folder, tmp_path):
+    for i, words in enumerate((("identify", small_folder, *QUICK), ("identifiability", small_folder))):
+        out = tmp_path / str(i)
+        first = run(*words, "--out", out).out.splitlines()[0]
+        again = run("report", out)
+        assert again.out.splitlines()[0] == first
+        pages = [path.read_text(encoding="utf-8") for path in out.iterdir() if path.suffix in (".md", ".html")]
+        assert len(pages) == 2
+        assert all(first in page for page in pages)
+    ran = run("study", study.parent / "small.toml", "--jobs", "1", "--out", study)
+    assert ran.out.splitlines()[0].partition(":")[0] in ("Yes, reproduced and beaten", "Reproduced, not beaten", "No",
+                                                         "Not reproduced by its own method, but beaten")  # fmt: skip
+    assert run("report", study).out.splitlines()[0] == ran.out.splitlines()[0]
+
+
+def test_a_point_that_takes_too_long_ends_the_check(run, tmp_path):
+    (tmp_path / "slow.py").write_text(
+        "import time\n\n\ndef slow(measured, simulated):\n    time.sleep(5.0)\n    return simulated[:, 0]\n"
+    )
+    ran = run("check", f"{tmp_path}/slow.py:slow", "--time-limit", "0.3")
+    assert ran.code == 1
+    assert "FAIL time limit: point 1 takes longer than 0.3 s" in ran.out
+
+
+def test_what_takes_long_is_announced_in_a_pipe_too(capsys):
+    log = logging.getLogger("armid")
+
+    @command("slow")
+    def slow():
+        thread = Thread(target=log.info, args=("compiling it",))
+        thread.start()
+        thread.join()
+
+    log.setLevel(logging.INFO)
+    for words, told in (([], "armid: compiling it\n"), (["--json"], "armid: compiling it\n"), (["--quiet"], "")):
+        slow.main(words, standalone_mode=False)
+        assert capsys.readouterr() == ("", told)
+
+
+def test_the_doctor_tells_what_is_wrong(run, monkeypatch, tmp_path):
+    assert "6 of 6 points hold" in run("doctor").out
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path / "file"))
+    ran = run("doctor")
+    assert ran.code == 1
+    assert "FAIL cache: " in ran.out
+
+
+def test_an_effect_is_tried_on_one_plant(refused, mine):
+    words = ("check", f"{mine}:cubic_drag")
+    assert "--on 'driven_axs' is no plant: did you mean 'driven_axis'?" in refused(*words, "--on", "driven_axs")
+    assert "--time-limit is 0" in refused(*words, "--time-limit", "0")
+
+
+def test_options_of_every_identifier_have_a_meaning(run):
+    told = json.loads(run("list", "identifiers", "--json").out)["identifiers"]
+    said = run("list", "identifiers", "--long").out
+    for name, identifier in told.items():
+        assert identifier["note"], name
+        for option, about in identifier["options"].items():
+            assert about["meaning"], (name, option)
+            assert f"--option {option}=" in said
+    assert told["pso"]["options"]["velocity_limit"]["default"] == "literal"

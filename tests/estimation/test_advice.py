@@ -1,0 +1,250 @@
+"""Advice on the next record: chances against brute force, and records that were then made."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from armid.engine import Calibration, Schedule, simulate
+from armid.errors import ArmidError
+from armid.estimation.advice import (
+    OFTEN,
+    THRESHOLD,
+    Advice,
+    Prediction,
+    Rival,
+    advice_of,
+    advise,
+    chance,
+    normal_draws,
+    outside,
+    simulate_refits,
+    spread_of,
+)
+from armid.estimation.design import Motions, manoeuvre_grid
+from armid.estimation.least_squares import LeastSquaresProblem, estimate, refine, weighted_records
+from armid.model import EFFECTS
+from armid.problem.problem import Replay
+from armid.problem.space import Space, space_of
+from armid.record import Noise, Piece, Record
+
+DEGREE = np.pi / 180.0
+NOISE = 0.5 * DEGREE
+APART = (0.3, 0.6, 0.8, 1.2)
+TRUTH = {"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4, "coulomb.level": 10.0, "viscous.slope": 5.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Linear(LeastSquaresProblem):
+    """Signals design @ z with noise of 1."""
+
+    design: np.ndarray
+    measured: np.ndarray
+
+    def signals(self, Z):
+        return Z @ self.design.T
+
+
+def linear_rivals(rng, apart):
+    """Return two linear rivals that fit 30 old samples about equally well, and their designs old and new.
+
+    apart: how far the two differ on a new record.
+    """
+    common = 60.0 * rng.normal(size=(30, 3))
+    old = [common, common + 0.1 * rng.normal(size=(30, 3))]
+    new = [20.0 * rng.normal(size=(25, 3)), apart * rng.normal(size=(25, 3))]
+    new[1] = new[0] + new[1]
+    seen = old[0] @ np.array([0.4, 0.5, 0.6]) + rng.normal(size=30)
+    space = Space(tuple("abc"), ("1",) * 3, np.zeros(3), np.ones(3), np.full(3, np.nan))
+    rivals = []
+    for name, design in zip("AB", old):
+        records = Linear((), space, design, seen)
+        z = np.linalg.lstsq(design, seen)[0]
+        rivals.append(Rival(name, records, z, float(records.chi2(z)[0])))
+    return rivals, old, new, seen
+
+
+def least(design, seen):
+    return float(np.sum((seen - design @ np.linalg.lstsq(design, seen)[0]) ** 2))
+
+
+def brute_force(rivals, old, new, seen, rng, n=1500):
+    """Return how often A wins by more than the threshold: draw its parameters and a new record, fit both again."""
+    right, wins = rivals[0], 0
+    for _ in range(n):
+        z = right.z + right.root @ rng.normal(size=3)
+        record = np.concatenate([seen, new[0] @ z + rng.normal(size=25)])
+        d = least(np.vstack([old[1], new[1]]), record) - least(np.vstack([old[0], new[0]]), record)
+        wins += d > THRESHOLD
+    return wins / n
+
+
+@pytest.mark.parametrize(("seed", "apart"), list(enumerate(APART)))
+def test_chances_of_linear_models_are_those_of_brute_force(seed, apart, monkeypatch):
+    rng = np.random.default_rng(seed)
+    rivals, old, new, seen = linear_rivals(rng, apart)
+    told = brute_force(rivals, old, new, seen, rng)
+    a, b = (Prediction(n @ r.z, n @ r.root) for n, r in zip(new, rivals))
+    ahead = rivals[1].criterion - rivals[0].criterion
+    forecast, _ = chance(a, b, ahead, normal_draws(7, 512), THRESHOLD)
+    assert forecast == pytest.approx(told, abs=0.05)
+    designs = dict(zip("AB", new))
+    monkeypatch.setattr("armid.estimation.advice.whitened_signals", lambda rival, *_: _[-1] @ designs[rival.name].T)
+    won, apart = simulate_refits(rivals, 0, None, None, normal_draws(3, 60), THRESHOLD)
+    assert won[0] == 1.0
+    assert won[1] == pytest.approx(told, abs=0.08)
+    assert apart[0] == 0.0 < apart[1]
+
+
+def test_these_chances_are_neither_all_nor_nothing():
+    told = []
+    for seed, apart in enumerate(APART):
+        rng = np.random.default_rng(seed)
+        told.append(brute_force(*linear_rivals(rng, apart), rng, n=200))
+    assert min(told) < 0.3
+    assert max(told) > 0.7
+    assert sum(0.1 < t < 0.9 for t in told) >= 2
+
+
+def test_a_draw_stays_in_the_box_where_its_mirror_does():
+    rng = np.random.default_rng(0)
+    (rival, _), *_ = linear_rivals(rng, 1.0)
+    held = replace(rival, z=np.array([0.0, 0.5, 0.5]))
+    for draw in normal_draws(3, 40):
+        assert held.drawn(draw)[0] >= 0.0
+    np.testing.assert_allclose(outside(np.array([[0.2, 1.0], [-0.1, 1.3]])), [0.0, 0.3])
+
+
+def test_a_side_that_the_box_cuts_off_does_not_count():
+    here, above, below = np.zeros(5), np.full((2, 5), 3.0), np.full((2, 5), -1.0)
+    spread = spread_of(here, above, below, np.array([0.5, 1.0]))
+    np.testing.assert_array_equal(spread[0], [2.0, 3.0])
+
+
+def candidate(model):
+    """Return the truth as a candidate of a model."""
+    return np.array([TRUTH.get(name, p.fixed) for name, p in model.parameters.items()])
+
+
+def made(model, manoeuvre, window, rng, file):
+    """Return the record that the truth gives, with noise."""
+    run = simulate(model, manoeuvre, candidate(model)[np.newaxis], Schedule(4))
+    measured = run.output[0] + NOISE * rng.normal(size=manoeuvre.n_samples)
+    piece = Piece(manoeuvre, measured, window)
+    noise = Noise(NOISE, 0.0, 0.0, 1.0, 1000, "rest")
+    return Record(file, "train", "rad/s", manoeuvre, measured, np.empty(0), noise, (piece,), (piece,))
+
+
+def fitted(name, model, records, start=None):
+    """Return a rival fitted to records."""
+    space = space_of(model)
+    ready = tuple(Replay(r, model, r.pieces, (Calibration(Schedule(2), 1e-6, True),)) for r in records)
+    x = estimate(ready, space) if start is None else refine(ready, space, start)
+    problem = weighted_records(ready, space)
+    return Rival(name, problem, problem.shares(x), float(problem.chi2(problem.shares(x))[0]))
+
+
+@pytest.fixture(scope="module")
+def models(arm):
+    return {name: arm + EFFECTS[name] for name in ("coulomb", "viscous")}
+
+
+@pytest.fixture(scope="module")
+def stroke(paper_arm):
+    """The manoeuvre of the lowering, 0.7 s of it."""
+    return paper_arm.train[0].pieces[0].manoeuvre.shortened(701)
+
+
+@pytest.fixture(scope="module")
+def rivals(models, stroke):
+    record = made(models["viscous"], stroke, slice(0, 701), np.random.default_rng(4), "lower.csv")
+    return [fitted(name, model, [record]) for name, model in models.items()]
+
+
+@pytest.mark.slow
+def test_advice_on_the_arm(rivals):
+    advice = advise(rivals, speed_limit=200.0 * DEGREE)
+    assert len(advice) >= 4
+    assert all(a.separates == ("coulomb", "viscous") for a in advice)
+    powers = [round(a.power, 2) for a in advice]
+    assert powers == sorted(powers, reverse=True)
+    assert all(0.0 <= a.power <= 1.0 for a in advice)
+    assert set(advice[0].manoeuvre) == {"start_angle_deg", "target_angle_deg", "shell", "supply_V"}
+    assert advice[0].words != "lower.csv once more"
+
+
+@pytest.fixture(scope="module")
+def some(rivals):
+    """Four manoeuvres of the grid."""
+    (replay,) = rivals[0].records.replays
+    return manoeuvre_grid(replay.model, [replay.record])[5::30]
+
+
+def test_a_louder_sensor_tells_less_apart(rivals, some):
+    (weight,) = rivals[0].records.weights
+    quiet = {a.words: a for a in advise(rivals, grid=some)}
+    again = {a.words: a for a in advise(rivals, lambda signals: weight * signals[0], some)}
+    assert again == quiet
+    # and where the residual is a misfit, the old records tell less, too
+    unsure = [replace(r, trust=0.05**2) for r in rivals]
+    for known in (rivals, unsure):
+        loud = {a.words: a for a in advise(known, lambda signals: 0.05 * weight * signals[0], some)}
+        assert len(loud) >= 2
+        for words, advice in loud.items():
+            assert advice.delta < quiet[words].delta
+            assert advice.power < quiet[words].power
+    assert np.all(unsure[0].root.diagonal() >= rivals[0].root.diagonal())
+
+
+def test_twins_cannot_be_told_apart(rivals, some):
+    twin = replace(rivals[1], name="twin")
+    for advice in advise([rivals[1], twin], grid=some):
+        assert advice.power < 0.05
+        assert advice.delta < 0.1
+    for advice in advise([*rivals, twin], grid=some):
+        assert not {"viscous", "twin"} <= set(advice.separates)
+
+
+def test_the_largest_set_that_is_told_apart_is_named(rivals):
+    three = [replace(rivals[0], name=n) for n in "xyz"]
+    (feasible, *_) = manoeuvre_grid(rivals[0].records.replays[0].model, [rivals[0].records.replays[0].record])
+    clear = {(0, 1): (0.9, 5.0), (0, 2): (0.7, 4.0), (1, 2): (0.8, 3.0)}
+    assert advice_of(three, feasible, clear).separates == ("x", "y", "z")
+    assert advice_of(three, feasible, clear).power == 0.7
+    partly = clear | {(0, 2): (OFTEN - 0.1, 1.0)}
+    told = advice_of(three, feasible, partly)
+    assert (told.separates, told.power, told.delta) == (("x", "y"), 0.9, 5.0)
+    hardly = {pair: (0.1 * sum(pair), 1.0) for pair in clear}
+    assert advice_of(three, feasible, hardly) == Advice(
+        dict(feasible.keys), feasible.name, ("y", "z"), pytest.approx(0.3), 1.0
+    )
+
+
+def test_one_model_has_no_rival(rivals):
+    with pytest.raises(ArmidError, match="1 model was given to be told apart from others: at least two"):
+        advise(rivals[:1])
+
+
+@pytest.mark.slow
+def test_the_advised_record_tells_apart_and_beats_a_random_one(models, stroke):
+    """One stroke leaves friction open. Make the advised record, and a random one, 8 times: fit both rivals again."""
+    rng = np.random.default_rng(7)
+    margins = {"advised": [], "random": []}
+    for turn in range(8):
+        right = ("coulomb", "viscous")[turn % 2]
+        old = made(models[right], stroke, slice(0, 701), rng, "lower.csv")
+        rivals = [fitted(name, model, [old]) for name, model in models.items()]
+        grid = manoeuvre_grid(models[right], [old])
+        best = advise(rivals, speed_limit=200.0 * DEGREE)[0]
+        motions = Motions(rivals[0].records.replays, rivals[0].candidate, 200.0 * DEGREE)
+        able = [f for f, _ in motions.signals(grid, rivals[0].candidate[np.newaxis])]
+        chosen = {"advised": next(f for f in grid if f.keys == best.manoeuvre), "random": able[rng.integers(len(able))]}
+        for how, feasible in chosen.items():
+            new = made(models[right], feasible.manoeuvre, feasible.window, rng, "new.csv")
+            again = {r.name: fitted(r.name, models[r.name], [old, new], r.records.values(r.z)) for r in rivals}
+            wrong = next(name for name in models if name != right)
+            margins[how].append(again[wrong].criterion - again[right].criterion)
+    won = {how: np.mean(np.array(values) > THRESHOLD) for how, values in margins.items()}
+    assert won["advised"] >= 0.8
+    assert won["advised"] >= won["random"]
+    assert np.median(margins["advised"]) > 2.0 * np.median(margins["random"])

@@ -1,0 +1,70 @@
+"""Constants within tolerances: the interval that they widen, products, and what is known up to a common factor."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from armid.errors import ArmidError
+from armid.estimation.constants import Product, columns_of, common_factors
+from armid.estimation.information import information_of
+from armid.model import PLANTS
+from armid.record.campaign import tolerances_of
+
+ARM = PLANTS["shell_transfer_arm"]
+
+
+class Linear:
+    """A problem whose signal is linear in two parameters."""
+
+    replays = ()
+    space = SimpleNamespace(free_names=("a", "b"), complete=lambda x: x)
+    span = np.array([2.0, 4.0])
+
+    def __init__(self, jacobian):
+        self.jacobian = jacobian
+
+    def values(self, z):
+        return z
+
+    def residual_and_slopes(self, z):
+        return np.zeros(len(self.jacobian)), self.jacobian
+
+
+def test_the_interval_counts_what_is_not_known_as_a_joint_estimate_does():
+    rng = np.random.default_rng(1)
+    jacobian, doubts = rng.normal(size=(50, 2)), rng.normal(size=(50, 3))
+    found = information_of(Linear(jacobian), np.array([0.5, 0.5]), None, doubts)
+    whole = np.hstack([jacobian, doubts])
+    joint = np.linalg.inv(whole.T @ whole + np.diag([0.0, 0.0, 1.0, 1.0, 1.0]))
+    assert found.deviation == pytest.approx(np.sqrt(np.diag(joint)[:2]) * Linear.span)
+    without = information_of(Linear(jacobian), np.array([0.5, 0.5]), None, columns_of((), 50))
+    assert (without.deviation < found.deviation).all()
+
+
+def test_what_is_known_up_to_a_common_factor_is_told():
+    rng = np.random.default_rng(2)
+    a, b, c, d = rng.normal(size=(4, 40))
+    slopes = np.column_stack([a, b, c])
+    mass = Product(("mass",), (1.0,), 0.02, -(a + b))
+    gain = Product(("gain", "drive"), (1.0, 1.0), 0.03, 2.0 * c)
+    told = common_factors(("p", "q", "r"), slopes, [mass, gain, Product(("other",), (1.0,), 0.02, d)])
+    assert told == (
+        "these records give p, q, mass up to a common factor",
+        "these records do not tell a change of r +1 %, gain*drive -0.5 %, made together",
+    )  # fmt: skip
+    assert gain.public == "constant:gain*drive"
+    assert common_factors(("p",), slopes[:, :1], [Product(("other",), (1.0,), 0.02, d)]) == ()
+
+
+def test_tolerances_of_a_campaign_of_a_plant_and_of_neither():
+    usual = tolerances_of({}, ARM, "campaign.toml")
+    assert usual["R"] == 0.02
+    assert not {"g", "theta_C", "shell", "U"} & set(usual)
+    assert tolerances_of({"default": 0.0}, ARM, "campaign.toml") == {}
+    told = tolerances_of({"default": 0.05, "R": 0.0, "g": 0.001}, ARM, "campaign.toml")
+    assert (told["K"], told["g"], "R" in told) == (0.05, 0.001, False)
+    assert tolerances_of({}, PLANTS["driven_axis"], "campaign.toml") == {}
+    assert set(tolerances_of({"default": 0.1}, PLANTS["driven_axis"], "")) == {"gain", "gravity_moment"}
+    with pytest.raises(ArmidError, match="tolerances: constant 'RR' is unknown, did you mean 'R'"):
+        tolerances_of({"RR": 0.1}, ARM, "campaign.toml")

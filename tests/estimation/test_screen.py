@@ -1,0 +1,305 @@
+"""Mistakes in campaigns are noticed, in words that name them; right campaigns are not accused."""
+
+import re
+import shutil
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armid.errors import ArmidError
+from armid.estimation.screen import screen
+from armid.problem.space import space_of
+from armid.record import read_campaign, write_table
+from armid.record.table import read_table
+
+SPEED = "angular_velocity_deg_s"
+TRAIN = ("lower.csv", "raise.csv", "short.csv", "empty.csv")
+ALL = (*TRAIN, "lower_low_voltage.csv", "raise_empty.csv")
+PENDULUM = """\
+name = "pendulum"
+plant = "driven_axis"
+constants.gravity_moment = 0.4
+[parameters.inertia]
+low = 0.02
+high = 0.2
+"""
+RECORD = '[[records]]\nfile = "{}"\nrole = "{}"\n'
+AXIS = ("slow.csv", "fast.csv", "other.csv")
+
+
+def change(column, function, *files):
+    """Return a mistake in a column of some files."""
+
+    def made(folder):
+        for file in files:
+            columns = dict(read_table(folder / file, file).columns)
+            columns[column] = function(columns[column])
+            write_table(folder / file, columns)
+
+    return made
+
+
+def header(old, new, *files):
+    def made(folder):
+        for file in files:
+            path = folder / file
+            path.write_text(path.read_text().replace(old, new, 1))
+
+    return made
+
+
+def toml(*pairs, more=""):
+    def made(folder):
+        path = folder / "campaign.toml"
+        text = path.read_text()
+        for old, new in pairs:
+            assert old in text
+            text = text.replace(old, new, 1)
+        path.write_text(text + more)
+
+    return made
+
+
+def exchange(a, b):
+    def made(folder):
+        (folder / a).rename(folder / "x")
+        (folder / b).rename(folder / a)
+        (folder / "x").rename(folder / b)
+
+    return made
+
+
+def copied(source, name, role, begin=-1.0, end=9.0, more=""):
+    """Return a mistake: a part of a recording under another name, as another record."""
+
+    def made(folder):
+        columns = read_table(folder / source, source).columns
+        times = columns["time_s"]
+        kept = (times >= begin) & (times <= end)
+        write_table(folder / name, {n: v[kept] for n, v in columns.items()})
+        text = (folder / "campaign.toml").read_text()
+        entry = next(e for e in text.split("[[records]]") if f'"{source}"' in e).strip()
+        entry = re.sub('role = "[a-z]+"', f'role = "{role}"', entry.replace(source, name))
+        (folder / "campaign.toml").write_text(f"{text}\n[[records]]\n{entry}\n{more}")
+
+    return made
+
+
+def late(seconds, *files):
+    return change("time_s", lambda t: np.round(t + seconds, 6), *files)
+
+
+def noise(*files):
+    return change(SPEED, lambda x: np.random.default_rng(5).normal(0, 20, x.size), *files)
+
+
+def pendulum(folder: Path, seed: int = 1, friction: float = 0.004) -> Path:
+    """Write a SYNTHETIC driven pendulum with friction that is not declared, by Runge-Kutta steps of its own."""
+    folder.mkdir()
+    (folder / "campaign.toml").write_text(
+        PENDULUM + "".join(RECORD.format(f, "train" if f != "other.csv" else "holdout") for f in AXIS)
+    )
+    rng, interval = np.random.default_rng(seed), 0.004
+    times = interval * np.arange(900)
+    for file, size, rate in zip(AXIS, (0.5, 0.35, 0.6), (2.0, 5.0, 3.1), strict=True):
+        drive, state, states = size * np.sin(rate * times) + 0.1, np.zeros(2), []
+        for now, after in zip(drive, np.append(drive[1:], drive[-1]), strict=True):
+            states.append(state)
+            state = step(state, now, after, interval, friction)
+        angle, speed = np.array(states).T
+        write_table(folder / file, {
+            "time_s": times, "angular_velocity_deg_s": np.rad2deg(speed) + rng.normal(0, 0.3, times.size),
+            "angle_deg": np.rad2deg(angle) + rng.normal(0, 0.05, times.size), "drive_N_m": drive,
+        })  # fmt: skip
+    return folder
+
+
+def step(state, now, after, interval, friction):
+    def rate(s, u):
+        return np.array([s[1], (u - 0.4 * np.sin(s[0]) - friction * s[1]) / 0.06])
+
+    k1 = rate(state, now)
+    k2 = rate(state + 0.5 * interval * k1, 0.5 * (now + after))
+    k3 = rate(state + 0.5 * interval * k2, 0.5 * (now + after))
+    k4 = rate(state + interval * k3, after)
+    return state + interval / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+def constant(text):
+    return toml(("gyro_range_deg_s = 200", f"gyro_range_deg_s = 200\nconstants = {{ {text} }}"))
+
+
+def bounds(text):
+    return toml(more=f"\n[parameters]\n{text}\n")
+
+
+NO_RANGE = toml(("gyro_range_deg_s = 200\n", ""))
+WINDOW, ONE = toml(("window_s = [0.0, 0.7]\n", "")), ("lower.csv",)
+# name of the mistake: campaign, what is done to it, words that must be said.
+MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
+    "all speeds inverted": ("arm", (change(SPEED, np.negative, *ALL),), r"every train record.*sign looks inverted"),
+    "one speed inverted": ("arm", (change(SPEED, np.negative, "raise.csv"),), r"raise\.csv.*sign looks inverted"),
+    "held-out inverted": ("arm", (change(SPEED, np.negative, ALL[5]),), r"raise_empty\.csv.*sign looks inverted"),
+    "only speed inverted": ("one", (change(SPEED, np.negative, *ONE),), "sign looks inverted"),
+    "rad under deg": ("arm", (change(SPEED, np.deg2rad, *ALL),), "every train record.*radians under a header in deg"),
+    "rad under deg once": ("arm", (change(SPEED, np.deg2rad, *ONE),), r"lower\.csv.*radians under a header in deg"),
+    "rad under deg alone": ("one", (change(SPEED, np.deg2rad, *ONE),), "radians under a header in degrees"),
+    "rad under deg held out": ("arm", (change(SPEED, np.deg2rad, ALL[4]),), r"lower_low_voltage\.csv.*radians under"),
+    "deg under rad": ("arm", (NO_RANGE, header("deg_s", "rad_s", *ALL)), "every train.*degrees under a header in rad"),
+    "deg under rad once": ("arm", (NO_RANGE, header("deg_s", "rad_s", "short.csv")), r"short\.csv.*degrees under"),
+    "tenfold": ("arm", (NO_RANGE, change(SPEED, lambda x: 10 * x, "raise.csv")), r"raise\.csv.*10 times too large"),
+    "rpm under deg/s": ("arm", (change(SPEED, lambda x: x / 6, *ALL),), "revolutions per minute"),
+    "gain of two": ("one", (NO_RANGE, change(SPEED, lambda x: 2 * x, *ONE)), "twice as large"),
+    "lower and raise": ("arm", (exchange(*TRAIN[:2]),), r"(lower|raise)\.csv.*look exchanged"),
+    "short and lower": ("arm", (exchange("short.csv", "lower.csv"),), "look exchanged"),
+    "short and raise": ("arm", (exchange("short.csv", "raise.csv"),), "look exchanged"),
+    "held-out exchanged": ("arm", (exchange(*ALL[4:]),), r"(lower_low_voltage|raise_empty)\.csv"),
+    "ms": ("arm", (change("time_s", lambda t: 1000 * t, *ALL),), "looks like milliseconds"),
+    "ms once": ("arm", (change("time_s", lambda t: 1000 * t, "short.csv"),), r"short\.csv.*looks like milliseconds"),
+    "ms alone": ("one", (WINDOW, change("time_s", lambda t: 1000 * t, *ONE)), "looks like milliseconds"),
+    "ten times too long": ("arm", (change("time_s", lambda t: 10 * t, *ALL),), "looks ten times too long"),
+    "once too long": ("arm", (change("time_s", lambda t: 10 * t, "raise.csv"),), r"raise\.csv.*ten times too long"),
+    "ten times too short": ("arm", (change("time_s", lambda t: t / 10, *ALL),), "looks ten times too short"),
+    "noise": ("arm", (noise("raise.csv"),), r"raise\.csv: the measured angular_velocity is noise"),
+    "noise alone": ("one", (noise(*ONE),), "the measured angular_velocity is noise"),
+    "noise held out": ("arm", (noise("raise_empty.csv"),), r"raise_empty\.csv: the measured angular_velocity is noise"),
+    "late": ("arm", (late(0.15, *ALL),), "clock looks 0.1[45].* s late"),
+    "late once": ("arm", (late(0.1, "raise.csv"),), r"raise\.csv.*clock looks 0\.(09|10|1).* late"),
+    "late alone": ("one", (late(0.15, *ONE),), "clock looks .* late"),
+    "early": ("arm", (late(-0.15, "raise.csv"),), r"raise\.csv.*(early|not at rest)"),
+    "empty for loaded": ("arm", (toml(("shell = true", "shell = false")),), r"lower\.csv.*shell looks wrong"),
+    "start is target": (
+        "arm", (toml(("-8.0", "-99"), ("start_angle_deg = -48.0\ntarget_angle_deg = -99",
+                                      "start_angle_deg = -8.0\ntarget_angle_deg = -48.0")),), r"short\.csv.*exchanged"),
+    "moving before the start": ("one", (late(-0.5, *ONE),), "not at rest before t = 0"),
+    "same record held out": ("arm", (copied("raise.csv", "again.csv", "holdout"),), "raise.*again.*same 1201 samples"),
+    "overlap": ("arm", (copied("raise.csv", "part.csv", "train", end=0.4),), r"raise.*part.*same 401 samples"),
+    "g < 0": ("arm", (constant("g = -9.81"),), "'g' is -9.81 m/s2, a value from 0 to 30"),
+    "efficiency of 5": ("arm", (constant("eta1 = 5.0"),), "'eta1' is 5 1, a value from 0 to 1"),
+    "percent": ("arm", (constant("eta2 = 97.0"),), "'eta2' is 97"),
+    "mm": ("arm", (constant("L_loaded = 580.0"),), "'L_loaded' is 580 m"),
+    "grams": ("arm", (constant("m_loaded = 118000.0"),), "'m_loaded' is 118000 kg"),
+    "deg for rad": ("arm", (constant("alpha = 5.0"),), "'alpha' is 5 rad"),
+    "litres": ("arm", (constant("V0 = 0.4"),), "'V0' is 0.4 m3"),
+    "milliohm": ("arm", (constant("R = 400.0"),), "'R' is 400 ohm"),
+    "MPa": ("arm", (bounds("p0 = { low = 2.6, high = 3.5 }"),), "p0: 2.6 to 3.5 is far outside the declared range"),
+    "MPa, fixed": ("arm", (bounds("p0 = { fixed = 3.05 }"),), "p0: 3.05 is far outside"),
+    "percent, bounds": ("arm", (bounds("eta3 = { low = 45, high = 70 }"),), "eta3: 45 to 70 is far outside"),
+    "drive inverted": ("axis", (change("drive_N_m", np.negative, *AXIS),), "'u'.*sign looks inverted"),
+    "drive inverted once": ("axis", (change("drive_N_m", np.negative, "fast.csv"),), r"fast\.csv.*'u'.*sign"),
+    "drive in mN m": ("axis", (change("drive_N_m", lambda u: 1000 * u, *AXIS),), "'u'.*1,000 times too large"),
+    "axis: speed inverted": ("axis", (change(SPEED, np.negative, *AXIS),), "angle_deg moves -1 times"),
+    "axis: rad under deg": ("axis", (change(SPEED, np.deg2rad, *AXIS),), r"angle_deg moves 57\.\d times"),
+    "axis: angle in rad": ("axis", (change("angle_deg", np.deg2rad, "slow.csv"),), r"slow.*moves 0\.017\d times"),
+    "axis: ms": ("axis", (change("time_s", lambda t: 1000 * t, *AXIS),), "every train record: time_s looks like milli"),
+    "axis: drive late": ("axis", (change("drive_N_m", lambda u: np.roll(u, -30), "fast.csv"),), r"fast\.csv.*late"),
+    "axis: held out": ("axis", (change("drive_N_m", np.negative, "other.csv"),), r"other\.csv.*'u'.*sign"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def campaign(root: Path, tmp_path: Path) -> Callable[[str], Path]:
+    """Return a function that makes a fresh copy of a campaign: arm, one (a single record), axis."""
+
+    def made(kind: str) -> Path:
+        if kind == "axis":
+            return pendulum(tmp_path / "axis")
+        folder = tmp_path / kind
+        folder.mkdir()
+        source = root / "studies" / "campaigns" / {"arm": "four_strokes", "one": "one_stroke"}[kind]
+        for path in source.iterdir():
+            (folder / path.name).write_bytes(path.read_bytes())
+        return folder
+
+    return made
+
+
+def said_of(folder: Path) -> list[str]:
+    """Return every sentence that reading and screening a campaign gives."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            read = read_campaign(folder)
+        except ArmidError as error:
+            return [str(error)]
+    model = read.model()
+    found = screen(read, model, space_of(model, read.parameters))
+    return [str(w.message) for w in caught] + [s.sentence for s in found]
+
+
+# Those that take longest, each like one of the others.
+LONG = {
+    "all speeds inverted", "axis: ms", "rpm under deg/s", "rad under deg", "rad under deg once", "deg under rad",
+    "deg under rad once", "tenfold", "ms once", "short and raise", "short and lower", "drive in mN m",
+    "percent, bounds", "axis: rad under deg", "late", "axis: speed inverted", "MPa, fixed", "early",
+    "ten times too long",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in MISTAKES])
+def test_a_mistake_is_noticed_and_named(name, campaign):
+    kind, made, words = MISTAKES[name]
+    folder = campaign(kind)
+    for one in made:
+        one(folder)
+    said = said_of(folder)
+    assert any(re.search(words, sentence) for sentence in said), said
+
+
+# Right campaigns: effects that the declared model lacks, larger than usual, other sensors, few records, real noise.
+LACKING = (
+    "coulomb=80", "stribeck=80 coulomb=40", "viscous=30", "drag=30", "seal_friction=400", "asymmetric_friction=80",
+    "torque_offset=30", "tilt_deg=5", "worm_loss=0.8 worm_width=0.05", "worm_speed=0.15 worm_fade=0.3",
+    "flux_saturation=80", "brush_drop=2",
+    "winding_heating=5e-5", "supply_sag=0.015", "gas_heat_loss=1", "line_loss=3e4", "tachometer_lag=0.01",
+    "tachometer_offset_deg_s=3", "controller_delay=0.01", "gyro_bandwidth_hz=30 gyro_bias_deg_s=3", "rocking_hz=5",
+    "coulomb=80 supply_sag=0.015 tilt_deg=3 viscous=20",
+)  # fmt: skip
+SENSORS = ("--noise-deg-s 5", "--noise-bandwidth-hz 40 --noise-deg-s 1", "--quantisation-deg-s 2", "--rest 1.0",
+           "--repeats 1 --holdout  --manoeuvres inside_E", "--duration 0.4",
+           "--noise-deg-s 0 --quantisation-deg-s 0")  # fmt: skip
+COMMITTED = ("four_strokes", "one_stroke", "paper_arm", "rocking_shell", "table2", "table1_stand/row_5")
+
+
+@pytest.mark.slow
+def test_right_campaigns_are_not_accused(root, stand, tmp_path):
+    options = [("--repeats", "1", "--effect", *effects.split()) for effects in LACKING]
+    options += [tuple(text.split(" ")) for text in SENSORS]
+    folders = [stand(*words) for words in options] + [root / "studies" / "campaigns" / name for name in COMMITTED]
+    folders += [pendulum(tmp_path / f"p{i}", i, friction) for i, friction in enumerate((0.0, 0.01, 0.03, 0.06, 0.1))]
+    shutil.copytree(root / "studies" / "campaigns" / "paper_arm", tmp_path / "arm")
+    folders += [halves(pendulum(tmp_path / "parts"), ("window_s = [0, 1.5]", "window_s = [1.6, 3]")),
+                halves(tmp_path / "arm", ("window_s = [0, 0.5]", "window_s = [0.6, 1]"))]  # fmt: skip
+    assert len(folders) >= 40
+    accused = {str(f): said for f in folders if (said := said_of(f))}
+    assert not accused, accused
+
+
+def halves(folder: Path, windows: tuple[str, str]) -> Path:
+    """Return a campaign that names one recording twice, under two names and with windows that do not overlap."""
+    file = next(folder.glob("s*.csv")).name
+    copied(file, "second.csv", "train", more=windows[1])(folder)
+    toml((f'file = "{file}"', f'file = "{file}"\n{windows[0]}'))(folder)
+    return folder
+
+
+def test_check_and_identify_say_it(campaign, capsys):
+    """Before anything is identified, and in the answer; check fails."""
+    from armid.cli.main import main
+
+    folder = campaign("one")
+    change(SPEED, np.negative, *ONE)(folder)
+    words = "every train record: the measured rad/s signal: its sign looks inverted"
+    with pytest.raises(SystemExit, match="1"):
+        main(["check", str(folder)])
+    assert f"FAIL plausible (sign): {words}" in capsys.readouterr().out
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        with pytest.raises(SystemExit, match="0"):
+            main(["identify", str(folder), "--budget", "80"])
+    told = capsys.readouterr()
+    assert f"armid: warning: {words}" in told.err
+    assert words in " ".join(told.out.split())

@@ -1,0 +1,115 @@
+"""Mistakes in campaigns of machines with other outputs are named, right campaigns are not accused."""
+
+import re
+from functools import partial
+
+import numpy as np
+import pytest
+from made_machines import write_arm, write_axis, write_link
+from test_screen import change, header, pendulum, said_of
+
+from armid.record import write_table
+from armid.record.table import read_table
+
+FILES = ("a.csv", "b.csv", "c.csv")
+ANGLE, SPEED, DRIVE = "angle_deg", "angular_velocity_deg_s", "drive_N_m"
+HUB, TWIST, PENDULUM = "hub_angle_deg", "deflection_deg", ("slow.csv", "fast.csv", "other.csv")
+both, speed = partial(write_arm, outputs="both"), partial(write_arm, outputs="speed")
+bare = partial(write_axis, position=False)
+
+
+def noise(values):
+    return np.random.default_rng(3).normal(0.0, 20.0, values.size)
+
+
+def later(values, n=25):
+    return np.concatenate([np.full(n, values[0]), values[:-n]])
+
+
+def everywhere(column, function):
+    return change(column, function, *FILES)
+
+
+def together(change_of):
+    """Return a mistake in both columns of the link. change_of: hub and deflection -> what is written for them."""
+
+    def made(folder):
+        for file in FILES:
+            columns = dict(read_table(folder / file, file).columns)
+            columns[HUB], columns[TWIST] = change_of(columns[HUB], columns[TWIST])
+            write_table(folder / file, columns)
+
+    return made
+
+
+def without_speed(folder):
+    columns = dict(read_table(folder / "b.csv", "b.csv").columns)
+    write_table(folder / "b.csv", {name: values for name, values in columns.items() if name != SPEED})
+
+
+# name: campaign, what is done to it, words of which the first sentence about the train records must hold one.
+MISTAKES = {
+    "angle inverted": (write_arm, (everywhere(ANGLE, np.negative),), r"every.*rad signal: its sign"),
+    "angle inverted once": (write_arm, (change(ANGLE, np.negative, "b.csv"),), r"b\.csv.*rad signal: its sign"),
+    "angle in rad": (write_arm, (everywhere(ANGLE, np.deg2rad),), "every.*radians under a header in deg"),
+    "angle in deg": (write_arm, (header(ANGLE, "angle_rad", *FILES),), "every.*degrees under a header in rad"),
+    "held out": (write_arm, (change(ANGLE, np.negative, "c.csv"),), r"c\.csv:.*measured rad signal: its sign"),
+    "drive inverted": (write_arm, (everywhere(DRIVE, np.negative),), "every.*input 'u': its sign"),
+    "ms": (write_arm, (everywhere("time_s", lambda t: 1000.0 * t),), "every.*milliseconds"),
+    "noise": (write_arm, (change(ANGLE, noise, "b.csv"),), r"b\.csv: the measured angle is noise"),
+    "horizontal": (write_arm, (everywhere(ANGLE, lambda x: x + 90.0),), "every.*from elsewhere: with -90"),
+    "speed inverted": (speed, (everywhere(SPEED, np.negative),), r"every.*rad/s signal: its sign"),
+    "of two, speed inverted": (both, (everywhere(SPEED, np.negative),), r"every.*velocity \[rad/s\]: its sign"),
+    "of two, speed inverted once": (both, (change(SPEED, np.negative, "b.csv"),), r"b\.csv.*velocity.*: its sign"),
+    "of two, angle inverted": (both, (everywhere(ANGLE, np.negative),), r"every.*angle \[rad\]: its sign"),
+    "of two, angle in rad": (both, (everywhere(ANGLE, np.deg2rad),), r"every.*angle \[rad\]: 57\.3"),
+    "of two, speed in rad": (both, (everywhere(SPEED, np.deg2rad),), r"every.*velocity \[rad/s\]: 57\.3"),
+    "of two, one without": (both, (everywhere(SPEED, np.negative), without_speed), "every.*velocity.*: its sign"),
+    "of two, both": (both, (everywhere(ANGLE, np.negative), everywhere(SPEED, np.negative)), "every.*'u': its sign"),
+    "upright": (pendulum, (change(ANGLE, lambda x: x + 180.0, *PENDULUM),), "every.*from elsewhere: with 180"),
+    "mm": (write_axis, (everywhere("velocity_m_s", lambda v: 1000.0 * v),), r"a\.csv: position_m moves 0\.001 times"),
+    "axis inverted": (bare, (everywhere("velocity_m_s", np.negative),), "every.*m/s signal: its sign"),
+    "hub inverted": (write_link, (everywhere(HUB, np.negative),), r"every.*hub_angle \[rad\]: its sign"),
+    "hub in rad": (write_link, (everywhere(HUB, np.deg2rad),), r"every.*hub_angle \[rad\]: 57\.3"),
+    "deflection inverted": (write_link, (everywhere(TWIST, np.negative),), r"every.*deflection \[rad\]: its sign"),
+    "deflection inverted once": (write_link, (change(TWIST, np.negative, "b.csv"),), r"b\.csv.*deflection.*: its sign"),
+    "deflection held out": (write_link, (change(TWIST, np.negative, "c.csv"),), r"c\.csv.*deflection.*: its sign"),
+    "thousandths": (write_link, (everywhere(TWIST, lambda x: 1000.0 * x),), "every.*1,000 times too (large|small)"),
+    "link driven inverted": (write_link, (everywhere(DRIVE, np.negative),), "every.*'u': its sign"),
+    "exchanged": (write_link, (together(lambda hub, twist: (twist, hub)),), "hub_angle and deflection look exchanged"),
+    "absolute": (write_link, (together(lambda hub, twist: (hub, hub + twist)),), "deflection looks counted from"),
+    "deflection is noise": (write_link, (change(TWIST, noise, "b.csv"),), r"b\.csv: the measured deflection is noise"),
+    "drive late": (write_link, (change(DRIVE, later, "a.csv"),), r"a\.csv: its clock looks 0\.(09|1)\d* s early"),
+    "link ms": (write_link, (everywhere("time_s", lambda t: 1000.0 * t),), "every.*milliseconds"),
+}  # fmt: skip
+RIGHT = {
+    **{f"arm {c}": partial(write_arm, friction=c) for c in (0.0, 0.02, 0.05, 0.1, 0.2)},
+    **{f"arm of two {c}": partial(both, friction=c) for c in (0.0, 0.05, 0.15)},
+    **{f"arm by its speed {c}": partial(speed, friction=c) for c in (0.0, 0.1)},
+    "arm, noise": partial(write_arm, noise=20.0), "arm, short stroke": partial(write_arm, size=0.15),
+    "arm, long stroke": partial(write_arm, size=1.5, friction=0.05), "arm, coarse": partial(write_arm, interval=0.02),
+    **{f"axis {c}": partial(write_axis, friction=c) for c in (0.0, 0.5, 1.0, 1.5)},
+    "axis, noise": partial(write_axis, noise=20.0), "axis, bare": partial(bare, friction=0.7),
+    **{f"link {c}": partial(write_link, friction=c) for c in (0.0, 0.1, 0.3, 0.5)},
+    "link, noise": partial(write_link, noise=10.0),
+    "link by speeds": partial(write_link, outputs=("hub_speed", "deflection_speed"), friction=0.1),
+    "link, all": partial(write_link, outputs=("hub_angle", "hub_speed", "deflection", "deflection_speed"), noise=2.0),
+    "link, hub alone": partial(write_link, outputs=("hub_angle",), friction=0.1),
+}  # fmt: skip
+QUICK = ("of two, speed inverted", "deflection inverted once")
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in MISTAKES])
+def test_a_mistake_is_named(name, tmp_path):
+    make, mistakes, words = MISTAKES[name]
+    folder = make(tmp_path / "campaign")
+    for made in mistakes:
+        made(folder)
+    said = said_of(folder)
+    assert any(re.search(words, sentence) for sentence in said[:1]), said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_campaign_is_not_accused(name, tmp_path):
+    assert said_of(RIGHT[name](tmp_path / "campaign")) == []

@@ -1,0 +1,105 @@
+"""One record that differs is found, undone or reported; broken samples weigh nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armid.loop import close_loop, report_of
+from armid.loop.diagnose import mains_hum
+from armid.loop.document import conclusion
+from armid.loop.suspects import Fault
+from armid.model import EFFECTS, PLANTS, Model
+from armid.record import read_campaign
+from armid.record.noise import noise_of
+
+pytestmark = pytest.mark.slow
+CANDIDATES = {n: EFFECTS[n] for n in ("coulomb", "supply_sag", "tilt", "viscous")}
+COMMON = (
+    "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
+    "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",
+)  # fmt: skip
+ARM = PLANTS["shell_transfer_arm"]
+
+
+@pytest.fixture(scope="module")
+def campaign(stand):
+    return read_campaign(stand(*COMMON))
+
+
+def with_fault(campaign, file, fault, value):
+    """Return a campaign with one record as a fault of that size makes it."""
+    records = tuple(fault.undone(r, -value, ARM) if r.file == file else r for r in campaign.records)
+    return replace(campaign, records=records)
+
+
+@pytest.mark.parametrize(("file", "kind", "value", "unit"), [
+    ("raise.csv", "offset", 0.02, "rad/s"), ("short.csv", "late", 0.004, "s"), ("lower_low_voltage.csv", "drift", 0.03,
+                                                                               "rad/s/s"),
+    ("raise.csv", "clock", 0.004, "1"),
+])  # fmt: skip
+def test_a_fault_of_one_record_is_told_and_no_effect_is_named(campaign, file, kind, value, unit):
+    found = close_loop(Model(ARM), with_fault(campaign, file, Fault(kind), value), CANDIDATES)
+    (suspect,) = report_of(found)["suspects"]
+    held_out = file == "lower_low_voltage.csv"
+    assert (suspect["record"], suspect["kind"], suspect["unit"]) == (file, kind, unit)
+    assert suspect["action"] == ("reported" if held_out else "freed")
+    assert suspect["low"] < value < suspect["high"]
+    assert suspect["value"] == pytest.approx(value, rel=0.1)
+    assert found.effects == ()
+    assert found.verdict == ("no_discrepancy" if held_out else "record_disagrees")
+    assert held_out or file in conclusion(found)
+    every = report_of(found)["error_all_records"]["after"]
+    role = "holdout" if held_out else "train"
+    assert every[role]["rmse"] > report_of(found)["error"]["after"][role]["rmse"]
+    for e in found.after.estimates[:4]:
+        assert e.low < {"p0": 3.2e6, "k": 0.9, "eta3": 0.6, "n": 1.2}[e.name] < e.high
+
+
+def test_broken_samples_weigh_nothing(campaign):
+    def spoiled(record):
+        measured = record.measured.copy()
+        measured[[200, 400, 600]] += 2.0
+        pieces = tuple(replace(p, measured=measured) for p in record.pieces)
+        return replace(record, measured=measured, pieces=pieces)
+
+    records = tuple(spoiled(r) if r.file == "lower.csv" else r for r in campaign.records)
+    found = close_loop(Model(ARM), replace(campaign, records=records), CANDIDATES)
+    sound = close_loop(Model(ARM), campaign, CANDIDATES)
+    (suspect,) = found.suspects
+    assert (suspect.record, suspect.kind, suspect.value, suspect.action) == ("lower.csv", "spikes", 3.0, "left_out")
+    assert (suspect.from_s, suspect.to_s) == pytest.approx((0.2, 0.6))
+    assert found.verdict == "no_discrepancy"
+    for a, b in zip(found.after.estimates, sound.after.estimates, strict=True):
+        assert a.value == pytest.approx(b.value, rel=1e-3)
+    assert found.after.train_error.rmse == pytest.approx(sound.after.train_error.rmse, rel=0.01)
+
+
+@pytest.mark.parametrize("size", [0.0027, 0.025])
+def test_hum_is_noise(campaign, size):
+    """Of half the noise, and of five times it, in rad/s; each record has its own phase, and a harmonic is in it."""
+    rng = np.random.default_rng(8)
+
+    def humming(record):
+        times = record.manoeuvre.interval * np.arange(-len(record.rest), len(record.measured))
+        phase = rng.random()
+        hum = size * (np.sin(2.0 * np.pi * (50.04 * times + phase)) + 0.3 * np.sin(2.0 * np.pi * 150.12 * times))
+        rest, measured = record.rest + hum[: len(record.rest)], record.measured + hum[len(record.rest) :]
+        pieces = tuple(replace(p, measured=measured) for p in record.pieces)
+        noise = noise_of(rest, measured, record.manoeuvre.interval)
+        return replace(record, rest=rest, measured=measured, pieces=pieces, whole_pieces=pieces, noise=noise)
+
+    found = close_loop(Model(ARM), replace(campaign, records=tuple(map(humming, campaign.records))), CANDIDATES)
+    assert (found.verdict, found.suspects) == ("no_discrepancy", ())
+    assert 50.0 in {sum(ends) / 2.0 for ends in mains_hum(found.before.train)}
+    assert mains_hum(close_loop(Model(ARM), campaign, CANDIDATES).before.train) == []
+
+
+def test_a_shift_is_undone_where_it_was_measured(campaign):
+    record = campaign.records[0]
+    fault = Fault("late")
+    there = fault.trimmed(fault.undone(record, -0.005, ARM), 0.005, ARM)
+    inside = there.pieces[0].window
+    assert inside.stop == record.pieces[0].window.stop - 7
+    inner = slice(20, inside.stop - 20)
+    assert np.abs(there.measured[inner] - record.measured[inner]).max() < 1e-6

@@ -1,0 +1,163 @@
+"""Several outputs of a plant: declared, simulated at once, and read from the columns of a record."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from two_inertias import INTERVAL, NOISE_ANGLE, NOISE_SPEED, TRUTH, drive, oracle, two_inertias, write_drive
+
+from armid.cli.main import main
+from armid.contract.equations import check_effects, check_plant
+from armid.engine import Schedule, simulate
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS, Manoeuvre, Model, Output
+from armid.model.effects.sensor import sensor_effects
+from armid.record import read_campaign
+from armid.record.table import read_table
+
+START = np.array([0.1, 0.5, 0.05, 0.4])
+STARTS = dict(zip(("start_motor", "start_motor_speed", "start_load", "start_load_speed"), START, strict=True))
+
+
+def test_one_simulation_gives_all_outputs_as_scipy_does() -> None:
+    u = drive(400, 1.0)
+    run = simulate(Model(two_inertias), Manoeuvre(INTERVAL, 400, STARTS, {"u": u}), list(TRUTH.values()), Schedule(8))
+    expected = oracle(u, START)
+    np.testing.assert_allclose(run.outputs[0, 0], expected["v"], atol=1e-8)
+    np.testing.assert_allclose(run.outputs[1, 0], expected["p"], atol=1e-8)
+    np.testing.assert_allclose(run.outputs[2, 0], expected["p"] - expected["q"], atol=1e-8)
+    alone = simulate(Model(two_inertias.recording({"load_angle"})), Manoeuvre(INTERVAL, 400, STARTS, {"u": u}),
+                     list(TRUTH.values()), Schedule(8))  # fmt: skip
+    np.testing.assert_array_equal(alone.output, run.outputs[1])
+
+
+def test_a_candidate_that_diverges_is_lost_in_all_outputs() -> None:
+    """The stiffness of a spring that pushes lets the angle run away first."""
+    manoeuvre = Manoeuvre(INTERVAL, 900, STARTS, {"u": drive(900, 1.0)})
+    run = simulate(Model(two_inertias), manoeuvre, [list(TRUTH.values()), [0.1, 0.08, -250.0, 0.12]], Schedule(4))
+    assert run.failed.tolist() == [False, True]
+    assert np.isfinite(run.outputs[:, 0]).all()
+    assert np.isnan(run.outputs[:, 1, -1]).all()
+
+
+def test_the_old_way_declares_one_output() -> None:
+    for plant in PLANTS.values():
+        for one in (plant, *plant.variants):
+            if one.records_one_speed:
+                names = {"rad/s": "angular_velocity", "m/s": "velocity"}
+                assert [o.name for o in one.outputs] == [names[one.output_unit]]
+    assert (two_inertias.output, two_inertias.output_unit) == ("recorded_speed", "rad/s")
+    assert replace(two_inertias, note="x").outputs == two_inertias.outputs
+    assert "recorded load_angle [rad]: recorded_load" in str(Model(two_inertias))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"outputs": (), "output": ""}, "records nothing"),
+        ({"output": "v"}, "one of them, or the first output 'recorded_speed' in rad/s"),
+        ({"outputs": two_inertias.outputs[:1] * 2}, "each name once"),
+        ({"outputs": (Output("a", "speeed", "rad/s"),), "output": ""}, "records 'speeed': did you mean"),
+        ({"outputs": (replace(two_inertias.outputs[0], port="sensor"),)}, "through the port 'sensor'"),
+    ],
+)
+def test_a_wrong_declaration_is_refused(changes, said) -> None:
+    with pytest.raises(ArmidError, match=said):
+        replace(two_inertias, **changes)
+
+
+def test_a_wrong_output_is_refused() -> None:
+    with pytest.raises(ArmidError, match="unit 'deg'"):
+        Output("angle", "q", "deg")
+    with pytest.raises(ArmidError, match="a name that ends in _deg or _rad"):
+        Output("angle", "q", "rad", ("angle",))
+
+
+@pytest.mark.slow
+def test_a_sensor_has_effects_at_the_port_of_its_output() -> None:
+    found = sensor_effects(two_inertias)
+    assert list(found) == ["load_angle_bias", "load_angle_scale", "load_angle_lag"]
+    u = drive(300, 1.0)
+    manoeuvre, truth = Manoeuvre(INTERVAL, 300, STARTS, {"u": u}), list(TRUTH.values())
+    model = Model(two_inertias, tuple(found.values()))
+    still, moved = simulate(model, manoeuvre, [[*truth, 0.0, 0.0, 0.0], [*truth, 0.05, 0.1, 0.0]], Schedule(4)).outputs[
+        1
+    ]
+    np.testing.assert_allclose(moved, 1.1 * still + 0.05, atol=1e-12)
+    assert Model(two_inertias) + EFFECTS["gyro_bias"]
+    points = check_effects([*found.values(), EFFECTS["coulomb"]], {"two_inertias": two_inertias})
+    assert [p for several in points for p in several if not p.passed] == []
+    assert [p for p in check_plant(two_inertias) if not p.passed] == []
+
+
+def test_simulate_writes_every_output(tmp_path) -> None:
+    folder = write_drive(tmp_path / "drive", more="".join(f"constants.{name} = 0.0\n" for name in STARTS))
+    plugin = f"--plugin={Path(__file__).parent / 'two_inertias.py'}:two_inertias"
+    values = [f"--set={name}={value}" for name, value in TRUTH.items()]
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", str(folder), plugin, *values, "--out", str(tmp_path / "out")])
+    assert not ended.value.code
+    table = read_table(tmp_path / "out" / "b.csv", "b.csv").columns
+    assert list(table) == ["time_s", "motor_speed_rad_s", "load_angle_deg", "deflection_rad",
+                           "load_speed_rad_s"]  # fmt: skip
+    measured = read_table(folder / "a.csv", "a.csv").columns
+    simulated = read_table(tmp_path / "out" / "a.csv", "a.csv").columns
+    assert np.std(measured["load_angle_deg"] - simulated["load_angle_deg"]) < np.rad2deg(2.0 * NOISE_ANGLE)
+
+
+def test_a_record_brings_any_outputs_in_the_unit_of_its_header(tmp_path) -> None:
+    campaign = read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
+    assert [o.name for o in campaign.plant.outputs] == ["motor_speed", "load_angle", "deflection"]
+    assert [o.name for o in campaign.unmeasured] == ["load_speed"]
+    all_three = ["motor_speed", "load_angle", "deflection"]
+    held = [[one.output for one in r.each] for r in campaign.records]
+    assert held == [all_three, ["load_angle"], all_three]
+    speed, angle, _ = campaign.records[0].each
+    assert (speed.unit, angle.unit, campaign.unit) == ("rad/s", "rad", "rad/s")
+    assert speed.noise.rms == pytest.approx(NOISE_SPEED, rel=0.15)
+    assert angle.noise.rms == pytest.approx(NOISE_ANGLE, rel=0.15)
+    assert angle.pieces[0].manoeuvre is speed.pieces[0].manoeuvre
+    np.testing.assert_array_equal(angle.measured, angle.pieces[0].measured)
+
+
+def test_every_state_of_the_start_comes_from_the_outputs(tmp_path) -> None:
+    """A record in motion: what nothing shows keeps its default and the plant's size; errors are within deviations."""
+    campaign = read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
+    _, train, held = campaign.records
+    for record, truth in ((train, [0.3, 2.0, 0.25, 1.6]), (held, [-0.2, 1.0, -0.2, 1.2])):
+        piece = record.pieces[0]
+        for name, expected in zip(STARTS, truth, strict=True):
+            assert abs(piece.manoeuvre.constants[name] - expected) < 4.0 * piece.start_deviation[name]
+    hidden = {n for n, d in train.pieces[0].start_deviation.items() if d == pytest.approx(5.0)}
+    assert hidden == {"start_motor", "start_motor_speed"}
+    assert train.pieces[0].start_deviation["start_load_speed"] < 0.4
+    assert train.pieces[0].shown_start
+    # of the record held out the first 5 % tell the start and judge nothing
+    assert (held.pieces[0].n_spent, held.pieces[0].window) == (35, slice(35, 700))
+    assert not held.pieces[0].shown_start
+
+
+def test_a_start_that_is_given_is_taken(tmp_path) -> None:
+    given = "".join(f"constants.{name} = 0.0\n" for name in STARTS)
+    campaign = read_campaign(write_drive(tmp_path / "drive", more=given), {"two_inertias": two_inertias})
+    piece = campaign.holdout[0].pieces[0]
+    assert (piece.window, piece.shown_start, piece.start_deviation) == (slice(0, 700), {}, {})
+    with pytest.raises(ArmidError, match="restart_s and the constant start_load are both given"):
+        read_campaign(write_drive(tmp_path / "again", more=f"{given}restart_s = 1.0\n"), {"two_inertias": two_inertias})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda text: text.replace("load_angle_deg", "load_angle_grad"), "load_angle_deg"),
+        (lambda text: text.replace("load_angle_deg", "motor_speed_deg_s", 1), "one column of motor_speed is expected"),
+    ],
+)
+def test_columns_that_say_nothing_clear_are_refused(tmp_path, change, said) -> None:
+    folder = write_drive(tmp_path / "drive")
+    for name in "bc":
+        path = folder / f"{name}.csv"
+        path.write_text(change(path.read_text()))
+    with pytest.raises(ArmidError, match=said):
+        read_campaign(folder, {"two_inertias": two_inertias})

@@ -1,0 +1,88 @@
+"""The loop on records of several outputs: dry friction is missing, and a record begins in motion with one output."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from two_inertias import NOISE_ANGLE, NOISE_SPEED, TRUTH, two_inertias, write_drive
+
+from armid.loop import close_loop, report_of
+from armid.loop.diagnose import holdout_residuals
+from armid.loop.document import details_of, loop_document
+from armid.loop.figures import figures_of
+from armid.loop.suspects import Fault
+from armid.model import EFFECTS
+from armid.model.effects.sensor import sensor_effects
+from armid.record import read_campaign
+from armid.report.style import pyplot
+
+pytestmark = pytest.mark.slow
+FRICTION = 0.3
+
+
+@pytest.fixture(scope="module")
+def closed(tmp_path_factory):
+    folder = write_drive(tmp_path_factory.mktemp("loop") / "drive", FRICTION, 0.03)
+    campaign = read_campaign(folder, {"two_inertias": two_inertias})
+    wanted = {name: EFFECTS[name] for name in ("coulomb", "viscous", "stribeck", "gyro_bias", "cubic_drag", "backlash")
+              if name in EFFECTS}  # fmt: skip
+    return close_loop(campaign.model(), campaign, {**wanted, **sensor_effects(campaign.plant)})
+
+
+def test_the_missing_friction_is_named_and_the_rest_is_noise(closed) -> None:
+    """The bias of the load's angle is none: a start that is fitted makes up for all of it."""
+    assert (closed.verdict, closed.effects) == ("explained", ("coulomb",))
+    found = {e.name: e for e in closed.after.estimates}
+    for name, truth in {**TRUTH, "coulomb.level": FRICTION}.items():
+        e = found[name]
+        assert e.low < truth < e.high or abs(e.value - truth) < 1.5 * (e.high - e.low) / 2.0
+    for replay, residual, noise in zip(closed.after.train.replays, closed.after.train.raw,
+                                       (NOISE_SPEED, NOISE_ANGLE, NOISE_ANGLE, NOISE_ANGLE), strict=True):  # fmt: skip
+        assert np.sqrt(np.mean(residual**2)) == pytest.approx(noise, rel=0.1), replay.name
+
+
+def test_the_report_tells_each_output(closed) -> None:
+    report, details = report_of(closed), details_of(closed)
+    assert list(report["outputs"]) == ["motor_speed", "load_angle", "deflection"]
+    assert (report["unit"], report["outputs"]["deflection"]["unit"]) == ("rad/s", "rad")
+    assert report["noise_rms"] == pytest.approx(NOISE_SPEED, rel=0.1)
+    before, after = (report["error"][model]["holdout"] for model in ("before", "after"))
+    assert after["rmse"] == after["outputs"]["motor_speed"]["rmse"] < before["rmse"]
+    shares = [e["rmse"] / e["span"] for e in after["outputs"].values()]
+    assert after["joint_nrmse"] == pytest.approx(np.sqrt(np.mean(np.square(shares))))
+    records = report["error"]["after"]["records"]
+    assert list(records["b.csv"]["outputs"]) == ["load_angle"]
+    assert records["c.csv"]["outputs"]["load_angle"]["rmse"] == pytest.approx(after["outputs"]["load_angle"]["rmse"])
+    document = loop_document(report, details, {}, "again")
+    assert "load_angle" in " ".join(document.answer)
+    assert any("in load_angle" in f.where for f in closed.before.diagnosis.findings)
+    for draw in figures_of(closed, report, details).values():
+        pyplot().close(draw())
+
+
+def test_the_start_of_a_record_held_out_does_not_judge(closed) -> None:
+    piece = closed.campaign.holdout[0].pieces[0]
+    assert (piece.n_spent, piece.window.start) == (35, 35)
+    assert closed.after.holdout.replays[0].pieces[0].manoeuvre.constants == piece.manoeuvre.constants
+    again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.library)
+    np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
+
+
+@pytest.mark.parametrize(("file", "kind", "value"), [("a.csv", "gain", 0.03), ("b.csv", "late", 0.012),
+                                                     ("c.csv", "gain", 0.02)])  # fmt: skip
+def test_a_fault_of_one_sensor_or_of_a_file_is_told(tmp_path, file, kind, value) -> None:
+    """Of several outputs one sensor is at fault, or the times of all; starts are fitted meanwhile."""
+    campaign = read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
+
+    def faulty(record):
+        return next(r for r in record.each if r.output == "load_angle")
+
+    records = tuple(Fault(kind).trimmed(r, -value, campaign.plant, faulty(r)) if r.file == file else r
+                    for r in campaign.records)  # fmt: skip
+    found = close_loop(campaign.model(), replace(campaign, records=records), {"coulomb": EFFECTS["coulomb"]})
+    (suspect,) = found.suspects
+    assert (suspect.record, suspect.kind) == (file, kind)
+    assert suspect.output == ("" if kind == "late" else "load_angle")
+    shown = value / (1.0 - value) if kind == "gain" else value
+    assert suspect.low < shown < suspect.high
+    assert found.effects == ()

@@ -1,0 +1,125 @@
+"""The suite: reproducible from name and version, exact optima, several objectives, and what is hard about it."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from pymoo.core.problem import Problem
+
+import armid
+from armid.errors import ArmidError
+from armid.problem.suite import CLASSES, DEFINITIONS, line_across, n_minima
+
+# Values of version 1 at a point each: u_j = frac(i sqrt(j + 2)), i from 1 in this order.
+STORED = {
+    "arm/1": 0.13404600046558043, "arm/15": 0.2675166514234411, "arm_noisy/2": 0.10788614908986356,
+    "arm_similarity/3": 0.14730023937865555, "arm_shape/6": 0.1857142857142857,
+    "arm_similarity_noisy/4": 0.02294472544182413, "arm_short/5": 0.3286182717919192, "arm_four/6": 0.09678005082351138,
+    "friction/7": 0.06476747340794244, "friction_similarity/8": 0.024362695031477144, "ripple/9": 0.27585627822400144,
+    "sticking/10": 0.38000634195995114, "sticking_similarity/11": 0.4634497329162959,
+    "supply_four/12": 0.3153829701825484, "lags_similarity/13": 0.04956412520446862, "rocking/14": 0.21292109364899267,
+    "rocking_friction/1": 0.38986471225039465, "balance/2": 0.5327874113927603, "sensor/3": 0.29775036626370865,
+    "whole_similarity/6": 0.3854988502694925,
+}  # fmt: skip
+OF_THE_ARM = [name for name in STORED if name.startswith("arm")]
+
+
+def is_as_stored(name):
+    problem = armid.suite()[name]
+    point = ((1 + list(STORED).index(name)) * np.sqrt(np.arange(2, 2 + problem.n_var))) % 1.0
+    return problem(point) == pytest.approx(STORED[name], rel=1e-7)
+
+
+def test_values_at_stored_points():
+    assert [name for name in OF_THE_ARM if not is_as_stored(name)] == []
+
+
+@pytest.mark.slow
+def test_values_at_stored_points_of_every_machine():
+    assert [name for name in STORED if not is_as_stored(name)] == []
+
+
+def test_the_suite_is_a_lazy_sequence():
+    suite = armid.suite()
+    assert len(suite) == 15 * len(DEFINITIONS) >= 360
+    assert [p.name for p in suite[:16]][-2:] == ["arm/15", "arm_noisy/1"]
+    assert len({p.name for p in suite}) == len(suite)
+    sizes = {p.n_var for p in suite}
+    assert (min(sizes), max(sizes)) == (4, 14)
+    assert all(isinstance(p, Problem) and len(p.xl) == len(p.xu) == p.n_var == len(p.names) for p in suite[::15])
+    for wrong in (lambda: suite["am/1"], lambda: armid.suite("two"), lambda: armid.suite(units="box ")):
+        with pytest.raises(ArmidError, match=r"is not in the suite|known:|mean"):
+            wrong()
+
+
+def test_making_the_suite_compiles_nothing(tmp_path):
+    """In a process of its own, whose compile cache stays empty until the first call."""
+    program = ("import armid, os, sys; problems = list(armid.suite()); before = os.listdir(sys.argv[1]); "
+               "assert before == [], before; print(problems[0].n_var)")  # fmt: skip
+    done = subprocess.run([sys.executable, "-c", program, tmp_path], env=os.environ | {"ARMID_CACHE": str(tmp_path)},
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert (done.stdout, done.returncode) == ("4\n", 0), done.stderr
+
+
+def test_the_truth_is_the_optimum_where_there_is_no_noise():
+    for name in ("arm/2", "arm_similarity/2", "arm_shape/2"):
+        problem = armid.suite()[name]
+        assert problem(problem.truth) == problem.optimum_value == problem.floor == 0.0
+        assert (problem.optimum_x == problem.truth).all()
+
+
+def test_noise_sets_the_floor():
+    noisy = armid.suite()["arm_noisy/2"]
+    assert noisy.floor == pytest.approx(np.deg2rad(0.3), rel=0.1)
+    assert 0.98 * noisy.floor < noisy.optimum_value < noisy.floor
+    around = noisy.optimum_x + 1e-3 * np.vstack([np.eye(4), -np.eye(4)])
+    assert (noisy(around) > noisy.optimum_value).all()
+    similar = armid.suite()["arm_similarity_noisy/2"]
+    assert similar.optimum_x is similar.optimum_value is None
+    assert similar.floor > 0.0
+
+
+def test_a_call_takes_a_vector_or_an_array_in_either_unit():
+    box, own = armid.suite()["arm/3"], armid.suite(units="SI")["arm/3"]
+    u = np.random.default_rng(1).random((5, 4))
+    values = box(u)
+    assert values.shape == (5,)
+    assert isinstance(box(u[0]), float)
+    assert box(list(u[0])) == values[0]
+    assert (box.xl == 0.0).all()
+    assert (box.xu == 1.0).all()
+    np.testing.assert_allclose(own(box.si(u)), values, rtol=1e-12)
+    np.testing.assert_allclose(own.truth, box.si(box.truth))
+    assert own.names[0] == "p0"
+    assert own.xl[0] == 2.6e6
+    assert box.cost_s > 0.0
+
+
+def test_one_objective_a_record():
+    several = armid.suite("records")
+    assert len(several) < len(armid.suite())
+    problem, joined = several["arm_four/1"], armid.suite()["arm_four/1"]
+    u = np.random.default_rng(1).random((3, 4))
+    assert problem.n_obj == 4
+    assert problem(u).shape == (3, 4)
+    assert problem(u[0]).shape == (4,)
+    # records of the same length: the whole is the root of the mean square
+    np.testing.assert_allclose(np.sqrt((problem(u) ** 2).mean(axis=1)), joined(u), rtol=1e-12)
+
+
+def test_what_is_hard_is_measured():
+    arm, shape = armid.suite()["arm/1"], armid.suite()["arm_shape/1"]
+    assert arm.difficulty == "smooth"
+    assert arm.landscape["minima"] == 1.0
+    assert shape.difficulty == "stair"
+    assert shape.landscape["stair"] > 0.9
+    assert {measure for _, measure, _ in CLASSES} < set(arm.landscape)
+
+
+def test_minima_on_a_line():
+    for values, n in (((3, 2, 1, 2, 3), 1), ((1, 2, 3), 1), ((1, 2, 1), 2), ((2, 1, 1, 2, 0), 2), ((1, 1), 1)):
+        assert n_minima(np.array(values, dtype=float)) == n
+    line = line_across(np.array([0.5, 0.25]), np.array([1.0, 1.0]))
+    np.testing.assert_allclose(line[[0, -1]], [[0.25, 0.0], [1.0, 0.75]], atol=1e-12)

@@ -1,0 +1,193 @@
+"""Calls by names or objects alike, results that print themselves, and searches that ignore their budget."""
+
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from pymoo.algorithms.soo.nonconvex.de import DE
+from pymoo.core.algorithm import Algorithm
+
+import armid
+from armid.cli.new import INERTIA, campaign_text, synthetic_records
+from armid.errors import ArmidError
+from armid.model import EFFECTS, PLANTS
+from armid.record import write_campaign
+from armid.report.result import MANIFEST, Result, Shown
+
+QUICK = {"effects": ["viscous"], "budget": 60}
+
+
+@pytest.fixture(scope="module")
+def axis(tmp_path_factory):
+    """The folder of a small campaign."""
+    return write_campaign(tmp_path_factory.mktemp("axis") / "axis", campaign_text("axis"), synthetic_records())
+
+
+@pytest.fixture(scope="module")
+def found(axis):
+    return armid.identify(str(axis), effects=["viscous"], identifier="least_squares", fitness="rmse")
+
+
+def annealing(value, low, high, budget, random, start=None, step=0.1):
+    """Walk downhill at random."""
+    best, x = value(start), start
+    for _ in range(10 * budget):
+        tried = np.clip(x + step * (high - low) * random.standard_normal(len(low)), low, high)
+        f = value(tried)
+        if f < best:
+            best, x = f, tried
+
+
+class Greedy(Algorithm):
+    """Ask for ever, whatever the termination says."""
+
+    def _infill(self):
+        while True:
+            self.problem.evaluate(self.random_state.random((40, self.problem.n_var)) * self.problem.xu)
+
+
+def test_names_and_objects_give_the_same(found, axis):
+    campaign = armid.read_campaign(axis)
+    model = campaign.model() + EFFECTS["viscous"]
+    space = armid.space_of(model, campaign.parameters)
+    objects = armid.identify(campaign, model, space, armid.FITNESS["rmse"], armid.IDENTIFIERS["least_squares"])
+    by_effect = armid.identify(axis / "campaign.toml", effects=EFFECTS["viscous"], identifier="least_squares")
+    for other in (objects, by_effect):
+        np.testing.assert_array_equal(other.candidate, found.candidate)
+    assert found.to_dict()["parameters"]["inertia"]["value"] == pytest.approx(INERTIA, rel=0.01)
+    assert (found.budget, armid.identify(axis, **{**QUICK, "budget": None}).budget) == (12_000, 3_000)
+    assert armid.identify(axis, **QUICK).identifier == "pso+least_squares"
+    assert armid.identify(axis, fitness="similarity", **QUICK).identifier == "cmaes"
+    paper = armid.identify(axis, paper=True, effects="viscous", budget=80)
+    assert (paper.identifier, paper.fitness.name) == ("pso", "similarity")
+    assert paper.campaign.train[0].pieces[0].duration == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("identifier", [DE(pop_size=10), DE, lambda budget: DE(pop_size=10), annealing])
+def test_an_algorithm_of_pymoo_or_any_function_searches(axis, identifier):
+    one, again = (armid.identify(axis, identifier=identifier, **QUICK) for _ in range(2))
+    assert (one.used, one.stopped) == (60, "budget used")
+    np.testing.assert_array_equal(one.candidate, again.candidate)
+
+
+def test_a_search_of_the_user_has_options_and_follows_in_a_chain(axis, tmp_path):
+    (tmp_path / "mine.py").write_text(f"import numpy as np\n\n\n{inspect.getsource(annealing)}", encoding="utf-8")
+    plugins = [f"{tmp_path}/mine.py:annealing"]
+    fine = armid.identify(axis, identifier="pso+annealing", plugins=plugins, options={"annealing.step": 0.01}, **QUICK)
+    assert fine.used == 60
+    with pytest.raises(ArmidError, match=r"no option 'stap'.*did you mean 'step'"):
+        armid.identify(axis, identifier=annealing, options={"stap": 0.01}, **QUICK)
+    with pytest.raises(ArmidError, match=r"has no option 'lows', did you mean 'low'"):
+        armid.as_identifier("mine", lambda value, lows: None)
+
+
+def test_an_identifier_that_ignores_its_budget_is_stopped(axis, run_check):
+    ended = armid.identify(axis, identifier=lambda budget: Greedy(), **QUICK)
+    assert ended.stopped == "<lambda> went on after its budget and was stopped"
+    assert ended.used == 60
+    assert run_check(Greedy) == {"exact budget"}
+
+
+@pytest.fixture
+def run_check():
+    """Return a function that gives the points of the contract that an identifier breaks."""
+    from armid.contract.check import check_thing
+
+    return lambda thing: {p.name for p in check_thing("identifiers", "mine", thing) if not p.passed}
+
+
+def test_tables_are_a_campaign(found, axis):
+    tables = {}
+    for file, role in (("synthetic_train", "train"), ("synthetic_holdout", "holdout")):
+        tables[file] = pd.read_csv(Path(axis) / f"{file}.csv")
+        tables[file].attrs = {"role": role, "hold": "zero", "constants": {"gain": 1.0}}
+    for plant in ("driven_axis", PLANTS["driven_axis"]):
+        other = armid.identify(tables, plant=plant, effects=["viscous"], identifier="least_squares")
+        np.testing.assert_allclose(other.candidate, found.candidate, rtol=1e-9)
+    assert armid.simulate(tables["synthetic_train"], plant="driven_axis", inertia=0.05).campaign.train[0].file
+
+
+def test_simulating_and_examining(axis, tmp_path):
+    simulated = armid.simulate(axis, inertia=0.05, effects=["viscous"], parameters={"viscous.slope": 0.03})
+    assert set(simulated.table["record"]) == {"synthetic_train.csv", "synthetic_holdout.csv"}
+    assert simulated.parameters == {"inertia": 0.05, "viscous.slope": 0.03}
+    assert simulated.save(tmp_path / "simulated") == ["synthetic_train.csv", "synthetic_holdout.csv"]
+    examined = armid.examine(axis, effects=["viscous"], x={"inertia": 0.05, "viscous.slope": 0.03})
+    for result in (simulated, examined):
+        shows(result, tmp_path / type(result).__name__)
+
+
+@pytest.mark.slow
+def test_closing_the_loop(axis, tmp_path):
+    closed = armid.close_loop(axis, candidates=["viscous", EFFECTS["coulomb"]])
+    assert (closed.effects, closed.to_dict()["verdict"]) == (("viscous",), "explained")
+    shows(closed, tmp_path / "closed")
+
+
+def shows(result, folder):
+    """Check what every result has."""
+    assert isinstance(result, Shown)
+    assert 20 < len(repr(result)) < 2_000
+    assert "<table" in result._repr_html_()
+    assert isinstance(result.table, pd.DataFrame)
+    assert len(result.table)
+    assert isinstance(result.to_dict(), dict)
+    assert result.plot().axes
+    if isinstance(result, Result):
+        names = result.save(folder)
+        assert {*names, MANIFEST} == {path.name for path in folder.iterdir()}
+        assert {result.kind.file, result.kind.page, result.kind.markdown} <= set(names)
+        with pytest.raises(ArmidError, match="there is no figure 'nothing'"):
+            result.plot("nothing")
+
+
+def test_an_identification_and_its_parts_are_small(found, tmp_path):
+    shows(found, tmp_path / "found")
+    assert list(found.table["parameter"]) == ["inertia", "viscous.slope"]
+    for part in (found.campaign, found.campaign.train[0], found.model, found.model.plant):
+        assert 20 < len(repr(part)) < 2_000
+    for name in ("identify", "simulate", "close_loop", "examine"):
+        assert len(str(inspect.signature(getattr(armid, name)))) < 800
+
+
+@pytest.mark.parametrize(("call", "said"), [
+    (lambda a: armid.identify(a, identifier="leest_squares"), "did you mean 'least_squares'"),
+    (lambda a: armid.identify(a, fitness="rms"), "did you mean 'rmse'"),
+    (lambda a: armid.identify(a, fitness=3), "3"),
+    (lambda a: armid.identify(a, identifier=3), "is 3, expected"),
+    (lambda a: armid.identify(a, effects=["viscos"]), "did you mean 'viscous'"),
+    (lambda a: armid.identify(a, efects=["viscous"]), "there is no argument 'efects': did you mean 'effects'"),
+    (lambda a: armid.identify(a, window=(0.5, 0.1)), "0.5"),
+    (lambda a: armid.identify(a, bounds={"inertai": (0.0, 1.0)}), "did you mean 'inertia'"),
+    (lambda a: armid.identify(a, effects=3), "effects is 3: names or Effects are expected"),
+    (lambda a: armid.identify(a, window=0.5), r"window is 0.5: \(begin, end\), s, is expected"),
+    (lambda a: armid.identify(a, bounds={"inertia": 3}), r"name -> \(low, high\) is expected"),
+    (lambda a: armid.identify(a, fix={"inertia": "x"}), "name -> value is expected"),
+    (lambda a: armid.identify(a, seed="x"), "the seed is 'x'"),
+    (lambda a: armid.identify(a, budget="x"), "the budget is 'x'"),
+    (lambda a: armid.identify(a, target="x"), "the target is 'x'"),
+    (lambda a: armid.identify(3), "the campaign is a int"),
+    (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]})), "needs its plant"),
+    (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]}), plant="axis"), "axis"),
+    (lambda a: armid.simulate(a, inertai=0.05), "did you mean 'inertia'"),
+    (lambda a: armid.simulate(a, inertia="much"), "a finite number is expected"),
+    (lambda a: armid.examine(a, x={"inertia": 0.05, "m": 1.0}), "'m' is not in the model"),
+    (lambda a: armid.close_loop(a, candidates=["viscos"]), "did you mean 'viscous'"),
+    (lambda a: armid.close_loop("nowhere"), "does not exist"),
+])  # fmt: skip
+def test_what_is_wrong_is_one_sentence(axis, call, said):
+    with pytest.raises(ArmidError, match=said) as caught:
+        call(axis)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_a_study_shows_itself(root, tmp_path):
+    text = (root / "studies" / "table1_short.toml").read_text(encoding="utf-8").replace("seeds = 5", "seeds = 1")
+    (tmp_path / "small.toml").write_text(text.replace("12000", "400").replace("3000", "100"), encoding="utf-8")
+    results = armid.run_study(tmp_path / "small.toml", jobs=1, out=tmp_path / "out")
+    shows(results, tmp_path)
+    assert results.to_dict()["n_done"] == 25
+    assert {"report.html", "report.md", "overview.csv"} <= set(results.save(tmp_path / "report"))
