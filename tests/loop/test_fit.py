@@ -66,7 +66,8 @@ def fit_with(level, trust, started=0.0):
         space=space, model=SimpleNamespace(parameters={n: SimpleNamespace(null=v) for n, v in nulls.items()}),
         data=SimpleNamespace(trust=lambda residual: np.full(400, trust)), values=lambda z: 2.0 * z - 1.0,
     )  # fmt: skip
-    fit = Fit((DRAG,), records, np.array([0.5, level, 0.5]), np.zeros(400), jacobian)
+    fit = Fit((DRAG,), records, np.array([0.5, level, 0.5]), np.zeros(400))
+    fit.__dict__["jacobian"] = jacobian
     deviation = np.sqrt(np.linalg.inv(trust * jacobian.T @ jacobian)[1, 1])
     fit.__dict__["start_slopes"] = started * deviation * jacobian[:, 1:2]
     return fit, deviation

@@ -261,6 +261,8 @@ LADDER, RAISED = (1e-3, 0.1, 1.0, 10.0), 1e3
 FIRST, LEAST, LARGEST = 1e-3, 1e-9, 1e6
 # Two starts that have come this close to each other, in shares of the range, are one.
 SAME = 1e-3
+# A path is given up that would not come to a limit with so many times the fall that its slopes promise.
+REACH = 10.0
 
 
 @dataclass(eq=False)
@@ -274,12 +276,16 @@ class Descent:
     done: bool = False
 
 
-def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: float, central: bool = False) -> Array:
+def descend(
+    records: LeastSquaresProblem, starts: Sequence[Array], tolerance: float, central: bool = False,
+    limit: float = np.inf,
+) -> Array:  # fmt: skip
     """Return the best of the least-squares estimates in the box from some starts that do not diverge, (n_free,).
 
     Levenberg-Marquardt with steps cut at the box, which hold what the box holds (More 1978, doi:10.1007/BFb0067700).
     starts: shares of the range. tolerance: relative fall of chi2 in one step at which a start has arrived. central:
-    take slopes from central differences, at twice the price, for an estimate to the last digits.
+    take slopes from central differences, at twice the price, for an estimate to the last digits. limit: chi2 that must
+    be in reach, see REACH; what gives up is where it was then.
     """
     first = np.clip(np.array(starts), 0.0, 1.0)
     paths = [Descent(z, r, float(r @ r)) for z, r in zip(first, records.residuals(first), strict=True)]
@@ -287,7 +293,7 @@ def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: fl
         moving = [p for p in paths if not p.done]
         if not moving:
             break
-        advance(records, moving, tolerance, central)
+        advance(records, moving, tolerance, central, limit)
         apart: list[Descent] = []
         for path in sorted(paths, key=lambda p: p.chi2):
             if all(np.max(np.abs(path.z - better.z), initial=0.0) > SAME for better in apart):
@@ -296,12 +302,14 @@ def descend(records: LeastSquaresProblem, starts: Sequence[Array], tolerance: fl
     return min(paths, key=lambda p: p.chi2).z
 
 
-def advance(records: LeastSquaresProblem, paths: Sequence[Descent], tolerance: float, central: bool) -> None:
+def advance(
+    records: LeastSquaresProblem, paths: Sequence[Descent], tolerance: float, central: bool, limit: float
+) -> None:
     slopes = [records.residual_and_slopes(p.z)[1] for p in paths] if central else forward_slopes(records, paths)
     left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
     for path, square, slope in left if not central else ():
         falls = float(slope @ (step_in_box(square, slope, path.z, LEAST) - path.z))
-        path.done = falls <= tolerance * path.chi2
+        path.done = falls <= tolerance * path.chi2 or path.chi2 - REACH * falls > limit
     left = [one for one in left if not one[0].done]
     while left:
         dampings = [[max(f * p.damping, LEAST) for f in LADDER] for p, *_ in left]

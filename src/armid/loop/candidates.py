@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.engine import STANDARD, Calibration, Schedule, probes, simulate
+from armid.engine import STANDARD, Calibration, Schedule, Simulation, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.errors import ArmidError
 from armid.estimation.least_squares import side_by_side
@@ -109,7 +109,8 @@ class Library:
 
     candidates: key -> effect under its compiled name; originals: key -> effect as registered. bundles: keys that are
     compiled together. overrides, bounds, fixed: as `space_of` takes them, of the declared model and of candidates
-    alike. tolerances: of the constants, relative. say: called with a sentence before something that takes long.
+    alike. tolerances: of the constants, relative. misfit: rms residual of the best model so far in units of the noise,
+    at least 1. say: called with a sentence before something that takes long.
     """
 
     declared: Model
@@ -123,6 +124,7 @@ class Library:
     threads: int
     say: Callable[[str], None]
     tolerances: Mapping[str, float] = field(default_factory=dict)
+    misfit: float = 1.0
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
 
@@ -159,7 +161,7 @@ class Library:
             alone = [p.replays for p in known if p is not None and p.replays[0].model is model]
             if len(alone) < max(len(active), 2):
                 # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
-                replays = calibrated_replays(self.data.records, model, space, near or {}, on_one=bool(active))
+                replays = self.replays(model, space, near or {}, self.misfit, on_one=bool(active))
                 self._problems[key] = WhiteRecords(replays, space, self.data)
             else:
                 joined = []
@@ -170,23 +172,35 @@ class Library:
                 self._problems[key] = WhiteRecords(tuple(joined), space, self.data)
         return self._problems[key]
 
-    def about(self, replays: Sequence[Replay]) -> "Library":
-        """Return the library whose records in motion start as those of a fit, itself where no start is fitted."""
-        if not fits_starts(replays):
-            return self
-        return replace(self, data=replace(self.data, records=tuple(r.record for r in replays)), _problems={})
+    def about(self, replays: Sequence[Replay], misfit: float) -> "Library":
+        """Return the library for what comes next to a fit: its records in motion start where those of the fit do.
 
-    def recalibrated(self, active: Active, values: Mapping[str, float]) -> WhiteRecords | None:
-        """Return the problem with finer steps where those at hand are too coarse at some values, else None."""
+        misfit: of the fit. Itself where no start is fitted and the misfit is not another.
+        """
+        if fits_starts(replays):
+            data = replace(self.data, records=tuple(r.record for r in replays))
+            return replace(self, data=data, misfit=misfit, _problems={})
+        return self if 0.5 < misfit / self.misfit < 2.0 else replace(self, misfit=misfit, _problems={})
+
+    def recalibrated(self, active: Active, values: Mapping[str, float], misfit: float) -> WhiteRecords | None:
+        """Return the problem with finer steps where those at hand are too coarse at some values, else None.
+
+        misfit: of the fit to which the values belong.
+        """
         records = self.problem(active)
-        replays = calibrated_replays(self.data.records, records.model, records.space, values)
-        again = replace(records, replays=replays)
-        pairs = zip(again.replays, records.replays, strict=True)
-        calibrations = ((new, old) for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
-        if not any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations):
+        replays = self.replays(records.model, records.space, values, misfit)
+        if not is_finer(replays, records.replays):
             return None
-        self._problems[frozenset(active)] = again
+        self._problems[frozenset(active)] = again = replace(records, replays=replays)
         return again
+
+    def replays(
+        self, model: Model, space: Space, near: Mapping[str, float], misfit: float, on_one: bool = False
+    ) -> tuple[Replay, ...]:  # fmt: skip
+        """Return the train records ready to be simulated, as finely as a residual so many times the noise asks for."""
+        noise = [level.innovation for level in self.data.levels]
+        hidden = HIDDEN * misfit**2 / len(self.data.kept)
+        return calibrated_replays(self.data.records, model, space, near, on_one, noise, hidden)
 
     def compiled_model(self, active: Active) -> Model:
         """Return a model that holds the bundles of some candidates, or just them where bundles run in a circle."""
@@ -300,15 +314,24 @@ def idle(parameter: Parameter) -> float:
 
 # Candidates of one calibration, the factor of a known value within which they lie, and the schedules that are tried.
 N_PROBES, NEAR, SUBSTEPS = 8, 2.0, (1, 2, 4, 8)
+# What the engine's error may add to chi2 of a residual that is noise, and in proportion to one that is more.
+HIDDEN = 0.1
 
 
 def calibrated_replays(
-    records: Sequence[Record], model: Model, space: Space, near: Mapping[str, float], on_one: bool = False
+    records: Sequence[Record],
+    model: Model,
+    space: Space,
+    near: Mapping[str, float],
+    on_one: bool = False,
+    noise: Sequence[float] | None = None,
+    hidden: float = 0.0,
 ) -> tuple[Replay, ...]:
-    """Make records ready to be simulated, on the engine's standard accuracy: the noise of the records hides its error.
+    """Make records ready to be simulated, on the engine's standard accuracy or one that a decision cannot tell from it.
 
     near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
-    each sampling interval, which stands for the others.
+    each sampling interval, which stands for the others. noise: of each record [its unit]; hidden: mean square of the
+    engine's error, in units of it, that may be.
     """
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
     for i, name in enumerate(space.free_names):
@@ -316,6 +339,11 @@ def calibrated_replays(
             ends = sorted((near[name] / NEAR, near[name] * NEAR))
             low[i], high[i] = max(low[i], ends[0]), min(high[i], ends[1])
     spread = space.complete(probes(low, np.maximum(high, low), N_PROBES))
+    outputs = [o.name for o in model.plant.outputs]
+    allowed: dict[str, Array] = {}
+    for record, rms in zip(records, noise or (), strict=noise is not None):
+        of_file = allowed.setdefault(record.file, np.full(len(outputs), np.inf))
+        of_file[outputs.index(record.output) if record.output else 0] = np.sqrt(hidden) * rms
     known: dict[object, Calibration] = {}
     ready: list[Replay] = []
     # of the records of one file the first holds the others
@@ -324,14 +352,22 @@ def calibrated_replays(
         likenesses = [p.manoeuvre.interval if on_one else p.manoeuvre.likeness() for p in pieces]
         for likeness, piece in zip(likenesses, pieces, strict=True):
             if likeness not in known:
-                known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread)
+                known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed.get(record.file))
         ready += Replay(record, model, pieces, tuple(known[likeness] for likeness in likenesses)).each
     return tuple(ready)
 
 
-def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array) -> Calibration:
+def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
+    """Tell whether a piece is simulated with finer steps than in other replays of the same records."""
+    pairs = zip(replays, others, strict=True)
+    calibrations = ((new, old) for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
+    return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
+
+
+def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:
     """Return the coarsest of few schedules whose error on the candidates stays within half of the standard one.
 
+    Or within half of `rms`, that of each output [its unit], (n_outputs,), as a root mean square over the samples.
     `calibrate` would go on to steps that a screening of candidates cannot pay (a ripple so fine that the motion is a
     matter of chance asks for 128 in a sample), and would look for steps over several samples.
     """
@@ -340,9 +376,17 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array) -> Cal
     for n in SUBSTEPS:
         runs[2 * n] = runs.get(2 * n) or simulate(model, manoeuvre, spread, Schedule(2 * n))
         error = difference(runs[n], runs[2 * n], model) * 16 / 15
-        if error <= MARGIN * allowed and not (runs[n].failed & ~runs[2 * n].failed).any():
+        is_hidden = rms is not None and bool((rms_difference(runs[n], runs[2 * n]) * 16 / 15 <= MARGIN * rms).all())
+        if (error <= MARGIN * allowed or is_hidden) and not (runs[n].failed & ~runs[2 * n].failed).any():
             break
-    return Calibration(Schedule(n, weights=switch_weights(spread, runs[n])), error, bool(error <= allowed))
+    return Calibration(Schedule(n, weights=switch_weights(spread, runs[n])), error, is_hidden or bool(error <= allowed))
+
+
+def rms_difference(a: Simulation, b: Simulation) -> Array:
+    """Return the largest rms difference of a candidate that both simulations hold, of each output, (n_outputs,)."""
+    good = ~(a.failed | b.failed)
+    square = np.mean((a.outputs[:, good] - b.outputs[:, good]) ** 2, axis=-1)
+    return np.asarray(np.sqrt(np.max(square, axis=1, initial=0.0)))
 
 
 # Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.

@@ -33,7 +33,7 @@ from armid.loop.constants import (
 from armid.loop.diagnose import diagnose, diagnosed, holdout_residuals, is_significant, train_residuals
 from armid.loop.empirical import Term, empirical_term
 from armid.loop.equivalence import WITHIN, EffectGroup, Likeness, RivalModel, group_of, rival_models
-from armid.loop.fit import Fit, criterion, dwarfs_noise, predicted_alike, with_own_starts
+from armid.loop.fit import Fit, criterion, dwarfs_noise, predicted_alike, with_own_starts, with_standard_accuracy
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
     CARRIES_NOT,
@@ -334,7 +334,7 @@ def predicting_best(levels: Sequence[SearchLevel]) -> list[SearchLevel]:
 def with_starts_fitted(library: Library) -> Library:
     """Return the library whose records in motion start where the declared model fits best, others as they are."""
     records = library.problem(())
-    return library.about(with_fitted_starts(records.replays, records.space))
+    return library.about(with_fitted_starts(records.replays, records.space), library.misfit)
 
 
 def largest_named(levels: Sequence[SearchLevel], search: Search) -> tuple[Fit, list[EffectGroup], EffectGroup | None]:
@@ -389,7 +389,7 @@ def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, member
 
     biases: see `unseen_biases_of`. members: models that cannot be told from it, over which intervals reach.
     """
-    fit = with_own_starts(fit)
+    fit = with_own_starts(with_standard_accuracy(fit))
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
     diagnosis, unseen_diagnosis = diagnosed(fit), None if unseen is None else diagnose(unseen)
     train_error = campaign_errors(seen.judged, fit.candidate)

@@ -121,7 +121,7 @@ def freed_constants(base: Fit, chosen: Sequence[Product]) -> ConstantModel:
     z = descend(posed, [np.concatenate([base.z, np.full(len(chosen), 0.5)])], SETTLED)
     off = posed.off(z[np.newaxis])[0]
     records, at = posed.moved(off), z[: -len(chosen)]
-    fit = Fit(base.active, records, at, *records.residual_and_slopes(at), constants=posed.shares_at(off))
+    fit = Fit(base.active, records, at, records.residuals(at)[0], constants=posed.shares_at(off))
     columns = beyond(base.basis, columns_of(chosen, len(base.residual)))
     told = len(chosen) - np.trace(np.linalg.inv(columns.T @ columns + np.eye(len(chosen))))
     names = (p.public for p in chosen)

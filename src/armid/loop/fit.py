@@ -17,7 +17,7 @@ from armid.estimation.constants import Product, products
 from armid.estimation.design import BOX
 from armid.estimation.information import start_changes
 from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, spread_starts
-from armid.loop.candidates import Active, EffectKey
+from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer
 from armid.loop.whitening import WhiteRecords
 from armid.model import Model
 from armid.problem.starts import fits_starts, with_starts
@@ -40,16 +40,14 @@ class Fit:
     """Hold the declared model with some effects at its least-squares estimate.
 
     active: the effects that were added. records: the least-squares problem. z: free parameters as shares of their
-    range, (n_free,). residual: whitened, measured minus simulated, (n_samples,). jacobian: whitened derivatives of the
-    signal by z, (n_samples, n_free). constants: by how much each differs from its declared value, as a share of it; the
-    records hold them so. rough: whether z is near the estimate only.
+    range, (n_free,). residual: whitened, measured minus simulated, (n_samples,). constants: by how much each differs
+    from its declared value, as a share of it; the records hold them so. rough: whether z is near the estimate only.
     """
 
     active: Active
     records: WhiteRecords
     z: Array
     residual: Array
-    jacobian: Array
     constants: Mapping[str, float] = field(default_factory=dict)
     rough: bool = False
     _products: dict[tuple[tuple[str, float], ...], tuple[Product, ...]] = field(default_factory=dict)
@@ -57,6 +55,11 @@ class Fit:
     @cached_property
     def chi2(self) -> float:
         return float(self.residual @ self.residual)
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square of the residual in units of the noise, at least 1."""
+        return max(1.0, float(np.sqrt(self.chi2 / len(self.residual))))
 
     @property
     def n_free(self) -> int:
@@ -89,6 +92,11 @@ class Fit:
         """Whether the size of the residual is that of the noise: chi2 per sample not above 1 by chance of 1 %."""
         level, n = self.records.data.levels[0], len(self.residual) - self.n_free
         return level.known and bool(f_distribution.sf(self.chi2 / n, n, level.n_slow) > ONLY_NOISE)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Whitened derivatives of the signal by z, (n_samples, n_free); most models of a search are never asked."""
+        return self.records.with_all_samples().residual_and_slopes(self.z)[1]
 
     @cached_property
     def basis(self) -> Array:
@@ -167,11 +175,13 @@ def decomposed(columns: Array) -> tuple[Array, Array]:
     return np.asarray(left[:, good]), inverse
 
 
-def fit_from(records: WhiteRecords, active: Active, starts: Sequence[Array], rough: bool = False) -> Fit:
+def fit_from(
+    records: WhiteRecords, active: Active, starts: Sequence[Array], rough: bool = False, limit: float = np.inf
+) -> Fit:  # fmt: skip
     """Return the best of the least-squares estimates from some starts (shares of the range).
 
-    rough: stop where a step lowers chi2 by less than a thousandth.
-    Residual and slopes are those of all samples, whatever the fit saw.
+    rough: stop where a step lowers chi2 by less than a thousandth, or where chi2 will not come below the limit.
+    The residual is that of all samples, whatever the fit saw.
     Raises ArmidError when every start diverges.
     """
     z = np.empty(0)
@@ -179,8 +189,20 @@ def fit_from(records: WhiteRecords, active: Active, starts: Sequence[Array], rou
         good = [z for z, chi2 in zip(starts, records.chi2(np.array(starts)), strict=True) if np.isfinite(chi2)]
         if not good:
             raise ArmidError("each start of a fit diverged: other bounds are expected")
-        z = descend(records, good, ROUGHLY if rough else TOLERANCE)
-    return Fit(tuple(active), records, z, *records.with_all_samples().residual_and_slopes(z), rough=rough)
+        z = descend(records, good, ROUGHLY if rough else TOLERANCE, limit=limit)
+    return Fit(tuple(active), records, z, records.with_all_samples().residuals(z)[0], rough=rough)
+
+
+def with_standard_accuracy(fit: Fit) -> Fit:
+    """Return a fit whose records are simulated on the engine's standard accuracy, itself where they are already."""
+    records = fit.records
+    standard = calibrated_replays([r.record for r in records.replays], fit.model, records.space, fit.values)
+    if not is_finer(standard, records.replays):
+        return fit
+    # the pieces are those of the fit, whose constants may be others than the record's
+    pairs = zip(records.replays, standard, strict=True)
+    replays = tuple(replace(ours, calibrations=finer.calibrations) for ours, finer in pairs)
+    return replace(fit_from(replace(records, replays=replays), fit.active, [fit.z]), constants=fit.constants)
 
 
 def with_own_starts(fit: Fit) -> Fit:
@@ -189,7 +211,7 @@ def with_own_starts(fit: Fit) -> Fit:
         return fit
     for _ in range(MOST_ROUNDS):
         last, records = fit, replace(fit.records, replays=with_starts(fit.records.replays, fit.candidate))
-        fit = fit_from(records, fit.active, [fit.z])
+        fit = replace(fit_from(records, fit.active, [fit.z]), constants=fit.constants)
         if np.all(np.abs(fit.z - last.z) <= SETTLED) or abs(last.chi2 - fit.chi2) <= SETTLED * fit.chi2:
             break
     return fit

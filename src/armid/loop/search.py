@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
+from armid.estimation.least_squares import REACH
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
 from armid.loop.diagnose import diagnosed, is_significant
 from armid.loop.equivalence import substitutes
@@ -36,8 +37,6 @@ N_FREED, FREED_WITHIN = 4, 4.0
 FEWEST, MOST, WITHIN = 6, 12, 4.0
 # So many of them are refitted even where the score says that they cannot do as well as a model that is known.
 SURE = 4
-# The others must come to what is known with so many times their score: without a friction every rate is biased.
-REACH = 10.0
 # A drop of chi2 that one candidate in thousands reaches on noise: below it nothing is refitted.
 WORTH = 8.0
 # An addition whose statistic stays below this is not looked at further; one in ten thousand asks for 15.
@@ -107,12 +106,13 @@ class Search:
         the search ends.
         """
         levels, earned = [SearchLevel((self.start(),))], 1
+        self.library = self.library.about(levels[0].best.records.replays, levels[0].best.misfit)
         while len(levels) <= most:
             level = self.next_level(levels[-1], levels[earned - 1].best)
             if level is None:
                 break
             levels.append(level)
-            self.library = self.library.about(level.best.records.replays)
+            self.library = self.library.about(level.best.records.replays, level.best.misfit)
             if level.earned:
                 earned = len(levels)
             elif len(levels) > LOOK_AHEAD or not is_significant(level.best):
@@ -176,12 +176,16 @@ class Search:
         near = [s for s in worth if s.drop * WITHIN >= worth[0].drop]
         leading = worth[: max(FEWEST, min(MOST, len(near)))]
         self.add_each(parent, leading[:SURE])
-        known = [f.chi2 for active, f in self.fits.items() if len(active) == len(parent.active) + 1]
-        limit = min(known, default=np.inf)
+        limit = min((f.chi2 for f in self.of_size(len(parent.active) + 1)), default=np.inf)
         self.add_each(parent, [s for s in leading[SURE:] if parent.chi2 - REACH * s.drop <= limit])
 
     def add_each(self, parent: Fit, found: Iterable[Score]) -> None:
-        self.fit_each({frozenset((*parent.active, s.key)): partial(refitted, parent, s, self.library) for s in found})
+        """Fit a model with each of some candidates added, as far as it may come near the best of its size."""
+        best = min(self.of_size(len(parent.active) + 1), key=lambda f: f.chi2, default=None)
+        limit = np.inf if best is None else best.chi2 * max(COMPARABLE, float(np.exp(FAR / best.independent)))
+        self.fit_each({
+            frozenset((*parent.active, s.key)): partial(refitted, parent, s, self.library, limit) for s in found
+        })  # fmt: skip
 
     def exchange_substitutes(self, best: Fit) -> None:
         """Fit the models in which a candidate that moves the records alike stands in the place of an effect."""
@@ -282,14 +286,17 @@ def promising(smaller: Fit, larger: Fit) -> bool:
     return far_behind(smaller, larger) > PROMISING
 
 
-def refitted(current: Fit, found: Score, library: Library) -> Fit:
-    """Fit the extended model fully, from the best two of the starts of a score that are not next to each other."""
+def refitted(current: Fit, found: Score, library: Library, limit: float) -> Fit:
+    """Fit the extended model, from the best two of the starts of a score that are not next to each other.
+
+    limit: chi2 that must be in reach, else the fit is given up.
+    """
     active = (*current.active, found.key)
     records = library.problem(active)
     chi2 = records.chi2(np.array(found.starts[:N_TRIED]))
     first, second = (found.starts[i] for i in np.resize(np.argsort(chi2, kind="stable")[:2], 2))
     starts = [first, second] if np.max(np.abs(second - first)) > 0.02 else [first]
-    return fit_from(records, active, starts, rough=True)
+    return fit_from(records, active, starts, rough=True, limit=limit)
 
 
 def fit_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
@@ -311,7 +318,7 @@ def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
 
 def accurate(fit: Fit, library: Library) -> Fit:
     """Return the fit about its own starts, with finer steps where it ended where the engine's are too coarse."""
-    finer = library.recalibrated(fit.active, fit.values)
+    finer = library.recalibrated(fit.active, fit.values, fit.misfit)
     return with_own_starts(fit if finer is None else fit_from(finer, fit.active, [fit.z]))
 
 
@@ -340,7 +347,7 @@ def with_free_shapes(fit: Fit, key: EffectKey, library: Library) -> Fit:
     units = [records.model.parameters[n].unit for n in records.space.free_names]
     starts += [best_along(records, at, place, N_PLACES if units[place] == "s" else N_PLACES // 8)
                for place in map(int, np.flatnonzero(free)) for at in (z, rest)]  # fmt: skip
-    return fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts])
+    return fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts], rough=True)
 
 
 def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -> Array:
