@@ -332,7 +332,8 @@ def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array
 def close_loop(
     model: Any, campaign: Campaign | None = None, candidates: Any = None, rng: np.random.Generator | None = None,
     bounds: Bounds | None = None, fixed: Mapping[str, float] | None = None, threads: int = 1,
-    told: Callable[[str], None] = lambda _: None, *, without: Named = (), curve: bool = True, **given: Any,
+    told: Callable[[str], None] = lambda _: None, *, without: Named = (), curve: bool = True,
+    progress: Path | None = None, **given: Any,
 ) -> "ClosedLoop":  # fmt: skip
     """Find what a declared model lacks on the train records; `armid.close_loop("folder")` is enough.
 
@@ -340,7 +341,7 @@ def close_loop(
     ----------
     model : path, Campaign, or pandas DataFrames
         The campaign, whose declared model is taken; or a Model, with the campaign as second argument.
-    campaign, rng, bounds, fixed, threads, told, curve
+    campaign, rng, bounds, fixed, threads, told, curve, progress
         As of `armid.loop.close_loop`.
     candidates : names, Effects, or a mapping of name to Effect
         Effects to look for; None: all that apply.
@@ -368,7 +369,16 @@ def close_loop(
     left_out = effects_of(without, known, "--without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
     found: ClosedLoop = run(
-        there.model, there.campaign, kept, rng, there.bounds, {**(fixed or {}), **there.fixed}, threads, told, curve
+        there.model,
+        there.campaign,
+        kept,
+        rng,
+        there.bounds,
+        {**(fixed or {}), **there.fixed},
+        threads,
+        told,
+        curve,
+        progress,
     )
     return found
 

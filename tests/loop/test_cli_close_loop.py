@@ -5,6 +5,7 @@ import json
 import pytest
 
 from armid.cli.main import main
+from armid.estimation.least_squares import descend
 
 MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage")
 CANDIDATES = "coulomb,seal_friction,supply_sag,tilt,viscous"
@@ -71,3 +72,38 @@ def test_the_result_is_the_same_on_any_number_of_threads(stand, tmp_path):
         reports.append((out / "report.json").read_bytes())
     assert reports[0] == reports[1]
     assert len(json.loads(reports[0])["effects"]) == 2
+
+
+@pytest.mark.slow
+def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(stand, tmp_path, monkeypatch):
+    campaign = stand(*MANOEUVRES, "--repeats", "1", "--duration", "1.0", "--effect", "coulomb=30", "tilt_deg=2")
+    made = []
+
+    def counted(*given, **options):
+        if len(made) == stop_at:
+            raise KeyboardInterrupt
+        made.append(given)
+        return descend(*given, **options)
+
+    monkeypatch.setattr("armid.loop.fit.descend", counted)
+    stop_at, options = None, ("--candidates", CANDIDATES, "--threads", 1)
+    assert run(campaign, "--out", tmp_path / "whole", *options) == 0
+    n_whole = len(made)
+    assert not (tmp_path / "whole" / "progress.jsonl").exists()
+
+    made.clear()
+    stop_at = n_whole - 5
+    assert run(campaign, "--out", tmp_path / "cut", *options) == 130
+    kept = tmp_path / "cut" / "progress.jsonl"
+    assert list(kept.parent.iterdir()) == [kept]
+    lines = kept.read_text().splitlines()
+    assert len(lines) == stop_at
+    kept.write_text("\n".join([*lines[:-1], lines[-1][:20]]))  # the last line was being written
+
+    made.clear()
+    stop_at = None
+    assert run(campaign, "--out", tmp_path / "cut", *options) == 0
+    assert len(made) == 5 + 1
+    assert not kept.exists()
+    reports = [(tmp_path / name / "report.json").read_bytes() for name in ("whole", "cut")]
+    assert reports[0] == reports[1]

@@ -226,6 +226,7 @@ def read_point(path: Path) -> dict[str, float]:
 
 # Where the output is no terminal, so many seconds pass between two lines.
 SILENT_S = 60.0
+PROGRESS = "progress.jsonl"
 
 
 @command("close-loop", short_help="Find the effects that the declared model lacks.", epilog=examples(
@@ -249,7 +250,8 @@ def close_loop_command(
     Identifies the declared model on the train records, tells whether what remains is more than noise, names the effect
     that is missing (or says that it cannot), adds it and identifies again, until nothing earns its parameters. Records
     held out are simulated after the last decision. --bounds and --fix may name parameters of candidates too; searches
-    start from evenly spread points, so that nothing is random. Every verdict exits with 0.
+    start from evenly spread points, so that nothing is random. Every verdict exits with 0. What is cut off goes on with
+    the same command, from the fits that DIR/progress.jsonl holds until then.
     """
     from numpy.random import default_rng
 
@@ -259,8 +261,10 @@ def close_loop_command(
     refuse_unwritable(out)
     with status_line() as tell:
         found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=tell, without=without,
-                           curve=not no_curve, **given(effects, plugins, window, bounds, fix))  # fmt: skip
+                           curve=not no_curve, progress=out / PROGRESS,
+                           **given(effects, plugins, window, bounds, fix))  # fmt: skip
     show_and_save(found, out)
+    (out / PROGRESS).unlink(missing_ok=True)
 
 
 @contextmanager

@@ -4,10 +4,15 @@ Free parameters stand as shares z of their range, in 0 to 1; residuals are measu
 engine runs eight candidates in the time of one, so that whatever can be asked at once is one population.
 """
 
+import hashlib
+import json
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from threading import Lock
 from typing import TypeVar
 
 import numpy as np
@@ -392,3 +397,40 @@ def side_by_side(work: Callable[[S], T], items: Iterable[S], threads: int) -> li
     # A pool of its own: work that waited for the engine's lanes in the same pool would wait for itself.
     with ThreadPoolExecutor(threads, thread_name_prefix="armid") as pool:
         return list(pool.map(work, tasks))
+
+
+class Estimates:
+    """Keep estimates in a file as they are made, so that a second start of the same search goes on from them.
+
+    path: of the file, one estimate a line; made with the first.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self._lock = path, Lock()
+        lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+        self._known: dict[str, list[float]] = {}
+        for line in lines:
+            with suppress(ValueError):  # the last one may have been cut off
+                self._known.update([json.loads(line)])
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def recalled(self, asked: Sequence[object], make: Callable[[], Array]) -> Array:
+        """Return the estimate that was made for the same question, else make it and keep it.
+
+        asked: arrays and numbers that stand for records, model and start: sums of squares at the starts are enough, as
+        no two problems share all digits.
+        """
+        parts = (one.tobytes() if isinstance(one, np.ndarray) else repr(one).encode() for one in asked)
+        key = hashlib.sha256(b"/".join(parts)).hexdigest()[:32]
+        if key in self._known:
+            return np.array(self._known[key])
+        found = make()
+        self._known[key] = found.tolist()
+        # On a disk that is full the search goes on; saving its result says so.
+        with self._lock, suppress(OSError):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps([key, self._known[key]]) + "\n")
+        return found

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from armid.estimation.advice import Advice, Rival, advise
 from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
-from armid.estimation.least_squares import with_fitted_starts
+from armid.estimation.least_squares import Estimates, with_fitted_starts
 from armid.estimation.screen import screen
 from armid.loop.candidates import (
     CONSTANT,
@@ -89,6 +90,7 @@ def close_loop(
     threads: int = 1,
     told: Callable[[str], None] = lambda _: None,
     curve: bool = True,
+    progress: Path | None = None,
 ) -> ClosedLoop:
     """Find what a declared model lacks on the train records of a campaign, and judge it on those held out.
 
@@ -114,6 +116,8 @@ def close_loop(
         Called with a sentence before what takes long.
     curve : bool
         Whether an empirical curve is tried where no effect will do.
+    progress : Path, optional
+        File in which estimates are kept as they are made: a second start goes on from them.
 
     Returns
     -------
@@ -130,10 +134,14 @@ def close_loop(
         model = replace(model, plant=model.plant.known_roughly(campaign.rough))
         candidates = {**candidates, **constant_effects(campaign.rough)}
 
+    estimates = None if progress is None else Estimates(progress)
+    if estimates:
+        told(f"going on from {len(estimates)} fits of {progress}")
+
     def library_for(records: Sequence[Record]) -> Library:
-        return with_starts_fitted(
-            library_of(model, candidates, whitened(records, model.plant), campaign.parameters, bounds or {},
-                       fixed or {}, threads, told, within))  # fmt: skip
+        data = replace(whitened(records, model.plant), estimates=estimates)
+        return with_starts_fitted(library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {},
+                                             threads, told, within))  # fmt: skip
 
     implausible = implausible_records(model, campaign, bounds or {}, fixed or {})
     found, suspects, train = settled(library_for, campaign.train, curve, bool(implausible))

@@ -5,7 +5,7 @@ That is judged by significance, by a criterion, and by the prediction of what wa
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,10 +186,13 @@ def fit_from(
     """
     z = np.empty(0)
     if records.space.free.any():
-        good = [z for z, chi2 in zip(starts, records.chi2(np.array(starts)), strict=True) if np.isfinite(chi2)]
-        if not good:
+        tried, tolerance, kept = np.array(starts), ROUGHLY if rough else TOLERANCE, records.data.estimates
+        chi2 = records.chi2(tried)
+        good = tried[np.isfinite(chi2)]
+        if not len(good):
             raise ArmidError("each start of a fit diverged: other bounds are expected")
-        z = descend(records, good, ROUGHLY if rough else TOLERANCE, limit=limit)
+        make = partial(descend, records, list(good), tolerance, limit=limit)
+        z = make() if kept is None else kept.recalled((tried, chi2, tolerance, limit), make)
     return Fit(tuple(active), records, z, records.with_all_samples().residuals(z)[0], rough=rough)
 
 

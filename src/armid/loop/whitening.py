@@ -16,7 +16,7 @@ from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
 from armid.estimation.information import MISFIT
-from armid.estimation.least_squares import LeastSquaresProblem
+from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.model import Plant
 from armid.problem.problem import signals_of
 from armid.record import Record
@@ -151,13 +151,14 @@ class WhitenedData:
     """Hold records with their noise, the outputs of one file as a record each.
 
     levels: noise of each record. kept: which of all samples enter fits, (n_samples,). sound: 0 where a sample is no
-    data, else 1, (n_samples,); None where all are data.
+    data, else 1, (n_samples,); None where all are data. estimates: where those of fits are kept, None: nowhere.
     """
 
     records: tuple[Record, ...]
     levels: tuple[NoiseLevel, ...]
     kept: NDArray[np.bool_]
     sound: Array | None = None
+    estimates: Estimates | None = None
 
     @cached_property
     def lengths(self) -> tuple[tuple[int, ...], ...]:
