@@ -139,11 +139,23 @@ def test_runs_as_a_module_and_its_errors_set_the_exit_code(other_process):
     assert "Traceback" not in bad.stderr
 
 
-def test_a_reader_that_leaves_is_no_error_of_ours(root):
-    command = [sys.executable, "-m", "armid", "list", "plants"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root) as process:
+def test_a_reader_that_leaves_changes_nothing_but_what_he_reads(small_folder, root, tmp_path):
+    """As `| head -1` leaves, and `2>&1 | head -1`: what was computed is saved, and the exit code stays."""
+    out = tmp_path / "out"
+    quick = ("--window", "0:0.4", "--budget", "80", "--identifier", "random", "--out", out)
+    calls = [("list", "plants"), ("list", "plants", "--quiet"), ("list", "plants", "--json"),
+             ("identify", small_folder, *quick), ("report", out)]  # fmt: skip
+    for call in calls:
+        command = [sys.executable, "-m", "armid", *map(str, call)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root) as process:
+            process.stdout.close()
+            told = process.stderr.read()
+        assert (process.returncode, told) == (0, b""), call
+        assert out not in call or (out / "report.html").stat().st_size > 0, call
+        (out / "report.html").unlink(missing_ok=True)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=root) as process:
         process.stdout.close()
-        assert b"Traceback" not in process.stderr.read()
+    assert (process.returncode, (out / "report.html").is_file()) == (0, True)
 
 
 def test_every_command_tells_an_example_that_exists(every_command):

@@ -28,6 +28,7 @@ from armid.cli.options import (
     say,
     seed_option,
     speaks,
+    tell,
     value_of,
 )
 from armid.cli.report import show_and_save
@@ -277,7 +278,7 @@ def status_line() -> Iterator[Callable[[str], None]]:
             nonlocal last
             if speaks() and time.monotonic() - last >= SILENT_S:
                 last = time.monotonic()
-                print(f"{last - began:.0f} s: {sentence}", file=sys.stderr, flush=True)
+                tell(f"{last - began:.0f} s: {sentence}")
 
         yield now_and_then
         return

@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from armid.cli.options import tell
 from armid.errors import ArmidError, on_a_line
 
 BAD_INPUT, INTERRUPTED = 2, 130
@@ -75,7 +76,7 @@ def app() -> None:
 
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
     """Print a warning as one line."""
-    print(f"armid: warning: {message}", file=sys.stderr)
+    tell(f"armid: warning: {message}")
 
 
 def asked_to_end(number: int, frame: Any) -> None:
@@ -104,9 +105,6 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(BAD_INPUT)
     except click.ClickException as error:
         stop(f"{error.format_message()} (see --help)", BAD_INPUT)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(1)
     except OSError as error:
         stop(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}", BAD_INPUT)
     except MemoryError as error:
@@ -126,5 +124,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 def stop(sentence: str, code: int) -> None:
     """Print a sentence to the error stream and leave."""
-    print(f"armid: {on_a_line(sentence)}", file=sys.stderr)
+    tell(f"armid: {on_a_line(sentence)}")
     sys.exit(code)

@@ -2,16 +2,20 @@
 
 import json
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from armid.errors import ArmidError, nearest
+
+if TYPE_CHECKING:
+    from armid.report.document import Document
 
 
 def kept(context: click.Context, option: click.Parameter, value: bool) -> None:
@@ -26,12 +30,12 @@ OUTPUT = (
 
 
 class Command(click.Command):
-    """A command with --json and --quiet; it prints by `say` and `give` alone."""
+    """A command with --json and --quiet; it prints by `say`, `present`, `give` and `tell` alone."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; it tells on the error stream that a model is being compiled."""
         # asked here, as what is announced comes from another thread
-        with nullcontext() if wants("quiet") else announcing(lambda text: print(f"armid: {text}", file=sys.stderr)):
+        with nullcontext() if wants("quiet") else announcing(lambda text: tell(f"armid: {text}")):
             return super().invoke(ctx)
 
     def __init__(self, *given: Any, **named: Any) -> None:
@@ -73,16 +77,44 @@ def speaks() -> bool:
     return not (wants("json") or wants("quiet"))
 
 
+@contextmanager
+def while_read(stream: TextIO) -> Iterator[None]:
+    """Print for as long as someone reads: the work goes on after `| head -1`, and what is said then goes nowhere."""
+    try:
+        yield
+    except BrokenPipeError:
+        # Python, too, writes what is left when it ends
+        with open(os.devnull, "w", encoding="utf-8") as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())
+
+
 def say(*lines: str) -> None:
     """Print lines as soon as they are said, unless --json or --quiet was given."""
     if speaks():
-        print(*lines, sep="\n", flush=True)
+        with while_read(sys.stdout):
+            print(*lines, sep="\n", flush=True)
+
+
+def present(document: "Document") -> None:
+    """Print answer and main tables of a document, unless --json or --quiet was given."""
+    from armid.report.terminal import show
+
+    if speaks():
+        with while_read(sys.stdout):
+            show(document)
 
 
 def give(**found: Any) -> None:
     """Print what was found as one JSON object where --json was given; once a command."""
     if wants("json"):
-        print(json.dumps(found, allow_nan=False, default=str))
+        with while_read(sys.stdout):
+            print(json.dumps(found, allow_nan=False, default=str), flush=True)
+
+
+def tell(text: str) -> None:
+    """Print a line beside the output, whose first line is the answer."""
+    with while_read(sys.stderr):
+        print(text, file=sys.stderr, flush=True)
 
 
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))

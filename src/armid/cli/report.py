@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armid.cli.options import command, examples, give, plugin_option, say, speaks
+from armid.cli.options import command, examples, give, plugin_option, present, say
 from armid.errors import ArmidError
 from armid.registry import load_registry
 from armid.report.result import (
@@ -25,11 +25,8 @@ from armid.report.result import (
 
 def show_and_save(found: Result, out: Path | None) -> None:
     """Print the answer and the main tables of a result, then with a folder write its files, all or none."""
-    from armid.report.terminal import show
-
     document = found.document()
-    if speaks():
-        show(document)
+    present(document)
     files = [] if out is None else found.save(out, made_by())
     if files:
         say(f"wrote {', '.join(files)} to {out}")
@@ -69,7 +66,6 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     """
     from armid.report.html import html
     from armid.report.markdown import markdown
-    from armid.report.terminal import show
 
     kind = kind_in(folder)
     refuse_unwritable(folder if kind else None)
@@ -80,8 +76,7 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
         raise ArmidError(f"{folder} holds no study, and a key is the truth of a study's campaigns: none is expected")
     document = document_of(folder, kind, str(folder))
     with NewFiles(folder) as files, refuse_damaged(folder, kind):
-        if speaks():
-            show(document)
+        present(document)
         page = html(document)
         files.path(kind.page).write_text(page, encoding="utf-8")
         files.path(kind.markdown).write_text(markdown(document), encoding="utf-8")
@@ -90,7 +85,6 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
 
 
 def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
-    from armid.report.terminal import show
     from armid.study.document import report_of, write_report
     from armid.study.results import load_study
 
@@ -100,8 +94,7 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
     document = report_of(results, key, load_registry(plugins).analyses, again)
     place = results.path.parent
     refuse_unwritable(place)
-    if speaks():
-        show(document)
+    present(document)
     with NewFiles(place) as files:
         write_report(document, files)
     say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")

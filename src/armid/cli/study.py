@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armid.cli.options import command, examples, give, out_option, plugin_option, say, speaks
+from armid.cli.options import command, examples, give, out_option, plugin_option, present, say, speaks, tell
 
 if TYPE_CHECKING:
     from armid.study.runner import Ending
@@ -50,8 +50,7 @@ def study_command(
     with ProgressBar(speaks()) as watch:
         known = read_study(study, absolute(plugins))
         if isinstance(known, Study) and speaks():
-            # beside the output, whose first line is the answer
-            print(f"{known.name}: {known.cost()}; what is finished already is kept", file=sys.stderr, flush=True)
+            tell(f"{known.name}: {known.cost()}; what is finished already is kept")
         limit = TIME_LIMIT_S if time_limit is None else time_limit
         ending = run(known, study, jobs, dask, out, limit, only, retry, watch.update)
     answer = show_answer(ending.folder) if ending.counts.done else []
@@ -64,13 +63,11 @@ def study_command(
 
 def show_answer(folder: Path) -> list[str]:
     """Print the answer so far with its table; return its sentences."""
-    from armid.report.terminal import show
     from armid.study.document import summary_of
     from armid.study.results import load_study
 
     document = summary_of(load_study(folder))
-    if speaks():
-        show(document)
+    present(document)
     return document.said
 
 

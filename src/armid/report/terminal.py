@@ -27,10 +27,18 @@ def show(document: Document) -> None:
     """Print warning, answer and main parts of a document; nothing from files is taken for markup or control codes.
 
     The width is that of the terminal, or COLUMNS; into a pipe without either tables are 80 wide and sentences whole.
+    Raises BrokenPipeError when who reads the output has gone.
     """
     from rich.console import Console
 
     console = Console()
+    with console.capture() as captured:
+        show_on(console, document)
+    # not by rich, which ends the program where a pipe is broken
+    print(captured.get(), end="", flush=True)
+
+
+def show_on(console: "Console", document: Document) -> None:
     whole = not sys.stdout.isatty()
 
     def say(text: str) -> None:
