@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armid.contract.check import check_campaign
+from armid.engine.simulate import Prepared
 from armid.errors import ArmidError
-from armid.estimation.screen import screen
+from armid.estimation.screen import Trial, screen, shortened
+from armid.model import EFFECTS
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
 from armid.record.table import read_table
@@ -284,6 +287,34 @@ def halves(folder: Path, windows: tuple[str, str]) -> Path:
     copied(file, "second.csv", "train", more=windows[1])(folder)
     toml((f'file = "{file}"', f'file = "{file}"\n{windows[0]}'))(folder)
     return folder
+
+
+def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
+    """Most of its motion comes after the samples that a screen begins with, and it is seen all the same."""
+    folder, n, steps = campaign("one"), 200_000, []
+    columns = dict(read_table(folder / "lower.csv", "lower.csv").columns)
+    often = np.linspace(0.0, 0.7, n)
+    measured = np.interp(often, columns["time_s"], columns[SPEED]) + np.random.default_rng(1).normal(0.0, 0.2, n)
+    write_table(folder / "lower.csv", {"time_s": np.round(often, 9), SPEED: measured})
+    run = Prepared.run
+
+    def counted(self, population, *more, **named):
+        steps.append(len(population) * self.n_samples * self.settings[4])
+        return run(self, population, *more, **named)
+
+    monkeypatch.setattr(Prepared, "run", counted)
+    read = read_campaign(folder)
+    points = list(check_campaign(read, dict(EFFECTS)))
+    assert [point.sentence for point in points if not point.passed] == []
+    # with all its samples one candidate in the middle, and once 8 others in steps of a quarter
+    assert sum(steps) < 120 * n
+    model = read.model()
+    whole = shortened(read.train[0], 1)
+    thinned = Trial(model, space_of(model, read.parameters)).thinned(whole, 1)
+    assert (whole.n_samples, thinned.n_samples) == (n, 1 + n // 12)
+    assert thinned.duration == pytest.approx(whole.duration, rel=1e-3)
+    change(SPEED, np.negative, "lower.csv")(folder)
+    assert any("sign looks inverted" in sentence for sentence in said_of(folder))
 
 
 def test_check_and_identify_say_it(campaign, capsys):

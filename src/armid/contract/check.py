@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 from armid.contract.equations import check_effect, check_plant
 from armid.contract.identifier import check_identifier
 from armid.contract.trials import ContractPoint
+from armid.engine import calibrate
 from armid.errors import ArmidError
 from armid.estimation.mends import Suspicion
 from armid.estimation.screen import screen
 from armid.identifiers import as_identifier
-from armid.model import PLANTS, Effect, Plant
+from armid.model import PLANTS, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
-from armid.problem.problem import replays
+from armid.problem.problem import Replay, accuracy_for
 from armid.problem.space import space_of
-from armid.record import Campaign
+from armid.record import Campaign, Record
 from armid.report.style import pyplot
 
 if TYPE_CHECKING:
@@ -187,9 +188,9 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         space = space_of(model, campaign.parameters)
         free = ", ".join(space.free_names) or "nothing"
         yield ContractPoint("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")
-        middle = 0.5 * (space.low + space.high)[space.free]
-        for replay in replays(campaign.records, model, space):
-            signal = replay.signal(space.complete(middle[np.newaxis]))[0]
+        middle = space.complete(0.5 * (space.low + space.high)[np.newaxis, space.free])
+        for replay in (one for record in campaign.records for one in replay_at(middle, record, model).each):
+            signal = replay.signal(middle)[0]
             whole = bool(np.isfinite(signal).all())
             size = f"up to {np.max(np.abs(signal)):.3g}" if whole else "diverges"
             text = f"simulated {size}, measured up to {np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
@@ -197,6 +198,16 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         yield from plausible(screen(campaign, model, space))
     except ArmidError as error:
         yield ContractPoint("model", False, str(error))
+
+
+def replay_at(candidate: Array, record: Record, model: Model) -> Replay:
+    """Make a record ready to be simulated with one candidate, (1, n_parameters): the engine is calibrated for no other.
+
+    That costs a small part of what the whole box does, and of a long record that is most of a check.
+    """
+    pieces, accuracy = tuple(p.until_window_end() for p in record.pieces), accuracy_for(record, model)
+    calibrations = (calibrate(model, p.manoeuvre, candidate, accuracy, spans=False) for p in pieces)
+    return Replay(record, model, pieces, tuple(calibrations))
 
 
 def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:

@@ -198,7 +198,8 @@ def long_steps(
 def difference(a: Simulation, b: Simulation, model: Model) -> float:
     """Return the largest difference of two simulations where both hold [unit of the first output]."""
     good, (x, y) = ~(a.failed | b.failed), (run.joint(model.plant.sizes) for run in (a, b))
-    return float(np.max(np.abs(x[good] - y[good]), initial=0.0))
+    # row by row: of a long record all differences at once would fill the memory
+    return max((float(np.max(np.abs(x[i] - y[i]))) for i in np.flatnonzero(good)), default=0.0)
 
 
 def lasting_difference(a: Simulation, b: Simulation, interval: float) -> float:

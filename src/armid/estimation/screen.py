@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armid.engine import Calibration, Schedule, probes
 from armid.estimation.least_squares import WeightedRecords, descend
 from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, of_pieces, rms, with_constants
-from armid.model import Model
+from armid.model import Manoeuvre, Model, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Record
@@ -38,6 +38,8 @@ N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
 # the best so many.
 N_LIKELY, N_HARD, N_BEST = 5, 512, 8
 MOST_VALUES, MOST_APART = 2**24, 6
+# Share of a signal by which a simulation may change when samples of a long record are left out.
+SAME = 0.01
 # A clock that is off by fewer samples, or by more than this share of the record, is not looked for.
 LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 # Integration steps between samples, relative fall of squares at which a rough fit has arrived.
@@ -74,10 +76,12 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
     if not train:
         return tuple(seen)
     trial = Trial(model, space).scaled(train)
+    train = [trial.thinned(r, len(train)) for r in train]
     found, z = mistakes(trial, train)
     errors = trial.errors(train, z)
-    others = [shortened(r, len(campaign.holdout)) for r in campaign.holdout if r.file not in noise]
     if not found:
+        n = len(campaign.holdout)
+        others = [trial.thinned(shortened(r, n), n) for r in campaign.holdout if r.file not in noise]
         found += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))]
     return (*seen, *found)
 
@@ -127,6 +131,30 @@ class Trial:
         # boxes are wide, and most machines lie in their lower part
         spread[::2] **= 3
         return spread
+
+    def thinned(self, record: Record, n_records: int) -> Record:
+        """Return a long record with no more samples than it takes to see how candidates move.
+
+        Every so many-th sample is kept, as long as a simulation from one to the next is that of all samples.
+        """
+        step = record.n_samples // most_samples(n_records)
+        if step < 2 or len(record.pieces) > 1 or record.pieces[0].start_index:
+            return record
+        Z = self.spread([record], N_BEST)
+        whole = self.signals(record, Z)
+        while step > 1:
+            rarer = every(record, step, self.model.plant)
+            kept = [signal[:, -record.pieces[0].window.start % step :: step] for signal in whole]
+            pairs = zip(self.signals(rarer, Z), kept, strict=True)
+            if all(float(np.linalg.norm(a - b)) <= SAME * float(np.linalg.norm(b)) for a, b in pairs):
+                return rarer
+            step //= 2
+        return record
+
+    def signals(self, record: Record, Z: Array) -> list[Array]:
+        """Return each output of a file at candidates in shares, (n_candidates, n_samples), 0 where one diverges."""
+        problem = self.problem([record])
+        return [np.nan_to_num(x) for x in signals_of(problem.replays, self.space.complete(problem.values(Z)))]
 
     def likeness(self, record: Record) -> float:
         """Return the largest cosine, either sign, between what was measured and what candidates do."""
@@ -276,10 +304,13 @@ def told_as(other: Record) -> Mend:
     return Mend("exchanged", np.nan, words, of_pieces(with_constants, constants=constants), other.file)
 
 
+def most_samples(n_records: int) -> int:
+    return max(MOST_SAMPLES // n_records, FEWEST_SAMPLES)
+
+
 def shortened(record: Record, n_records: int) -> Record:
     """Return a record cut to what is looked at; whole where most of its motion comes later."""
-    most = max(MOST_SAMPLES // n_records, FEWEST_SAMPLES)
-    pieces, left = [], most
+    pieces, left = [], most_samples(n_records)
     for piece in record.pieces:
         if left < min(FEWEST_SAMPLES, piece.n_samples):
             break
@@ -296,6 +327,26 @@ def shortened(record: Record, n_records: int) -> Record:
 def cut(record: Record, windows: Sequence[slice]) -> Record:
     pairs = zip(record.pieces, windows, strict=False)
     return replace(record, pieces=tuple(replace(p, window=w).until_window_end() for p, w in pairs))
+
+
+def every(record: Record, step: int, plant: Plant) -> Record:
+    """Return a record of one piece with every so many-th sample; inputs are averages, so that no impulse is lost."""
+    (piece,), holds = record.pieces, {i.name: i.hold or record.manoeuvre.hold for i in plant.inputs}
+
+    def averages(x: Array, hold: str) -> Array:
+        # over the samples up to the next that stays, of an input that runs straight over as many on either side
+        first = np.maximum(np.arange(0, len(x), step) - (0 if hold == "zero" else step // 2), 0)
+        return np.asarray(np.add.reduceat(x, first) / np.diff(np.append(first, len(x))))
+
+    def rarer(old: Manoeuvre) -> Manoeuvre:
+        inputs = {name: averages(x, holds[name]) for name, x in old.inputs.items()}
+        return replace(old, interval=step * old.interval, n_samples=-(-old.n_samples // step), inputs=inputs)
+
+    window = slice(*(-(-end // step) for end in (piece.window.start, piece.window.stop)))
+    kept = replace(piece, manoeuvre=rarer(piece.manoeuvre), measured=piece.measured[::step], window=window)
+    others = tuple(every(one, step, plant) for one in record.others)
+    return replace(record, manoeuvre=rarer(record.manoeuvre), measured=record.measured[::step], pieces=(kept,),
+                   others=others)  # fmt: skip
 
 
 def noise_or_rest(record: Record) -> Iterator[Suspicion]:
