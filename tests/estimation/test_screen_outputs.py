@@ -42,6 +42,19 @@ def together(change_of):
     return made
 
 
+def clock(factor, file):
+    return change("time_s", lambda t: factor * t, file)
+
+
+def drives_exchanged(folder):
+    """Each of two files gets the drive column of the other, as long as both last."""
+    both_files = [dict(read_table(folder / file, file).columns) for file in FILES[:2]]
+    n = min(len(columns["time_s"]) for columns in both_files)
+    for file, columns, other in zip(FILES, both_files, both_files[::-1], strict=False):
+        mixed = {name: (other if name.startswith("drive") else columns)[name][:n] for name in columns}
+        write_table(folder / file, mixed)
+
+
 def without_speed(folder):
     columns = dict(read_table(folder / "b.csv", "b.csv").columns)
     write_table(folder / "b.csv", {name: values for name, values in columns.items() if name != SPEED})
@@ -80,6 +93,19 @@ MISTAKES = {
     "absolute": (write_link, (together(lambda hub, twist: (hub, hub + twist)),), "deflection looks counted from"),
     "deflection is noise": (write_link, (change(TWIST, noise, "b.csv"),), r"b\.csv: the measured deflection is noise"),
     "drive late": (write_link, (change(DRIVE, later, "a.csv"),), r"a\.csv: its clock looks 0\.(09|1)\d* s early"),
+    "drive late once": (bare, (change("drive_N", partial(later, n=50), "b.csv"),), r"b\.csv: its clock looks 0\.[01]"),
+    "ms once": (write_arm, (clock(1000, "a.csv"),), r"a\.csv: time_s looks like milli"),
+    "of two, ms once": (both, (clock(1000, "b.csv"),), r"b\.csv: time_s looks like milli"),
+    "ten times once": (write_arm, (clock(10, "b.csv"),), r"b\.csv: time_s looks ten times too"),
+    "link, ten times once": (
+        write_link, (clock(10, "a.csv"),), r"[: ]a\.csv: time_s looks ten times too long"),
+    "drives exchanged": (write_arm, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged: each with the inputs"),
+    "drives exchanged, axis": (bare, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged"),
+    "drives exchanged, link": (write_link, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged"),
+    "deflection in rad": (
+        write_link, (everywhere(TWIST, np.deg2rad),), r"every.*deflection \[rad\]: 57\.3 times too small"),
+    "deflection in rad once": (
+        write_link, (change(TWIST, np.deg2rad, "b.csv"),), r"b\.csv: the measured deflection \[rad\]: 57\.3 times too"),
     "link ms": (write_link, (everywhere("time_s", lambda t: 1000.0 * t),), "every.*milliseconds"),
 }  # fmt: skip
 RIGHT = {

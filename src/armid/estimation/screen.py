@@ -5,7 +5,7 @@ the declared model is fitted roughly to the train records; where it misses more 
 of mistakes is undone in turn, and one is named only where that takes away most of the misfit.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -18,7 +18,7 @@ from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, of_pieces, rm
 from armid.model import Manoeuvre, Model, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.problem.space import Space, space_of
-from armid.record import Campaign, Record
+from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
 from armid.record.noise import correlation_sum
 from armid.record.table import POSITIONS
@@ -38,6 +38,8 @@ N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
 # the best so many.
 N_LIKELY, N_HARD, N_BEST = 5, 512, 8
 MOST_VALUES, MOST_APART = 2**24, 6
+# Train records up to so many are few; samples that two of them must have in common to be exchanged.
+FEW, FEWEST_COMMON = 3, 100
 # Share of a signal by which a simulation may change when samples of a long record are left out.
 SAME = 0.01
 # A clock that is off by fewer samples, or by more than this share of the record, is not looked for.
@@ -214,11 +216,13 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Ar
     z, before = trial.fit(train)
     if trial.errors(train, z).max() <= TOLERABLE:
         return [], z
+    # a mend begins at spread candidates, and is compared with what the declared model was there
+    below = max(before, min(rms(e) for e in trial.errors(train, trial.spread(train))))
     tried = []
     for mend in trial.mends(train[0], np.concatenate([[z], trial.spread(train[:1])])):
         undone = tuple(map(mend.undo, train))
         own = trial.scaled(undone)
-        tried.append((*own.fit(undone, below=before), mend, own, undone))
+        tried.append((*own.fit(undone, below=below), mend, own, undone))
     declared = space_of(trial.model)
     if not all(np.array_equal(getattr(declared, n), getattr(trial.space, n), True) for n in ("low", "high", "fixed")):
         own = Trial(trial.model, declared)
@@ -230,7 +234,9 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Ar
     found = chosen("", before, [(own.fit_hard(undone, starts)[1], mend) for _, _, mend, own, undone in likely])
     if trial.errors(train, z).max() <= TOLERABLE or any(s.after <= TOLERABLE for s in found):
         return found, z
-    everywhere = found
+    everywhere, found = found, of_few(trial, train, before, below)
+    if found:
+        return found, z
     z = agreed(trial, train, z)
     errors = trial.errors(train, z)[0]
     typical = typical_of(errors)
@@ -241,6 +247,43 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Ar
         found = [unlike(r.file, e) for r, e in zip(train, errors, strict=True)
                  if NOTHING < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
     return found or everywhere, z
+
+
+def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -> list[Suspicion]:
+    """Return the mistake in one of few records, or the exchange of two, with which the model fits all of them well.
+
+    Of two or three records no majority says which are right: each mend of each is fitted together with the others.
+    below: see `Trial.fit`.
+    """
+    if not 1 < len(train) <= FEW:
+        return []
+    tried = []
+    for changes in changes_of_few(trial, train):
+        undone = tuple(changes[r.file].undo(r) if r.file in changes else r for r in train)
+        own, (file, mend) = trial.scaled(undone), next(iter(changes.items()))
+        tried.append((*own.fit(undone, below=below), own, undone, file, mend))
+    found = []
+    for start, _, own, undone, file, mend in sorted(tried, key=lambda t: t[1])[:N_LIKELY]:
+        z, error = own.fit_hard(undone, [start])
+        if own.errors(undone, z).max() <= TOLERABLE:
+            found.append((error, file, mend))
+    if not found:
+        return []
+    first = min(found, key=lambda f: f[0])[1]
+    told = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in found]
+    return chosen(first, before, told)
+
+
+def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Mend]]:
+    """Yield what may be undone in one record, or in two that are exchanged, file -> mend."""
+    for record in train:
+        others = trial.fit([r for r in train if r is not record])[0]
+        for mend in trial.mends(record, others[np.newaxis]):
+            yield {record.file: mend}
+    for a, b in combinations([r for r in train if len(r.pieces) == 1], 2):
+        ends = [r.pieces[0].window for r in (a, b)]
+        if min(w.stop for w in ends) - max(w.start for w in ends) >= FEWEST_COMMON:
+            yield {a.file: told_as(b), b.file: told_as(a)}
 
 
 def agreed(trial: Trial, train: Sequence[Record], z: Array) -> Array:
@@ -299,9 +342,20 @@ def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], 
 
 def told_as(other: Record) -> Mend:
     """Return what gives a record the manoeuvre of another, but for the state from which it starts."""
-    constants = {n: v for n, v in other.pieces[0].manoeuvre.constants.items() if not n.startswith("start_")}
-    words = f"it and {other.file} look exchanged: each with the manoeuvre of the other"
-    return Mend("exchanged", np.nan, words, of_pieces(with_constants, constants=constants), other.file)
+    manoeuvre = other.pieces[0].manoeuvre
+    constants = {n: v for n, v in manoeuvre.constants.items() if not n.startswith("start_")}
+    what = "inputs" if manoeuvre.inputs else "manoeuvre"
+    words = f"it and {other.file} look exchanged: each with the {what} of the other"
+    undo = of_pieces(driven_as, constants=constants, inputs=manoeuvre.inputs)
+    return Mend("exchanged", np.nan, words, undo, other.file)
+
+
+def driven_as(piece: Piece, constants: Mapping[str, float], inputs: Mapping[str, Array]) -> Piece:
+    """Return a piece with the constants and inputs of another, as long as both last."""
+    told = with_constants(piece, constants)
+    n = min([piece.window.stop, *map(len, inputs.values())])
+    shorter = replace(told, window=slice(piece.window.start, n)).until_window_end()
+    return replace(shorter, manoeuvre=replace(shorter.manoeuvre, inputs={k: v[:n] for k, v in inputs.items()}))
 
 
 def most_samples(n_records: int) -> int:
