@@ -8,6 +8,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import time
 import zlib
 from contextlib import closing
 
@@ -38,7 +39,7 @@ def small_disk(tmp_path):
     """A file system of its own with little room, which only root may make."""
     folder = tmp_path / "disk"
     folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(folder)]
+    command = ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", str(folder)]
     if shutil.which("mount") is None or subprocess.run(command, check=False, capture_output=True).returncode:
         pytest.skip("a small file system cannot be mounted here")
     yield folder
@@ -57,7 +58,22 @@ def ended_with_one_sentence(process):
 @pytest.mark.slow
 def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, small_disk, undisturbed):
     file, out = write_study(SEEDS), small_disk / "out"
+
+    def fill(left):
+        used = sum(path.stat().st_size for path in (out.iterdir() if out.is_dir() else ()))
+        (small_disk / "filler").write_bytes(b"f" * (4 * 2**20 - used - left))
+
+    fill(2_000_000)
     err = ended_with_one_sentence(start(file, "--out", out, "--jobs", 1))
+    assert "study.sqlite: 2.0 MB are left on its disk, at least 3 MB are expected" in err
+    assert not out.exists()
+    (small_disk / "filler").unlink()
+    process = start(file, "--out", out, "--jobs", 1)
+    while not (out / "study.sqlite").exists():
+        assert process.poll() is None
+        time.sleep(0.01)
+    fill(300_000)
+    err = ended_with_one_sentence(process)
     assert "database or disk is full; what was finished before is kept" in err
     kept = load_study(out)
     assert 0 < len(kept.runs) < SEEDS * RUNS_A_SEED
@@ -94,7 +110,7 @@ def test_a_read_only_folder_can_be_read_and_is_told_when_written(start, write_st
         assert same_results(load_study(small_disk / "out"), undisturbed)
         err = ended_with_one_sentence(start(write_study(7), "--out", small_disk / "out"))
         assert FILE_NAME in err
-        assert "readonly" in err or "read-only" in err
+        assert "Read-only file system" in err
     finally:
         subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
 

@@ -33,7 +33,7 @@ from armid.cli.options import (
 )
 from armid.cli.report import show_and_save
 from armid.errors import ArmidError, nearest
-from armid.report.result import refuse_unwritable
+from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_unwritable
 
 
 @command("simulate", epilog=examples(
@@ -127,7 +127,7 @@ def identify_command(
     minimised = fitness or (PAPER_FITNESS if paper else FITNESS)
     goal = 1.0 - target if target is not None and minimised.partition(":")[0] in SIMILARITIES else target
     named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
-    refuse_unwritable(out)
+    refuse_unwritable(out, IDENTIFICATION.file)
     with progress_bar() as update:
         found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), update,
                     options=named, paper=paper, **given(effects, plugins, window, bounds, fix))  # fmt: skip
@@ -201,7 +201,7 @@ def identifiability_command(
         raise ArmidError(f"--noise is {noise:g}, {expected}")
     if at and source is not None:
         raise ArmidError("--at and --from are both given: one point is expected")
-    refuse_unwritable(out)
+    refuse_unwritable(out, IDENTIFIABILITY.file)
     point, where = None, "--at"
     if at:
         point = {n: number(v, f"--at {n}") for n, v in assignments(at.split(","), "--at").items()}
@@ -259,7 +259,7 @@ def close_loop_command(
     from armid.by_name import close_loop
 
     named = [name for name in candidates.split(",") if name.strip()] or None
-    refuse_unwritable(out)
+    refuse_unwritable(out, LOOP.file)
     with status_line() as tell:
         found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=tell, without=without,
                            curve=not no_curve, progress=out / PROGRESS,

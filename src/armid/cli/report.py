@@ -68,7 +68,7 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     from armid.report.markdown import markdown
 
     kind = kind_in(folder)
-    refuse_unwritable(folder if kind else None)
+    refuse_unwritable(folder if kind else None, PAGE)
     if kind is None:
         report_study(folder, key, plugins)
         return
@@ -93,7 +93,7 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
     again = shlex.join(["armid", "report", f"results/{results.study['name']}", *named])
     document = report_of(results, key, load_registry(plugins).analyses, again)
     place = results.path.parent
-    refuse_unwritable(place)
+    refuse_unwritable(place, PAGE)
     present(document)
     with NewFiles(place) as files:
         write_report(document, files)

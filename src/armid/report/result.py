@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 DETAILS, MANIFEST = "details.json", "manifest.json"
 # Room on a disk without which no search is begun: results take some MB.
-LEAST_ROOM = 1_000_000
+LEAST_ROOM = 3_000_000
 # Letters of a result's `repr`.
 MOST_LETTERS = 1_500
 Draw = Callable[[], Any]
@@ -289,14 +289,19 @@ def sweep(folder: Path) -> None:
             continue
 
 
-def refuse_unwritable(folder: Path | None) -> None:
-    """Refuse a folder before the work, not after it.
+def refuse_unwritable(folder: Path | None, file: str = "") -> None:
+    """Refuse a folder before the work, not after it; file: the first that would come into it.
 
     Raises ArmidError for a file and for a disk that is full, OSError for a place where nothing can be written.
     """
     if folder is not None:
-        with NewFiles(folder):
-            left = disk_usage(folder).free
+        try:
+            with NewFiles(folder):
+                left = disk_usage(folder).free
+        except OSError as error:
+            if beside() in str(error.filename):
+                error.filename = str(folder / file)
+            raise
         if left < LEAST_ROOM:
-            least = f"{LEAST_ROOM / 1e6:.0f} MB"
-            raise ArmidError(f"--out {folder}: {left / 1e6:.1f} MB are left on its disk, at least {least} are expected")
+            expected = f"at least {LEAST_ROOM / 1e6:.0f} MB are expected"
+            raise ArmidError(f"{folder / file}: {left / 1e6:.1f} MB are left on its disk, {expected}")

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from armid.errors import ArmidError, nearest
 from armid.estimation.identify import ctrl_c_waits
+from armid.report.result import refuse_unwritable
 from armid.study.outcome import Outcome
 from armid.study.pool import LocalPool, WorkerSetup, performed_apart
-from armid.study.store import Counts, Store
+from armid.study.store import FILE_NAME, Counts, Store
 from armid.study.tasks import Task, read_study
 
 if TYPE_CHECKING:
@@ -125,6 +126,7 @@ def run(
     setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
     study.check(partial(performed_apart, setup))
     folder, named = RESULTS / study.name if out is None else Path(out), Path(file)
+    refuse_unwritable(folder, FILE_NAME)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
         # a whole path says something on this machine alone
         told = named.name if named.is_absolute() else named.as_posix()
