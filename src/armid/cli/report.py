@@ -68,7 +68,7 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     from armid.report.markdown import markdown
 
     kind = kind_in(folder)
-    refuse_unwritable(folder if kind else None, PAGE)
+    refuse_unwritable(folder if kind else None, kind.page if kind else PAGE)
     if kind is None:
         report_study(folder, key, plugins)
         return
