@@ -1,6 +1,7 @@
 """The declared plants: their equations as plain functions, against the paper's."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
 from armid.loop.candidates import EffectKey, constant_effects
-from armid.model import PLANTS, Manoeuvre, Model
+from armid.model import PLANTS, Manoeuvre, Model, Scales
 from armid.model.plants import flexible_link as link
 from armid.model.plants import shell_transfer_arm as arm
 
@@ -90,6 +91,12 @@ def test_the_gas_starts_on_its_polytrope() -> None:
     volume = 0.4e-3 - 1.9635e-3 * 0.06 * math.radians(7.0)
     pressure = arm.start_pressure(3.05e6, 1.4, 0.4e-3, 1.9635e-3, 0.06, math.radians(-48.0), math.radians(-55.0))
     assert pressure == pytest.approx(3.05e6 * (0.4e-3 / volume) ** 1.4)
+
+
+def test_a_speed_in_metres_makes_the_scales_those_of_a_force() -> None:
+    axis = PLANTS["driven_axis"]
+    assert replace(axis, scales=Scales(3.0, 0.5)).scales == Scales(3.0, 0.5, "N", "m")
+    assert replace(PLANT, scales=Scales(3.0, 0.5)).scales == Scales(3.0, 0.5, "N m", "rad")
 
 
 def test_an_axis_comes_in_metres_or_radians() -> None:

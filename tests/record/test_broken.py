@@ -65,3 +65,20 @@ def test_a_sound_record_and_a_coarse_quiet_one_have_none():
     assert broken_samples(record()) == ()
     coarse = record(lambda signal: 0.05 * np.round(signal / 0.05))
     assert broken_samples(coarse) == ()
+
+
+def test_motion_at_the_ends_and_what_a_jump_of_an_input_does_are_no_spikes():
+    times, noise = np.arange(N) * record().manoeuvre.interval, 1e-4 * np.random.default_rng(4).standard_normal(N)
+    quiet = replace(record(), noise=Noise(1e-4, 0.0, 0.0, 1.0, 200, "rest"))
+    moving = replace(quiet, measured=np.sin(40.0 * times + 0.3) + noise)
+    assert broken_samples(moving) == ()
+
+    target = np.where(np.arange(N) < 600, 0.0, 1.0)
+    since = np.maximum(np.arange(N) - 600.0, 0.0)
+    decaying = replace(quiet, measured=noise + 12.0 * target * np.exp(-since / 3.0))
+    assert broken_samples(decaying) == ()
+    alone = replace(quiet, measured=noise + 12.0 * target * np.exp(-since / 0.05))
+    driven = replace(alone, manoeuvre=replace(alone.manoeuvre, inputs={"target": target}))
+    assert broken_samples(driven) == ()
+    (found,) = broken_samples(alone)
+    assert (found.kind, found.count) == ("spikes", 1)

@@ -71,7 +71,8 @@ class Scales:
     """Declare the sizes of effort and speed of a machine.
 
     effort, speed: typical largest effort and speed, SI.
-    effort_unit: "N m" or "N"; length_unit: "rad" or "m" (speed is in length_unit/s).
+    effort_unit: "N m" or "N"; length_unit: "rad" or "m" (speed is in length_unit/s). A plant whose speed `omega` is in
+    m/s has N and m, whether or not it says so.
     """
 
     effort: float

@@ -237,6 +237,9 @@ class Plant:
     def __post_init__(self) -> None:
         check_name(self.name, "plant")
         self._fill_outputs()
+        speeds = [s.unit for s in self.states if s.name == self.aliases.get("omega", "omega")]
+        if speeds == ["m/s"] and self.scales.length_unit != "m":  # its author left the units of the scales as they are
+            object.__setattr__(self, "scales", replace(self.scales, effort_unit="N", length_unit="m"))
         for name in (*self.quantities, *self.ports, *self.aliases):
             check_name(name, "quantity, port or alias")
         twice = sorted({n for n in self.declared if self.declared.count(n) > 1})

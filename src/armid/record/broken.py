@@ -13,9 +13,12 @@ Mask = NDArray[np.bool_]
 # So many equal samples in a row are no chance where the noise exceeds half a step of the values; so many lie on one
 # straight line only where a gap was bridged; a sensor at its limit shows as many in all.
 REPEATED, BRIDGED, CLIPPED = 8, 4, 8
-# A sample that is so many times the noise away from the median of its five neighbours, and this many times what nearly
-# all samples of the record are.
-ABOVE_NOISE, ABOVE_OTHERS, USUAL = 10.0, 6.0, 0.95
+# A sample that is so many times the noise away from the median of its four neighbours, this many times what nearly all
+# samples of the record are, and so many times what the closest three of the neighbours span: a step spans them.
+ABOVE_NOISE, ABOVE_OTHERS, USUAL, ABOVE_SPAN = 10.0, 6.0, 0.95, 3.0
+# An input that changes in one sample by so many times what it usually does, and by so much of its range, makes a signal
+# jump too (a current, say); so many samples from there on are no spikes.
+SUDDEN, SUDDEN_SHARE, AFTER_SUDDEN = 6.0, 0.05, 4
 # Rounding of a value, relative to the largest.
 ROUNDING = 1e-12
 
@@ -39,7 +42,7 @@ class Broken:
 
 
 def broken_samples(record: Record) -> tuple[Broken, ...]:
-    """Return the broken samples of a record by kind, found in its signal alone; one sample is of one kind."""
+    """Return the broken samples of a record by kind, whatever the model says; one sample is of one kind."""
     found, taken = [], np.zeros(record.measured.size, dtype=np.bool_)
     for kind, samples in kinds_of(record):
         own = samples & ~taken
@@ -74,10 +77,24 @@ def kinds_of(record: Record) -> Iterator[tuple[str, Mask]]:
             if int(at_end.sum()) >= CLIPPED and (at_end & equal).any():
                 yield "clipped", at_end
         yield "stuck", equal
-    padded = np.pad(signal, 2, mode="edge")
-    around = np.median(np.stack([padded[i : i + signal.size] for i in (0, 1, 3, 4)]), axis=0)
-    away = np.abs(signal - around)
-    yield "spikes", away > max(ABOVE_NOISE * noise, ABOVE_OTHERS * float(np.quantile(away, USUAL)))
+    # beyond its ends a signal goes on as it comes in
+    padded = np.pad(signal, 2, mode="reflect", reflect_type="odd")
+    sides = np.sort(np.stack([padded[i : i + signal.size] for i in (0, 1, 3, 4)]), axis=0)
+    away = np.abs(signal - 0.5 * (sides[1] + sides[2]))
+    span = np.minimum(sides[2] - sides[0], sides[3] - sides[1])
+    usual = max(ABOVE_NOISE * noise, ABOVE_OTHERS * float(np.quantile(away, USUAL)))
+    yield "spikes", (away > np.maximum(usual, ABOVE_SPAN * span)) & ~after_sudden_input(record)
+
+
+def after_sudden_input(record: Record) -> Mask:
+    """Return the samples at which an input has just jumped."""
+    found = np.zeros(record.measured.size, dtype=np.bool_)
+    for values in record.manoeuvre.inputs.values():
+        change = np.abs(np.diff(values))
+        least = max(SUDDEN * float(np.quantile(change, USUAL)), SUDDEN_SHARE * float(np.ptp(values)))
+        for place in np.flatnonzero(change > least):
+            found[place : place + AFTER_SUDDEN] = True
+    return found
 
 
 def in_runs(true: Mask, shortest: int, wider: int) -> Mask:
