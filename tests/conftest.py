@@ -26,6 +26,12 @@ ROOT = Path(__file__).parents[1]
 # Fast tests run the lines of these packages too: their slow ones go without the tracer of coverage, which makes them
 # twice as long.
 NOT_TRACED = ("bench", "contract", "engine", "estimation", "identifiers", "model", "problem")
+# Those that take longest come first, so that two processes end together.
+LONGEST = (
+    "test_the_small_blind_suite", "test_every_effect_keeps_its_contract", "test_a_runner_killed_fifty_times",
+    "test_the_notebook_runs", "test_the_small_table", "test_every_snippet_runs_and_every_output_is_true",
+    "test_random_candidates_agree_with_the_test_stand",
+)  # fmt: skip
 Array = NDArray[np.float64]
 AXIS_TOML = """\
 name = "axis"
@@ -72,7 +78,8 @@ event.register("numba:compile", Untraced())
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the slow tests that coverage leaves out."""
+    """Put the longest tests first, and mark the slow ones that coverage leaves out."""
+    items.sort(key=lambda item: item.name.partition("[")[0] not in LONGEST)
     for item in items:
         if item.get_closest_marker("slow") and item.path.relative_to(ROOT / "tests").parts[0] in NOT_TRACED:
             item.add_marker("no_cover")
