@@ -1,5 +1,6 @@
 """What several folders of tests share: the committed campaign, small campaigns of an axis, the test stand."""
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from numba.core import event
 from numpy.typing import NDArray
 
 from armid.model import EFFECTS, Model
@@ -21,6 +23,15 @@ from armid.record import Campaign, read_campaign, write_table
 settings.register_profile("armid", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("armid")
 ROOT = Path(__file__).parents[1]
+# Fast tests run the lines of these packages too: their slow ones go without the tracer of coverage, which makes them
+# twice as long.
+NOT_TRACED = ("bench", "contract", "engine", "estimation", "identifiers", "model", "problem")
+# Those that take longest come first, so that two processes end together.
+LONGEST = (
+    "test_the_small_blind_suite", "test_every_effect_keeps_its_contract", "test_a_runner_killed_fifty_times",
+    "test_the_notebook_runs", "test_the_small_table", "test_every_snippet_runs_and_every_output_is_true",
+    "test_random_candidates_agree_with_the_test_stand",
+)  # fmt: skip
 Array = NDArray[np.float64]
 AXIS_TOML = """\
 name = "axis"
@@ -43,6 +54,44 @@ def no_word_of_compiling() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("armid.engine.compile.SLOW_S", 1e6)
         yield
+
+
+class Untraced(event.Listener):
+    """Coverage rests while numba compiles, which takes 1.8 times as long under it.
+
+    tests/engine/test_simd_math.py compiles every operation, so that what makes machine code is seen to run there.
+    """
+
+    def __init__(self) -> None:
+        self.tracers: list[Any] = []
+
+    def on_start(self, event: Any) -> None:
+        self.tracers.append(sys.gettrace())
+        if "test_simd_math.py" not in os.environ.get("PYTEST_CURRENT_TEST", ""):
+            sys.settrace(None)
+
+    def on_end(self, event: Any) -> None:
+        sys.settrace(self.tracers.pop())
+
+
+event.register("numba:compile", Untraced())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest tests first, and mark the slow ones that coverage leaves out."""
+    items.sort(key=lambda item: item.name.partition("[")[0] not in LONGEST)
+    for item in items:
+        if item.get_closest_marker("slow") and item.path.relative_to(ROOT / "tests").parts[0] in NOT_TRACED:
+            item.add_marker("no_cover")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Leave out of coverage what a slow test starts: workers, which end without telling theirs, and examples."""
+    with pytest.MonkeyPatch.context() as patch:
+        if item.get_closest_marker("slow"):
+            patch.delenv("COVERAGE_PROCESS_CONFIG", raising=False)
+        return (yield)
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,8 @@ from armid.record import read_campaign
 from armid.report.style import save
 
 pytestmark = pytest.mark.slow
-CANDIDATES = {n: EFFECTS[n] for n in ("supply_sag", "tilt")}
+# Those of test_closing_the_loop.py: the same compiled models.
+CANDIDATES = {n: EFFECTS[n] for n in ("coulomb", "seal_friction", "supply_sag", "tilt", "viscous")}
 COMMON = (
     "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
     "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",

@@ -37,8 +37,10 @@ def test_values_at_stored_points():
 
 
 @pytest.mark.slow
-def test_values_at_stored_points_of_every_machine():
-    assert [name for name in STORED if not is_as_stored(name)] == []
+@pytest.mark.parametrize("name", [name for name in STORED if name not in OF_THE_ARM])
+def test_values_at_stored_points_of_every_machine(name):
+    """Nearly each compiles a model of its own, which two processes may share out."""
+    assert is_as_stored(name)
 
 
 def test_the_suite_is_a_lazy_sequence():
