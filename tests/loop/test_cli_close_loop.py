@@ -98,7 +98,8 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(stand, tmp_pat
     assert list(kept.parent.iterdir()) == [kept]
     lines = kept.read_text().splitlines()
     assert len(lines) == stop_at
-    kept.write_text("\n".join([*lines[:-1], lines[-1][:20]]))  # the last line was being written
+    # the last line was being written, others come from elsewhere
+    kept.write_bytes("\n".join(["5", '["a", 3]', *lines[:-1], lines[-1][:20]]).encode() + b"\xff")
 
     made.clear()
     stop_at = None

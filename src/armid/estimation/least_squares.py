@@ -407,11 +407,12 @@ class Estimates:
 
     def __init__(self, path: Path) -> None:
         self.path, self._lock = path, Lock()
-        lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
         self._known: dict[str, list[float]] = {}
         for line in lines:
-            with suppress(ValueError):  # the last one may have been cut off
-                self._known.update([json.loads(line)])
+            with suppress(ValueError, TypeError):  # the last one may have been cut off
+                key, estimate = json.loads(line)
+                self._known[key] = [float(value) for value in estimate]
 
     def __len__(self) -> int:
         return len(self._known)
