@@ -7,7 +7,7 @@ import pytest
 
 from armid.estimation.least_squares import side_by_side
 from armid.loop.candidates import EffectKey, library_of
-from armid.loop.search import Search, best_along, with_free_shapes
+from armid.loop.search import Search, best_along, finished, with_free_shapes
 from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
@@ -36,7 +36,7 @@ def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, effect, shape, 
     assert last.values[f"{name}.{shape}"] == pytest.approx(expected, abs=within)
     usual = found.fits[frozenset((EffectKey(name),))]
     assert last.chi2 < usual.chi2
-    again = with_free_shapes(usual, EffectKey(name), found.library)
+    again = finished(with_free_shapes(usual, EffectKey(name), found.library), found.library)
     assert again.chi2 == pytest.approx(last.chi2, rel=1e-6)
 
 
