@@ -12,9 +12,10 @@ import llvmlite.binding as llvm
 import numba
 import numpy as np
 import pytest
+from numba.core import codegen
 
 from armid.engine import cache_folder, compile_model, simulate
-from armid.engine.cache import unusable
+from armid.engine.cache import keep, unusable
 from armid.engine.compile import load_module, module_name
 from armid.engine.generate import kernel_parts
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
@@ -107,6 +108,15 @@ def damaged(content: bytes) -> list[bytes]:
     flipped = bytearray(content)
     flipped[len(content) // 2] ^= 4
     return [b"", content[: len(content) // 2], bytes(len(content)), bytes(flipped), b"raise SystemExit"]
+
+
+def test_ctrl_c_that_numba_loses_ends_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interrupt while LLVM hands over the machine code ends in its callback, and numba is left without the code."""
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
+    monkeypatch.setattr(codegen.CodeLibrary, "_compiled_object", property(lambda _: None, lambda *_: None), False)
+    with pytest.raises(KeyboardInterrupt):
+        keep(numba.njit(lambda x: x + 1.0), "a name")(1.0)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

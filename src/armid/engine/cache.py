@@ -72,7 +72,11 @@ class KeptCode:
         """Keep what was compiled; code that numba may not keep, with addresses of this process in it, is left out."""
         path = self._path(signature, compiled.library.codegen)
         if path is not None and not compiled.library.has_dynamic_globals and not compiled.lifted:
-            write_whole(path, dumps(compiled._reduce()))
+            try:
+                content = dumps(compiled._reduce())
+            except RuntimeError as error:  # Ctrl-C came while numba was handed the code, and was lost there
+                raise KeyboardInterrupt from error
+            write_whole(path, content)
 
     def flush(self) -> None:
         """Forget nothing: another signature or text has another file."""
