@@ -115,7 +115,7 @@ def copy(name: str, recipe: Recipe) -> None:
     kept = {f"{figure}.png" for figure in recipe.figures}
     for path in files:
         text = path.read_text(encoding="utf-8")
-        (target / path.name).write_text(page(text, name, kept) if path.suffix == ".md" else text, encoding="utf-8")
+        (target / path.name).write_text(page(text, name, kept) if path.name == "report.md" else text, encoding="utf-8")
     for figure in recipe.figures:
         shrink(made / f"{figure}.png", target / f"{figure}.png")
     print(f"results/{name}: {sum(path.stat().st_size for path in target.iterdir()) / 1e6:.2f} MB", flush=True)
@@ -128,7 +128,7 @@ def page(text: str, name: str, kept: set[str]) -> str:
     shown = FIGURE.sub(lambda found: found[0] if found[1] in kept else "", text)
     less = re.sub(r"^## .*\n+(?=## |\Z)", "", shown, flags=re.MULTILINE).rstrip() + "\n"
     told_here = re.sub(r"^Made from the stored results by .*", told, less, flags=re.MULTILINE)
-    return told_here if told_here != less or shown == text else f"{less}\n{told}\n"
+    return told_here if told_here != less else f"{less}\n{told}\n"
 
 
 def shrink(path: Path, target: Path) -> None:

@@ -200,7 +200,7 @@ def test_a_page_loses_the_figures_that_are_not_kept(root):
     loop = "# s\n\n| a |\n\n## Figures\n\n![a.png](a.png)\n\n![b.png](b.png)\n"
     assert clean(loop, "s", {"b.png"}) == f"# s\n\n| a |\n\n## Figures\n\n![b.png](b.png)\n\n{told}\n"
     assert clean(loop, "s", set()) == f"# s\n\n| a |\n\n{told}\n"
-    assert clean("# note\n\nWords.\n", "s", set()) == "# note\n\nWords.\n"
+    assert clean("# s\n\nWords.\n", "s", set()) == f"# s\n\nWords.\n\n{told}\n"
 
 
 def test_the_recipes_name_commands_that_exist(root, recipes):
