@@ -260,8 +260,8 @@ def close_loop_command(
 
     named = [name for name in candidates.split(",") if name.strip()] or None
     refuse_unwritable(out, LOOP.file)
-    with status_line() as tell:
-        found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=tell, without=without,
+    with status_line() as show_status:
+        found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status, without=without,
                            curve=not no_curve, progress=out / PROGRESS,
                            **given(effects, plugins, window, bounds, fix))  # fmt: skip
     show_and_save(found, out)
