@@ -6,10 +6,12 @@ from importlib import import_module
 import numpy as np
 import pytest
 from arm_cases import box_of, drawn
+from numpy.typing import NDArray
 
 from armid.engine import Schedule, calibrate, probes, simulate
 from armid.errors import ArmidError
-from armid.model import PLANTS, Manoeuvre, Model
+from armid.loop.candidates import quickly_calibrated
+from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 
 def test_probes_fill_the_box(arm: Model) -> None:
@@ -106,3 +108,57 @@ def test_weights_bring_like_switch_times_together(arm: Model, manoeuvres: dict[s
     population = drawn(arm, 300, 6)
     times = simulate(arm, manoeuvres["lower"], population).switch_times["closed"]
     assert np.corrcoef(population @ weights, times)[0, 1] > 0.95
+
+
+RUBBED = Model(PLANTS["driven_axis"], (EFFECTS["coulomb"], EFFECTS["viscous"]))
+
+
+def rubbing() -> tuple[Manoeuvre, NDArray[np.float64]]:
+    """Return a motion that turns back often, in friction whose sign changes between two samples, and 20 candidates."""
+    times = 0.01 * np.arange(400)
+    drive = 2.0 * np.sin(2.0 * times) + 1.5 * np.sin(7.3 * times)
+    middle = {"mass": 1.0, "coulomb.level": 0.5, "coulomb.width": 0.01, "viscous.slope": 0.2}
+    values = np.array([middle[n] for n in RUBBED.parameters])
+    spread = np.random.default_rng(4).uniform(0.9, 1.1, (20, len(values)))
+    return Manoeuvre(0.01, 400, {}, {"u": drive}), values * spread
+
+
+def test_only_rough_samples_are_cut() -> None:
+    manoeuvre, candidates = rubbing()
+    finest = simulate(RUBBED, manoeuvre, candidates, Schedule(64)).output
+    ranges = np.ptp(finest, axis=1).max() * np.ones(len(RUBBED.states))
+    error, steps = {}, {}
+    for share in (1e-3, 1e-4, 1e-5):
+        run = simulate(RUBBED, manoeuvre, candidates, Schedule(8, rough=share * ranges))
+        error[share], steps[share] = np.abs(run.output - finest).max(), run.n_steps
+    even = {n: np.abs(simulate(RUBBED, manoeuvre, candidates, Schedule(n)).output - finest).max() for n in (1, 2, 4)}
+    assert error[1e-3] > error[1e-4] > error[1e-5]
+    assert steps[1e-3] < steps[1e-4] < steps[1e-5]
+    # with half of the steps it is nearer than with four everywhere
+    assert steps[1e-5] < 2.0
+    assert error[1e-5] < even[4] < even[2] < even[1]
+    # whatever runs beside it
+    schedule = Schedule(8, rough=1e-4 * ranges)
+    alone = [simulate(RUBBED, manoeuvre, c, schedule).output[0] for c in candidates]
+    assert np.array_equal(np.array(alone), simulate(RUBBED, manoeuvre, candidates, schedule, threads=2).output)
+
+
+def test_the_loop_spares_steps_where_friction_asks_for_many() -> None:
+    manoeuvre, candidates = rubbing()
+    found = quickly_calibrated(RUBBED, manoeuvre, candidates[:8])
+    assert found.reached
+    assert found.schedule.rough is not None
+    run, finest = (simulate(RUBBED, manoeuvre, candidates, s) for s in (found.schedule, Schedule(64)))
+    assert run.n_steps < found.schedule.substeps
+    assert np.abs(run.output - finest.output).max() < 5e-6 * RUBBED.plant.sizes[0]
+
+
+def test_what_is_cut_where_it_is_rough_changes_smoothly() -> None:
+    """The slope of a misfit along a fine line is the same over a short and a long way."""
+    manoeuvre, candidates = rubbing()
+    schedule = Schedule(8, rough=1e-4 * np.array([1.0] * len(RUBBED.states)))
+    line = candidates[0] * (1.0 + 1e-6 * np.arange(400)[:, np.newaxis] * np.array([1.0, -0.7, 0.5, 0.9]))
+    record = simulate(RUBBED, manoeuvre, candidates[1], schedule).output[0]
+    misfit = np.sqrt(np.mean((simulate(RUBBED, manoeuvre, line, schedule).output - record) ** 2, axis=1))
+    short, long = ((misfit[100 + n : 300 + n] - misfit[100 - n : 300 - n]) / (2 * n) for n in (10, 100))
+    assert np.max(np.abs(short - long)) < 1e-2 * np.max(np.abs(long))

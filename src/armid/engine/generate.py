@@ -86,6 +86,7 @@ class KernelParts:
             "latches": listed(self.latches), "latches_n": listed(self.latches, "n_"), "times": listed(times),
             "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.starts + self.constants),
         }  # fmt: skip
+        lists["judging"] = f"judged, {listed(self.states, 'per_')}"
         names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
         return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
             names | lists, guards=guards, carried=carried, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST,

@@ -25,9 +25,12 @@ DIVERGED = 1e3
 class Schedule:
     """Say how finely time is cut; the result of a candidate depends on it, never on the other candidates.
 
-    substeps: integration steps between samples.
-    refinement: times finer for `fresh_samples` samples from a one-way switch on, where the motion is fastest; what is
-        refined follows the switch without a jump.
+    substeps: integration steps between samples, everywhere unless `rough` is given.
+    refinement: times finer for `fresh_samples` samples from a one-way switch on, where the motion is fastest, and where
+        a step is rough; what is refined follows without a jump.
+    rough: a sample takes one step, and where this step is rough `refinement`, in the lanes that ask for it: from which
+        h (|k3 - k2| + |k1 - k2 - k3 + k4|) of its Runge-Kutta stages on, for each state [its unit], shape (n_states,).
+        As accurate as `substeps` everywhere, which then only tells so; None: every sample is cut alike.
     plan: for each sample, how many sample intervals one step may span while no switch has happened (at most 8), shape
         (n_samples - 1,); None: one.
     weights: weights of the parameters in the expected time of the switch, shape (n_parameters,); candidates that switch
@@ -39,6 +42,12 @@ class Schedule:
     fresh_samples: int = 8
     plan: NDArray[np.int64] | None = None
     weights: Array | None = None
+    rough: Array | None = None
+
+    @property
+    def least(self) -> int:
+        """Integration steps between samples where nothing asks for more."""
+        return self.substeps if self.rough is None else 1
 
     def spans(self, n_samples: int) -> NDArray[np.int64]:
         """Return the plan for a number of samples, no step reaching beyond the last."""
@@ -57,12 +66,14 @@ class Simulation:
     failed: shape (n_candidates,), True where it diverged.
     switch_times: latch -> time [s] of its switch, shape (n_candidates,), NaN where it never switched.
     states: state -> shape (n_candidates, n_samples); empty unless asked for.
+    n_steps: integration steps between two samples, mean over the samples and over what ran side by side.
     """
 
     outputs: Array
     failed: NDArray[np.bool_]
     switch_times: dict[str, Array]
     states: dict[str, Array]
+    n_steps: float
 
     @property
     def output(self) -> Array:
@@ -114,12 +125,14 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
     starts = np.array([given.pop(name) for name in model.starts])
     settings = (
         np.array(list(given.values()) or [0.0]), input_values(model, manoeuvre),
-        float(manoeuvre.interval), manoeuvre.n_samples, schedule.substeps, schedule.refinement,
+        float(manoeuvre.interval), manoeuvre.n_samples, schedule.least, schedule.refinement,
         float(schedule.fresh_samples), spans, np.array([hold == "zero" for hold in holds]),
         float(manoeuvre.start_time),
         DIVERGED * np.array(model.plant.sizes),
+        schedule.rough is not None,
+        np.zeros(len(model.states)) if schedule.rough is None else 1.0 / schedule.rough,
     )  # fmt: skip
-    return Prepared(model, kernel, width, schedule.weights, manoeuvre.n_samples, starts, settings, states)
+    return Prepared(model, kernel, width, schedule, manoeuvre.n_samples, starts, settings, states)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +146,7 @@ class Prepared:
     model: Model
     kernel: Kernel
     width: int
-    weights: Array | None
+    schedule: Schedule
     n_samples: int
     starts: Array
     settings: tuple[Any, ...]
@@ -148,17 +161,20 @@ class Prepared:
         candidates = as_population(model, population)
         n = len(candidates)
         starts = np.broadcast_to(self.starts if starts is None else starts, (n, len(self.starts)))
-        rows, places = arranged(candidates, starts, self.width, self.weights)
+        rows, places = arranged(candidates, starts, self.width, self.schedule.weights)
         outputs = np.empty((len(model.plant.outputs), n, self.n_samples))
         switches = np.full((len(model.latches), rows.shape[1]), np.nan)
         trace = np.empty((len(model.states), n, self.n_samples) if self.states else (0, 0, 0))
-        given = (rows.ravel(), rows.shape[1], *self.settings, places)
+        given, n_groups = (rows.ravel(), rows.shape[1], *self.settings, places), rows.shape[1] // self.width
+        repeats = np.zeros(n_groups)
         with compiling(model, self.kernel):
-            run(self.kernel, given, (outputs, switches.ravel(), trace), rows.shape[1] // self.width, threads)
+            run(self.kernel, given, (outputs, switches.ravel(), trace, repeats), n_groups, threads)
         kept = dict(zip(model.states, trace, strict=True)) if self.states else {}
         inverse = np.argsort(places[:n], kind="stable")
         times = {name: row[inverse] for name, row in zip(model.latches, switches, strict=True)}
-        return Simulation(outputs, np.isnan(outputs[0, :, -1]), times, kept)
+        again = float(np.sum(repeats)) / max(n_groups * self.n_samples, 1)
+        n_steps = self.schedule.least * (1.0 + self.schedule.refinement * again)
+        return Simulation(outputs, np.isnan(outputs[0, :, -1]), times, kept, n_steps)
 
 
 def as_population(model: Model, population: ArrayLike) -> Array:

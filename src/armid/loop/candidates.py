@@ -6,7 +6,7 @@ model with the two. An effect at its null is skipped by the engine, so that it c
 candidates and 1.5 s of motion with no effect in the model, 0.4 ms with 38.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, product
@@ -158,7 +158,7 @@ class Library:
             space = self.space(model, active)
             known = [self._problems.get(frozenset((k,))) or self._problems.get(frozenset((k.declared,)))
                      for k in active]  # fmt: skip
-            alone = [p.replays for p in known if p is not None and p.replays[0].model is model]
+            alone = [p.replays for p in known if p is not None and is_even(p.replays) and p.replays[0].model is model]
             if len(alone) < max(len(active), 2):
                 # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
                 replays = self.replays(model, space, near or {}, self.misfit, on_one=bool(active))
@@ -314,6 +314,9 @@ def idle(parameter: Parameter) -> float:
 
 # Candidates of one calibration, the factor of a known value within which they lie, and the schedules that are tried.
 N_PROBES, NEAR, SUBSTEPS = 8, 2.0, (1, 2, 4, 8)
+# From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
+# in which a step is uncertain by such a share of the range of a state.
+FEWEST_SPARED, SHARES = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 # What the engine's error may add to chi2 of a residual that is noise, and in proportion to one that is more.
 HIDDEN = 0.1
 
@@ -364,6 +367,11 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
 
 
+def is_even(replays: Sequence[Replay]) -> bool:
+    """Tell whether all samples are cut alike, so that the schedule does not depend on the candidates' states."""
+    return all(c.schedule.rough is None for r in replays for c in r.calibrations)
+
+
 def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:
     """Return the coarsest of few schedules whose error on the candidates stays within half of the standard one.
 
@@ -372,14 +380,42 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
     matter of chance asks for 128 in a sample), and would look for steps over several samples.
     """
     allowed = ALLOWED[STANDARD] * model.plant.sizes[0]
+
+    def judged(run: Simulation, finer: Simulation) -> tuple[float, bool, bool]:
+        """Return the error of a simulation, whether the noise hides it, and whether it is accurate enough."""
+        error = difference(run, finer, model) * 16 / 15
+        is_hidden = rms is not None and bool((rms_difference(run, finer) * 16 / 15 <= MARGIN * rms).all())
+        good = (error <= MARGIN * allowed or is_hidden) and not (run.failed & ~finer.failed).any()
+        return error, is_hidden, good
+
     runs = {n: simulate(model, manoeuvre, spread, Schedule(n)) for n in SUBSTEPS[:2]}
     for n in SUBSTEPS:
         runs[2 * n] = runs.get(2 * n) or simulate(model, manoeuvre, spread, Schedule(2 * n))
-        error = difference(runs[n], runs[2 * n], model) * 16 / 15
-        is_hidden = rms is not None and bool((rms_difference(runs[n], runs[2 * n]) * 16 / 15 <= MARGIN * rms).all())
-        if (error <= MARGIN * allowed or is_hidden) and not (runs[n].failed & ~runs[2 * n].failed).any():
+        error, is_hidden, good = judged(runs[n], runs[2 * n])
+        if good:
             break
-    return Calibration(Schedule(n, weights=switch_weights(spread, runs[n])), error, is_hidden or bool(error <= allowed))
+    schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
+    if good and n >= FEWEST_SPARED:
+        # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut.
+        for rough in rough_steps(model, manoeuvre, spread, runs[2 * n]):
+            tried = replace(schedule, rough=rough)
+            run = simulate(model, manoeuvre, spread, tried)
+            found = judged(run, runs[2 * n])
+            if found[2] and run.n_steps < n:
+                schedule, (error, is_hidden, _) = tried, found
+                break
+    return Calibration(schedule, error, is_hidden or bool(error <= allowed))
+
+
+def rough_steps(model: Model, manoeuvre: Manoeuvre, spread: Array, run: Simulation) -> Iterator[Array]:
+    """Yield from where on a step is called rough, as `Schedule.rough`, ever smaller shares of the range of each state.
+
+    run: of the candidates, which says those that have not diverged.
+    """
+    states = simulate(model, manoeuvre, spread[~run.failed], Schedule(SUBSTEPS[-1]), states=True).states
+    ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
+    for share in SHARES:
+        yield np.where(ranges > 0.0, share * ranges, np.inf)
 
 
 def rms_difference(a: Simulation, b: Simulation) -> Array:
