@@ -1,6 +1,6 @@
 """Run the command line as `python -m armid`."""
 
-from armid.cli.main import main
+from armid.cli.start import run
 
 if __name__ == "__main__":
-    main()
+    run()
