@@ -199,7 +199,7 @@ CRAFTED = {
     'UPDATE study SET value = \'{"name": "small", "cases": 5}\'': "cannot be read",
     "UPDATE study SET value = '[]'": "the description of the study lacks 'name'",
     "ALTER TABLE runs DROP COLUMN seconds": "its table 'runs' has no column 'seconds'",
-    "UPDATE traces SET trace = :bomb": "is no trace of 4 parameters",
+    "UPDATE traces SET trace = :bomb": "the trace of run",
     "UPDATE traces SET names = 'p0'": "the trace of run",
 }
 

@@ -1,23 +1,10 @@
-"""The first moments of the command: asked to end while it is being imported, it ends as it does later."""
+"""How a command is asked to end."""
 
 import signal
-import sys
 import threading
 from typing import Any
 
 INTERRUPTED = 130
-
-
-def run() -> None:
-    """Run the command of this process."""
-    try:
-        end_on_request()
-        from armid.cli.main import main
-
-        main()
-    except KeyboardInterrupt:
-        print("armid: interrupted", file=sys.stderr)
-        sys.exit(INTERRUPTED)
 
 
 def end_on_request() -> None:
