@@ -95,7 +95,7 @@ def opened(
     ArmidError
         For whatever of them cannot be used.
     """
-    refuse_others(effects, window, bounds, fix)
+    refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
     if isinstance(plant, Plant):
         registry.plants[plant.name] = plant
@@ -114,11 +114,13 @@ def opened(
     return Opened(registry, read, model, dict(bounds or {}), dict(fix or {}))
 
 
-def refuse_others(effects: Any, window: Any, bounds: Any, fix: Any) -> None:
+def refuse_others(effects: Any, plugins: Any, window: Any, bounds: Any, fix: Any) -> None:
     """Raise ArmidError for what has not the form that `opened` tells."""
     pair = (list, tuple)
     forms = {
         "effects": (effects, isinstance(effects, str | Effect | Iterable), "names or Effects are"),
+        "plugins": (plugins, isinstance(plugins, Iterable) and not isinstance(plugins, str),
+                    "a list of FILE.py:attribute is"),
         "window": (window, not window or (isinstance(window, pair) and are_numbers(window, 2)), "(begin, end), s, is"),
         "bounds": (bounds, bounds is None or (isinstance(bounds, Mapping) and all(
             isinstance(ends, pair) and are_numbers(ends, 2) for ends in bounds.values())), "name -> (low, high) is"),
@@ -245,6 +247,8 @@ def identify(
     from armid.estimation.screen import screen
     from armid.problem.fitness import as_fitness, fitness_of_name
 
+    if not isinstance(options or {}, Mapping):
+        raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
     window = {"window": PAPER_WINDOW} if paper and not given.get("window") else {}
     there = opened(campaign, model=model, **expected(given) | window)
     fitness = fitness or (PAPER_FITNESS if paper else FITNESS)

@@ -89,6 +89,27 @@ def keyboard():
     signal.signal(signal.SIGINT, before)
 
 
+ASKED = """
+import os, signal, sys
+
+class Asking:
+    def find_spec(self, name, *_):
+        if name == "click":
+            os.kill(os.getpid(), signal.SIGTERM)
+
+sys.meta_path.insert(0, Asking())
+sys.argv[1:] = ["list", "plants"]
+import runpy
+runpy.run_module("armid", run_name="__main__")
+"""
+
+
+def test_a_request_to_end_in_the_first_moments_is_one():
+    """While the command is being imported."""
+    ran = subprocess.run([sys.executable, "-c", ASKED], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "armid: interrupted\n")
+
+
 @pytest.mark.usefixtures("keyboard")
 @pytest.mark.parametrize("presses", [1, 2])
 def test_an_interrupted_search_returns_its_best(lowering, arm, arm_space, presses):

@@ -153,6 +153,12 @@ def test_a_reader_that_leaves_changes_nothing_but_what_he_reads(small_folder, ro
         assert (process.returncode, told) == (0, b""), call
         assert out not in call or (out / "report.html").stat().st_size > 0, call
         (out / "report.html").unlink(missing_ok=True)
+    for told in (["--help"], ["identify", "--help"], ["--version"], []):
+        asked = [sys.executable, "-m", "armid", *told]
+        with subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            process.stdout.close()
+            assert process.stderr.read() == b""
+        assert process.returncode == (0 if told else 2), told
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=root) as process:
         process.stdout.close()
     assert (process.returncode, (out / "report.html").is_file()) == (0, True)

@@ -75,6 +75,15 @@ def exchange(a, b):
     return made
 
 
+def exchange_column(column, a, b):
+    def made(folder):
+        tables = [dict(read_table(folder / file, file).columns) for file in (a, b)]
+        for file, table, other in zip((a, b), tables, tables[::-1], strict=True):
+            write_table(folder / file, table | {column: other[column]})
+
+    return made
+
+
 def copied(source, name, role, begin=-1.0, end=9.0, more=""):
     """Return a mistake: a part of a recording under another name, as another record."""
 
@@ -199,17 +208,20 @@ MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
     "axis: angle in rad": ("axis", (change("angle_deg", np.deg2rad, "slow.csv"),), r"slow.*moves 0\.017\d times"),
     "axis: ms": ("axis", (change("time_s", lambda t: 1000 * t, *AXIS),), "every train record: time_s looks like milli"),
     "axis: drive late": ("axis", (change("drive_N_m", lambda u: np.roll(u, -30), "fast.csv"),), r"fast\.csv.*late"),
+    "drives exchanged": ("axis", (exchange_column("drive_N_m", *AXIS[:2]),), r"slow\.csv.*fast\.csv look exchanged"),
+    "drives exchanged, friction": (
+        "rubbing", (exchange_column("drive_N_m", *AXIS[:2]),), r"slow\.csv.*fast\.csv look exchanged"),
     "axis: held out": ("axis", (change("drive_N_m", np.negative, "other.csv"),), r"other\.csv.*'u'.*sign"),
 }  # fmt: skip
 
 
 @pytest.fixture
 def campaign(root: Path, tmp_path: Path) -> Callable[[str], Path]:
-    """Return a function that makes a fresh copy of a campaign: arm, one (a single record), axis."""
+    """Return a function that makes a fresh campaign: arm, one (a single record), axis, rubbing (more friction)."""
 
     def made(kind: str) -> Path:
-        if kind == "axis":
-            return pendulum(tmp_path / "axis")
+        if kind in ("axis", "rubbing"):
+            return pendulum(tmp_path / kind, friction=0.05 if kind == "rubbing" else 0.004)
         folder = tmp_path / kind
         folder.mkdir()
         source = root / "studies" / "campaigns" / {"arm": "four_strokes", "one": "one_stroke"}[kind]

@@ -14,7 +14,7 @@ from pandas import DataFrame, read_csv
 from stored import EVIL, SVG, loop_details, loop_report, study_document, write_loop
 
 from armid.cli.main import main
-from armid.cli.report import LOOP, document_of, kind_in
+from armid.cli.report import LOOP, document_of, kind_in, refuse_damaged
 from armid.errors import ArmidError
 from armid.loop.document import loop_document
 from armid.report.document import Document, Line, Listing, Section, Sentences, changed, table
@@ -213,7 +213,12 @@ def test_a_damaged_result_is_one_sentence(tmp_path):
         (tmp_path / "report.json").write_text(text)
         with pytest.raises(ArmidError, match="armid close-loop") as caught:
             document_of(tmp_path, LOOP, "x")
-        assert "\n" not in str(caught.value)
+        assert not re.search(r"\n|Error|Expecting|line 1|codec", str(caught.value))
+
+
+def test_a_number_that_no_float_holds_is_damage_too(tmp_path):
+    with pytest.raises(ArmidError, match="damaged or changed"), refuse_damaged(tmp_path, LOOP):
+        float(10**400)
 
 
 def test_damaged_details_are_one_sentence(tmp_path):

@@ -15,6 +15,7 @@ from contextlib import closing
 import pytest
 from small_study import RUNS_A_SEED, beside_cost, same_results
 
+from armid.cli.main import main
 from armid.errors import ArmidError, MachineError
 from armid.study.outcome import ClaimedRun
 from armid.study.results import load_study
@@ -67,6 +68,13 @@ def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, sma
     err = ended_with_one_sentence(start(file, "--out", out, "--jobs", 1))
     assert "study.sqlite: 2.0 MB are left on its disk, at least 3 MB are expected" in err
     assert not out.exists()
+    (small_disk / "filler").unlink()
+    # one of which nothing is missing needs no room
+    shutil.copytree(undisturbed.path.parent, out)
+    fill(800_000)
+    process = start(file, "--out", out, "--jobs", 1)
+    assert process.wait() == 0, process.communicate()
+    shutil.rmtree(out)
     (small_disk / "filler").unlink()
     process = start(file, "--out", out, "--jobs", 1)
     while not (out / "study.sqlite").exists():
@@ -191,7 +199,7 @@ CRAFTED = {
     'UPDATE study SET value = \'{"name": "small", "cases": 5}\'': "cannot be read",
     "UPDATE study SET value = '[]'": "the description of the study lacks 'name'",
     "ALTER TABLE runs DROP COLUMN seconds": "its table 'runs' has no column 'seconds'",
-    "UPDATE traces SET trace = :bomb": "is no trace of 4 parameters",
+    "UPDATE traces SET trace = :bomb": "the trace of run",
     "UPDATE traces SET names = 'p0'": "the trace of run",
 }
 
@@ -210,6 +218,17 @@ def test_a_crafted_store_is_told_in_one_sentence(sql, undisturbed, tmp_path):
         copy.commit()
     with pytest.raises(ArmidError, match=re.escape(CRAFTED[sql]) if "trace" not in sql else CRAFTED[sql]):
         list(load_study(tmp_path).iter_traces())
+
+
+def test_a_store_without_what_was_identified_is_told(undisturbed, tmp_path, capsys):
+    shutil.copy(undisturbed.path, tmp_path / FILE_NAME)
+    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as copy:
+        copy.execute("DELETE FROM identified")
+        copy.commit()
+    with pytest.raises(SystemExit, match="2"):
+        main(["report", str(tmp_path), "--quiet"])
+    assert f"{FILE_NAME} is damaged: its runs cannot be shown, what armid wrote is expected" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == [FILE_NAME]
 
 
 def test_a_damaged_page_is_told(undisturbed, tmp_path):

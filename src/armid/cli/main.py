@@ -2,19 +2,18 @@
 
 import gc
 import logging
-import signal
 import sys
-import threading
 import warnings
 from importlib import import_module
 from typing import Any
 
 import click
 
-from armid.cli.options import tell
+from armid.cli.options import Heard, tell, while_read
+from armid.cli.start import INTERRUPTED, end_on_request
 from armid.errors import ArmidError, on_a_line
 
-BAD_INPUT, INTERRUPTED = 2, 130
+BAD_INPUT = 2
 EPILOG = """\b
 Examples:
   armid new campaign my_axis                   a folder to put your own records into
@@ -37,7 +36,7 @@ COMMANDS = {
 }  # fmt: skip
 
 
-class Commands(click.Group):
+class Commands(Heard, click.Group):
     """The commands by name, each imported when it is asked for."""
 
     def __init__(self, *given: Any, **named: Any) -> None:
@@ -79,29 +78,22 @@ def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__:
     tell(f"armid: warning: {message}")
 
 
-def asked_to_end(number: int, frame: Any) -> None:
-    """End as by Ctrl-C, so that what is half-written goes; also where Ctrl-C is ignored, as in the background."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.default_int_handler(number, frame)
-    signal.raise_signal(signal.SIGINT)
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run a command; bad input gives one sentence and exit code 2."""
     warnings.showwarning = show_warning
     # imports and figures make many objects that stay: looking through them every 700 is a tenth of a short command
     gc.set_threshold(20_000)
-    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
-        signal.signal(signal.SIGTERM, asked_to_end)
     logging.getLogger("armid").setLevel(logging.INFO)
     try:
+        end_on_request()
         code = app.main(arguments, prog_name="armid", standalone_mode=False, obj=arguments or sys.argv[1:])
     except ArmidError as error:
         stop(str(error), BAD_INPUT)
     except (click.Abort, KeyboardInterrupt):
         stop("interrupted", INTERRUPTED)
     except click.exceptions.NoArgsIsHelpError as error:
-        print(error.format_message())
+        with while_read(sys.stdout):
+            print(error.format_message(), flush=True)
         sys.exit(BAD_INPUT)
     except click.ClickException as error:
         stop(f"{error.format_message()} (see --help)", BAD_INPUT)

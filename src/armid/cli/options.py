@@ -29,7 +29,17 @@ OUTPUT = (
 )
 
 
-class Command(click.Command):
+class Heard(click.Command):
+    """A command whose help may be cut off by its reader, as `| head -1` does."""
+
+    def make_context(self, *given: Any, **named: Any) -> click.Context:
+        """Read the options; those that print and end do it here."""
+        with while_read(sys.stdout):
+            return super().make_context(*given, **named)
+        raise click.exceptions.Exit(0)
+
+
+class Command(Heard):
     """A command with --json and --quiet; it prints by `say`, `present`, `give` and `tell` alone."""
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -57,7 +67,7 @@ def announcing(told: Callable[[str], None]) -> Iterator[None]:
         log.removeHandler(handler)
 
 
-class Group(click.Group):
+class Group(Heard, click.Group):
     """Commands below a command."""
 
     command_class = Command

@@ -2,6 +2,8 @@
 
 import json
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ import click
 
 from armid.cli.options import command, examples, give, plugin_option, present, say
 from armid.errors import ArmidError
-from armid.registry import load_registry
+from armid.registry import load_registry, place_in_plugin
 from armid.report.result import (
     IDENTIFIABILITY,
     IDENTIFICATION,
@@ -91,14 +93,28 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
     results = load_study(folder)
     named = [word for plugin in plugins for word in ("--plugin", plugin)]
     again = shlex.join(["armid", "report", f"results/{results.study['name']}", *named])
-    document = report_of(results, key, load_registry(plugins).analyses, again)
-    place = results.path.parent
+    analyses, place = load_registry(plugins).analyses, results.path.parent
     refuse_unwritable(place, PAGE)
-    present(document)
-    with NewFiles(place) as files:
-        write_report(document, files)
+    with refuse_damaged_store(results.path):
+        document = report_of(results, key, analyses, again)
+        present(document)
+        with NewFiles(place) as files:
+            write_report(document, files)
     say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
     give(answer=document.said, folder=place, files=files.names)
+
+
+@contextmanager
+def refuse_damaged_store(file: Path) -> Iterator[None]:
+    """Tell in one sentence that numbers of a store cannot be shown; what a plug-in does wrong stays its own."""
+    try:
+        yield
+    except ArmidError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
+        if place_in_plugin(error) is not None:
+            raise
+        raise ArmidError(f"{file} is damaged: its runs cannot be shown, what armid wrote is expected") from error
 
 
 def kind_in(folder: Path) -> Kind | None:

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 
-from armid.errors import ArmidError
+from armid.errors import ArmidError, quoted
 from armid.estimation.information import MISFIT, Information, information_at
 from armid.estimation.least_squares import held_by_bound, with_fitted_starts
 from armid.estimation.mends import Suspicion
 from armid.identifiers import Identifier, can_run_directly, run_directly
 from armid.model import Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
-from armid.problem.meter import BudgetIgnoredError, Meter, MeterTermination
+from armid.problem.meter import LARGEST_BUDGET, BudgetIgnoredError, Meter, MeterTermination
 from armid.problem.problem import (
     IdentificationProblem,
     Replay,
@@ -152,10 +152,16 @@ def identify(
     Raises
     ------
     ArmidError
-        For a negative seed, a fitness that the identifier cannot minimise, and when every candidate diverged.
+        For a negative seed, a budget too large, a target that is not finite, a fitness that the identifier cannot
+        minimise, and when every candidate diverged.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ArmidError(f"the seed is {seed!r}, a whole number of at least 0 is expected")
+    if target is not None and isinstance(target, int | float) and np.isinf(target):
+        raise ArmidError(f"the target is {target}, a finite fitness is expected")
+    if isinstance(budget, int) and budget > LARGEST_BUDGET:
+        # a whole number may have more digits than any float
+        raise ArmidError(f"the budget is {quoted(budget)}, expected at most {LARGEST_BUDGET:,} simulations")
     identifier.refuse(fitness)
     identifier.build(Meter(budget, target).budget)  # refuses bad options before anything is calibrated
     train = replays(campaign.train, model, space, accuracy)

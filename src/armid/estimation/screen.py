@@ -30,6 +30,8 @@ TOLERABLE = 0.1
 MENDED, LEFT, AS_GOOD = 0.4, 0.5, 1.5
 # An error above this, with no candidate of this cosine to the signal: the model explains nothing of it.
 NOTHING, UNLIKE = 0.95, 0.3
+# An error up to this, where the model explains nothing as told, shows an exchange that a missing effect half hides.
+EXCHANGED = 0.6
 # A record stands out where its error is so many times that of the others; an error from which on records disagree.
 APART, AGREED = 3.0, 0.05
 # Candidates spread over the box, samples of all records together that are looked at, least of one record.
@@ -262,13 +264,16 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
         undone = tuple(changes[r.file].undo(r) if r.file in changes else r for r in train)
         own, (file, mend) = trial.scaled(undone), next(iter(changes.items()))
         tried.append((*own.fit(undone, below=below), own, undone, file, mend))
-    found = []
+    found, hidden = [], []
     for start, _, own, undone, file, mend in sorted(tried, key=lambda t: t[1])[:N_LIKELY]:
         z, error = own.fit_hard(undone, [start])
         if own.errors(undone, z).max() <= TOLERABLE:
             found.append((error, file, mend))
+        elif mend.other and before > NOTHING and error <= EXCHANGED:
+            hidden.append((error, file, mend))
     if not found:
-        return []
+        best = min(hidden, key=lambda f: f[0], default=None)
+        return [] if best is None else [best[2].suspicion(best[1], before, best[0])]
     first = min(found, key=lambda f: f[0])[1]
     told = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in found]
     return chosen(first, before, told)

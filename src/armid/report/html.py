@@ -86,7 +86,7 @@ def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Marku
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise ArmidError(f"{where} is no SVG ({error}): a file that armid wrote is expected") from error
+        raise ArmidError(f"{where} is no SVG, it was damaged: a file that armid wrote is expected") from error
     if local(root.tag) != "svg":
         raise ArmidError(f"{where} holds <{local(root.tag)}>, an SVG is expected")
     used = referenced(root)

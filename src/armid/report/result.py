@@ -181,10 +181,10 @@ def refuse_damaged(folder: Path, kind: Kind) -> Iterator[None]:
         yield
     except ArmidError:
         raise
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
         raise ArmidError(
-            f"{folder / kind.file}, or details.json beside it, is not what `{kind.command}` writes "
-            f"({type(error).__name__}: {error}): a folder that it wrote is expected"
+            f"{folder / kind.file}, or details.json beside it, is not what `{kind.command}` writes, it was damaged or "
+            "changed: a folder as that command left it is expected"
         ) from error
 
 
@@ -211,7 +211,7 @@ def read_json(path: Path, command: str) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
-        raise ArmidError(f"{path} is no JSON ({error}): what `{command}` wrote is expected") from error
+        raise ArmidError(f"{path} is no JSON, it was damaged or changed: what `{command}` wrote is expected") from error
     if not isinstance(found, dict):
         raise ArmidError(f"{path} holds no table: what `{command}` wrote is expected")
     return found

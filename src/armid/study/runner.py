@@ -126,7 +126,9 @@ def run(
     setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
     study.check(partial(performed_apart, setup))
     folder, named = RESULTS / study.name if out is None else Path(out), Path(file)
-    refuse_unwritable(folder, FILE_NAME)
+    is_new = not (folder / FILE_NAME).exists()
+    if is_new:
+        refuse_unwritable(folder, FILE_NAME)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
         # a whole path says something on this machine alone
         told = named.name if named.is_absolute() else named.as_posix()
@@ -136,6 +138,9 @@ def run(
         counts = store.counts()
         progress(counts, None)
         finished = simulations = 0
+        if counts.missing and not is_new:
+            # a study that is complete needs no room
+            refuse_unwritable(folder, FILE_NAME)
         if counts.missing:
             pool = _pool(jobs, dask, setup, counts.missing)
             try:

@@ -358,7 +358,7 @@ def corruption_guard(file: Path, what: str) -> Iterator[None]:
     except ArmidError:
         raise
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError, zlib.error) as error:
-        raise ArmidError(f"{file} is damaged: {what} cannot be read ({type(error).__name__}: {error})") from error
+        raise ArmidError(f"{file} is damaged: {what} cannot be read, what armid wrote is expected") from error
 
 
 def description_of(file: Path, text: str) -> dict[str, Any]:
