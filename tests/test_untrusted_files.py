@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from armid.cli.main import main
+from input_texts import LOWERING
 
 ROOT = Path(__file__).parents[1] / "src" / "armid"
 # Where code is made out of text, and whose text that is: the composed model's own, the user's --plugin.
@@ -20,18 +21,7 @@ TEXT_RUNS, FILE_RUNS = {"eval", "exec", "compile", "__import__"}, {"exec_module"
 READS_PICKLES = {"engine/cache.py", "study/pool.py"}
 UNPICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve", "yaml"}
 EVIL = "from pathlib import Path\nPath('touched').touch()\nthing = 1\n"
-CAMPAIGN = """\
-name = "c"
-plant = "{plant}"
-effects = {effects}
-[[records]]
-file = "lower.csv"
-role = "train"
-start_angle_deg = -48.0
-target_angle_deg = 22.0
-shell = true
-supply_V = 28.0
-"""
+CAMPAIGN = f'name = "c"\nplant = "{{plant}}"\neffects = {{effects}}\n{LOWERING}'
 STUDY = """\
 name = "{name}"
 plant = "{plant}"

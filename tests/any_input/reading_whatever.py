@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from armid.errors import LONGEST, ArmidError
 from armid.record import Campaign, IrregularSamplingWarning, read_campaign
+from input_texts import LOWERING
 
-ARM_TOML = """name = "c00"
+ARM_TOML = f"""name = "c00"
 plant = "shell_transfer_arm"
 effects = ["coulomb"]
 gyro_range_deg_s = 200
@@ -22,14 +23,7 @@ gyro_range_deg_s = 200
 low = 2.9e6
 [constants]
 K_p = 250.0
-[[records]]
-file = "lower.csv"
-role = "train"
-start_angle_deg = -48.0
-target_angle_deg = 22.0
-shell = true
-supply_V = 28.0
-window_s = [0.0, 0.7]
+{LOWERING}window_s = [0.0, 0.7]
 [records.constants]
 R = 0.5
 """

@@ -57,7 +57,7 @@ def written(folder: Path, toml: str, columns_of: Columns, seed: int) -> Path:
     return write_campaign(folder, f"{toml}\n{records}", tables)
 
 
-def write_arm(folder: Path, friction: float = 0.0, outputs: str = "angle", interval: float = 0.005,
+def write_arm(folder: Path, friction: float = 0.0, outputs: str = "angle", interval: float = 0.01,
               noise: float = 1.0, size: float = 0.6, seed: int = 1) -> Path:  # fmt: skip
     """Write a rotary arm; outputs: "angle", "speed" or "both"; noise: times 0.1 deg and 1 deg/s."""
 
@@ -75,7 +75,7 @@ def write_arm(folder: Path, friction: float = 0.0, outputs: str = "angle", inter
     return written(folder, 'name = "arm"\nplant = "rotary_arm"', columns, seed)
 
 
-def write_axis(folder: Path, friction: float = 0.0, position: bool = True, interval: float = 0.002,
+def write_axis(folder: Path, friction: float = 0.0, position: bool = True, interval: float = 0.004,
                noise: float = 1.0, size: float = 4.0, seed: int = 1) -> Path:  # fmt: skip
     """Write a linear axis with its speed and, if wished, its position; noise: times 2 mm/s."""
 
@@ -90,15 +90,15 @@ def write_axis(folder: Path, friction: float = 0.0, position: bool = True, inter
 
 
 def write_link(folder: Path, friction: float = 0.0, outputs: tuple[str, ...] = ("hub_angle", "deflection"),
-               interval: float = 0.004, noise: float = 1.0, size: float = 1.5, seed: int = 1) -> Path:  # fmt: skip
+               interval: float = 0.008, noise: float = 1.0, size: float = 1.5, seed: int = 1) -> Path:  # fmt: skip
     """Write a flexible link; noise: times 0.1 deg (hub), 0.05 deg (deflection) and 1 deg/s (speeds)."""
     states = {"hub_angle": (0, 0.1), "hub_speed": (1, 1.0), "deflection": (2, 0.05), "deflection_speed": (3, 1.0)}
 
     def columns(seconds: float, pace: float, rng: np.random.Generator) -> dict[str, Array]:
         times = np.arange(0.0, seconds, interval)
         u = swing(times, pace, size)
-        fine = np.interp(np.arange(0.0, times[-1], interval / 4.0), times, u)
-        moved = np.rad2deg(motion(lambda x, v: link(x, v, friction), fine, interval / 4.0, np.zeros(4)))[::4]
+        fine = np.interp(np.arange(0.0, times[-1], interval / 8.0), times, u)
+        moved = np.rad2deg(motion(lambda x, v: link(x, v, friction), fine, interval / 8.0, np.zeros(4)))[::8]
         moved = np.concatenate([moved, moved[-1:]])[: times.size]
         found = {"time_s": times, "drive_N_m": u}
         for name in outputs:

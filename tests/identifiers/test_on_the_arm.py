@@ -16,23 +16,14 @@ from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem, replays
 from armid.problem.space import space_of
 from armid.record import Campaign, read_campaign, write_table
+from input_texts import LOWERING
 
 # The paper's Table I.
 ROWS = {
     "row 1": (3.2e6, 1.0, 0.62, 1.0), "row 2": (3.1e6, 0.95, 0.60, 1.1), "row 3": (3.0e6, 0.90, 0.58, 1.2),
     "row 4": (2.9e6, 0.85, 0.55, 1.3), "row 5": (2.8e6, 0.80, 0.50, 1.4),
 }  # fmt: skip
-TOML = """\
-name = "row"
-plant = "shell_transfer_arm"
-[[records]]
-file = "lower.csv"
-role = "train"
-start_angle_deg = -48.0
-target_angle_deg = 22.0
-shell = true
-supply_V = 28.0
-"""
+TOML = f'name = "row"\nplant = "shell_transfer_arm"\n{LOWERING}'
 
 
 @pytest.fixture

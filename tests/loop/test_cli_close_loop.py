@@ -1,14 +1,16 @@
 """`armid close-loop` as a user meets it."""
 
 import json
+import shutil
 
 import pytest
+from few_candidates import CANDIDATES, COMMON, STROKES
 
 from armid.cli.main import main
 from armid.estimation.least_squares import descend
 
-MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage")
-CANDIDATES = "coulomb,seal_friction,supply_sag,tilt,viscous"
+TWO_LACKING = (*STROKES, "--effect", "coulomb=30", "tilt_deg=2")
+IN_ONE_THREAD = ("--candidates", ",".join(CANDIDATES), "--threads", 1)
 
 
 def run(*arguments):
@@ -20,11 +22,10 @@ def run(*arguments):
 
 @pytest.mark.slow
 def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
-    options = ("--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0")
-    campaign = stand(*options, *MANOEUVRES, "--effect", "supply_sag=0.010")
+    campaign = shutil.copytree(stand(*COMMON, "--effect", "supply_sag=0.010"), tmp_path / "campaign")
     with (campaign / "campaign.toml").open("a") as file:
         file.write("R = 0.001\n")
-    assert run(campaign, "--out", tmp_path / "out", "--candidates", CANDIDATES) == 0
+    assert run(campaign, "--out", tmp_path / "out", *IN_ONE_THREAD[:2]) == 0
     printed = capsys.readouterr().out
     assert "supply_sag" in printed
     assert "verdict: explained" in printed
@@ -62,21 +63,33 @@ def test_bad_option_is_one_sentence_and_writes_nothing(paper_arm_folder, tmp_pat
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
-def test_the_result_is_the_same_on_any_number_of_threads(stand, tmp_path):
-    campaign = stand(*MANOEUVRES, "--repeats", "1", "--duration", "1.0", "--effect", "coulomb=30", "tilt_deg=2")
-    reports = []
-    for threads in (1, 3):
-        out = tmp_path / str(threads)
-        assert run(campaign, "--out", out, "--candidates", CANDIDATES, "--threads", threads) == 0
-        reports.append((out / "report.json").read_bytes())
-    assert reports[0] == reports[1]
-    assert len(json.loads(reports[0])["effects"]) == 2
+@pytest.fixture(scope="module")
+def whole(stand, tmp_path_factory):
+    """A loop that finds two effects, closed in one thread: its campaign, its report, and how many fits it made."""
+    campaign, out, made = stand(*TWO_LACKING), tmp_path_factory.mktemp("whole") / "out", []
+
+    def counted(*given, **options):
+        made.append(given)
+        return descend(*given, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("armid.loop.fit.descend", counted)
+        assert run(campaign, "--out", out, *IN_ONE_THREAD) == 0
+    assert not (out / "progress.jsonl").exists()
+    return campaign, (out / "report.json").read_bytes(), len(made)
 
 
 @pytest.mark.slow
-def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(stand, tmp_path, monkeypatch):
-    campaign = stand(*MANOEUVRES, "--repeats", "1", "--duration", "1.0", "--effect", "coulomb=30", "tilt_deg=2")
+def test_the_result_is_the_same_on_any_number_of_threads(whole, tmp_path):
+    campaign, report, _ = whole
+    assert run(campaign, "--out", tmp_path, *IN_ONE_THREAD[:-1], 3) == 0
+    assert (tmp_path / "report.json").read_bytes() == report
+    assert len(json.loads(report)["effects"]) == 2
+
+
+@pytest.mark.slow
+def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_path, monkeypatch):
+    campaign, report, n_whole = whole
     made = []
 
     def counted(*given, **options):
@@ -86,16 +99,10 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(stand, tmp_pat
         return descend(*given, **options)
 
     monkeypatch.setattr("armid.loop.fit.descend", counted)
-    stop_at, options = None, ("--candidates", CANDIDATES, "--threads", 1)
-    assert run(campaign, "--out", tmp_path / "whole", *options) == 0
-    n_whole = len(made)
-    assert not (tmp_path / "whole" / "progress.jsonl").exists()
-
-    made.clear()
     stop_at = n_whole - 5
-    assert run(campaign, "--out", tmp_path / "cut", *options) == 130
-    kept = tmp_path / "cut" / "progress.jsonl"
-    assert list(kept.parent.iterdir()) == [kept]
+    assert run(campaign, "--out", tmp_path, *IN_ONE_THREAD) == 130
+    kept = tmp_path / "progress.jsonl"
+    assert list(tmp_path.iterdir()) == [kept]
     lines = kept.read_text().splitlines()
     assert len(lines) == stop_at
     # the last line was being written, others come from elsewhere
@@ -103,8 +110,7 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(stand, tmp_pat
 
     made.clear()
     stop_at = None
-    assert run(campaign, "--out", tmp_path / "cut", *options) == 0
+    assert run(campaign, "--out", tmp_path, *IN_ONE_THREAD) == 0
     assert len(made) == 5 + 1
     assert not kept.exists()
-    reports = [(tmp_path / name / "report.json").read_bytes() for name in ("whole", "cut")]
-    assert reports[0] == reports[1]
+    assert (tmp_path / "report.json").read_bytes() == report

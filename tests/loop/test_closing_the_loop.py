@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from few_candidates import CANDIDATES, COMMON, TRUTH, garbage
 
 from armid.errors import ArmidError
 from armid.estimation.constants import moved_record
@@ -15,20 +16,12 @@ from armid.record import read_campaign
 from armid.record.campaign import tolerances_of
 
 pytestmark = pytest.mark.slow
-# Few candidates, so that one model is compiled; coulomb and seal_friction leave the very same trace.
-NAMES = ("coulomb", "seal_friction", "supply_sag", "tilt", "viscous")
-CANDIDATES = {n: EFFECTS[n] for n in NAMES}
-COMMON = (
-    "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
-    "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",
-)  # fmt: skip
 KEYS = ["campaign", "plant", "unit", "noise_rms", "outputs", "verdict", "also", "effects", "error", "error_all_records",
         "suspects", "parameters", "steps", "withdrawn", "advice", "next_steps", "log"]  # fmt: skip
 ENTRY = ["value", "unit", "low", "high", "trusted", "interval_holds", "given_low", "given_high",
          "trusted_given_constants"]  # fmt: skip
 STEP = ["effect", "port", "alternatives", "empirical", "claimed", "constants", "error", "parameters"]
 ERRORS = ["rmse", "nrmse", "chi2_per_sample", "s", "s1", "s2"]
-TRUTH = {"p0": 3.2e6, "k": 0.9, "eta3": 0.6, "n": 1.2}
 
 
 @pytest.fixture(scope="module")
@@ -142,13 +135,6 @@ def test_rounds_and_next_steps_are_told(closed):
     assert report["log"][0]["leading"][0]["effects"] == ["supply_sag"]
     assert report["log"][0]["refused"] == ""
     assert report["log"][-1]["refused"] != ""
-
-
-def garbage(record, rng):
-    """Return a record of noise."""
-    measured = rng.standard_normal(record.measured.shape)
-    pieces = tuple(replace(p, measured=measured[p.start_index :][: len(p.measured)]) for p in record.pieces)
-    return replace(record, measured=measured, rest=rng.standard_normal(record.rest.shape), pieces=pieces)
 
 
 @pytest.mark.parametrize("effects", [(), ("supply_sag=0.010",), ("coulomb=40",)], ids=["none", "one", "group"])

@@ -5,21 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from few_candidates import CANDIDATES, COMMON, garbage
 
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion, details_of
 from armid.loop.figures import figures_of
-from armid.model import EFFECTS, Model
+from armid.model import Model
 from armid.record import read_campaign
 from armid.report.style import save
 
 pytestmark = pytest.mark.slow
-# Those of test_closing_the_loop.py: the same compiled models.
-CANDIDATES = {n: EFFECTS[n] for n in ("coulomb", "seal_friction", "supply_sag", "tilt", "viscous")}
-COMMON = (
-    "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
-    "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -62,10 +57,3 @@ def test_holdout_records_decide_nothing(found, campaign):
     again = close_loop(Model(campaign.plant), replace(campaign, records=records), CANDIDATES)
     assert again.effects == found.effects
     assert again.parameters == found.parameters
-
-
-def garbage(record, rng):
-    """Return a record of noise."""
-    measured = rng.standard_normal(record.measured.shape)
-    pieces = tuple(replace(p, measured=measured[p.start_index :][: len(p.measured)]) for p in record.pieces)
-    return replace(record, measured=measured, rest=rng.standard_normal(record.rest.shape), pieces=pieces)

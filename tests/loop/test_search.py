@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armid.estimation.least_squares import side_by_side
-from armid.loop.candidates import EffectKey, library_of
+from armid.loop.candidates import EffectKey, Library, library_of
 from armid.loop.search import Search, best_along, finished, with_free_shapes
 from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Model
@@ -15,22 +15,29 @@ from armid.record import read_campaign
 MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
 
 
-def library(folder, name):
+SHAPES = {
+    "shell_rocking": (("rocking_hz=6", "rocking_stop=0.008"), "hardening", 0.0077, 0.001),
+    "stribeck": (("stribeck=60", "stribeck_exponent=1"), "exponent", 1.0, 0.15),
+    "controller_delay": (("controller_period=0.012",), "period", 0.012, 0.0015),
+    "winding_heating": (("winding_heating=5e-5", "winding_cooling=2.5"), "cooling", 2.5, 0.4),
+}
+
+
+def library(folder):
+    """Return the effects of SHAPES as candidates, which are compiled together."""
     campaign = read_campaign(folder)
     model = Model(campaign.plant)
     data = whitened(campaign.train, model.plant)
-    return library_of(model, {name: EFFECTS[name]}, data, campaign.parameters, {}, {})
+    return library_of(model, {n: EFFECTS[n] for n in SHAPES}, data, campaign.parameters, {}, {})
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "effect", "shape", "expected", "within"), [
-    ("shell_rocking", ("rocking_hz=6", "rocking_stop=0.008"), "hardening", 0.0077, 0.001),
-    ("stribeck", ("stribeck=60", "stribeck_exponent=1"), "exponent", 1.0, 0.15),
-    ("controller_delay", ("controller_period=0.012",), "period", 0.012, 0.0015),
-    ("winding_heating", ("winding_heating=5e-5", "winding_cooling=2.5"), "cooling", 2.5, 0.4),
-])  # fmt: skip
-def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, effect, shape, expected, within):
-    found = Search(library(stand(*MANOEUVRES, "--effect", *effect), name))
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, monkeypatch):
+    """Each with itself as the only candidate, in the compiled model of all four."""
+    effect, shape, expected, within = SHAPES[name]
+    monkeypatch.setattr(Library, "joinable", lambda _, active: [] if active else [EffectKey(name)])
+    found = Search(library(stand(*MANOEUVRES, "--effect", *effect)))
     last = found.run()[-1].best
     assert last.active == (EffectKey(name, free_shape=True),)
     assert last.values[f"{name}.{shape}"] == pytest.approx(expected, abs=within)

@@ -4,28 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from few_candidates import CANDIDATES, COMMON, TRUTH
 
 from armid.loop import close_loop, report_of
 from armid.loop.diagnose import mains_hum
 from armid.loop.document import conclusion
 from armid.loop.suspects import Fault
-from armid.model import EFFECTS, PLANTS, Model
+from armid.model import PLANTS, Model
 from armid.record import read_campaign
 from armid.record.noise import noise_of
 
 pytestmark = pytest.mark.slow
-# Those of test_closing_the_loop.py: the same compiled models.
-CANDIDATES = {n: EFFECTS[n] for n in ("coulomb", "seal_friction", "supply_sag", "tilt", "viscous")}
-COMMON = (
-    "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
-    "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",
-)  # fmt: skip
 ARM = PLANTS["shell_transfer_arm"]
 
 
 @pytest.fixture(scope="module")
 def campaign(stand):
     return read_campaign(stand(*COMMON))
+
+
+@pytest.fixture(scope="module")
+def sound(campaign):
+    """The loop closed on the campaign as it is."""
+    return close_loop(Model(ARM), campaign, CANDIDATES)
 
 
 def with_fault(campaign, file, fault, value):
@@ -54,10 +55,10 @@ def test_a_fault_of_one_record_is_told_and_no_effect_is_named(campaign, file, ki
     role = "holdout" if held_out else "train"
     assert every[role]["rmse"] > report_of(found)["error"]["after"][role]["rmse"]
     for e in found.after.estimates[:4]:
-        assert e.low < {"p0": 3.2e6, "k": 0.9, "eta3": 0.6, "n": 1.2}[e.name] < e.high
+        assert e.low < TRUTH[e.name] < e.high
 
 
-def test_broken_samples_weigh_nothing(campaign):
+def test_broken_samples_weigh_nothing(campaign, sound):
     def spoiled(record):
         measured = record.measured.copy()
         measured[[200, 400, 600]] += 2.0
@@ -66,7 +67,6 @@ def test_broken_samples_weigh_nothing(campaign):
 
     records = tuple(spoiled(r) if r.file == "lower.csv" else r for r in campaign.records)
     found = close_loop(Model(ARM), replace(campaign, records=records), CANDIDATES)
-    sound = close_loop(Model(ARM), campaign, CANDIDATES)
     (suspect,) = found.suspects
     assert (suspect.record, suspect.kind, suspect.value, suspect.action) == ("lower.csv", "spikes", 3.0, "left_out")
     assert (suspect.from_s, suspect.to_s) == pytest.approx((0.2, 0.6))
@@ -77,7 +77,7 @@ def test_broken_samples_weigh_nothing(campaign):
 
 
 @pytest.mark.parametrize("size", [0.0027, 0.025])
-def test_hum_is_noise(campaign, size):
+def test_hum_is_noise(campaign, sound, size):
     """Of half the noise, and of five times it, in rad/s; each record has its own phase, and a harmonic is in it."""
     rng = np.random.default_rng(8)
 
@@ -93,7 +93,7 @@ def test_hum_is_noise(campaign, size):
     found = close_loop(Model(ARM), replace(campaign, records=tuple(map(humming, campaign.records))), CANDIDATES)
     assert (found.verdict, found.suspects) == ("no_discrepancy", ())
     assert 50.0 in {sum(ends) / 2.0 for ends in mains_hum(found.before.train)}
-    assert mains_hum(close_loop(Model(ARM), campaign, CANDIDATES).before.train) == []
+    assert mains_hum(sound.before.train) == []
 
 
 def test_a_shift_is_undone_where_it_was_measured(campaign):

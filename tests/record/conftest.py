@@ -7,21 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from input_texts import LOWERING
+
 Array = NDArray[np.float64]
 WriteCampaign = Callable[..., Path]
 
-ARM_TOML = """\
-name = "c00"
-plant = "shell_transfer_arm"
-
-[[records]]
-file = "lower.csv"
-role = "train"
-start_angle_deg = -48.0
-target_angle_deg = 22.0
-shell = true
-supply_V = 28.0
-"""
+ARM_TOML = f'name = "c00"\nplant = "shell_transfer_arm"\n\n{LOWERING}'
 AXIS_TOML = """\
 name = "axis"
 plant = "driven_axis"

@@ -8,18 +8,11 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.record import read_campaign
+from input_texts import LOWERING
 
 HEADER = "time_s,angular_velocity_deg_s"
 ROWS = [f"{i / 1000:.3f},{50 * np.sin(i / 10):.3f}" for i in range(-3, 60)]
-ENTRY = """
-[[records]]
-file = "lower.csv"
-role = "train"
-start_angle_deg = -48.0
-target_angle_deg = 22.0
-shell = true
-supply_V = 28.0
-"""
+ENTRY = f"\n{LOWERING}"
 GOOD = f'name = "c00"\nplant = "shell_transfer_arm"\n{ENTRY}'
 
 

@@ -8,23 +8,13 @@ from typing import Any
 import pytest
 
 from armid.record import read_campaign
+from input_texts import SUITE_HEAD
 from stand.advice import PROOF, make_base, make_more, read_proof
 from stand.blind.campaign import key_path
 
-SMALL = """
-[suite]
-tried = 2
-taken = 1
-bandwidth_hz = 40.0
-noise_deg_s = [0.25, 0.30]
-duration_s = [1.0, 1.1]
-rest_s = 0.2
-margin = 0.1
-[suite.ranges]
-p0 = [2.6e6, 3.5e6]
-k = [0.6, 1.1]
-eta3 = [0.45, 0.70]
-n = [0.9, 1.5]
+SMALL = (
+    SUITE_HEAD.replace("controls = 1", "tried = 2\ntaken = 1")
+    + """\
 [[suite.pairs]]
 strokes = ["lower"]
 first = { name = "coulomb", port = "torque", size = { coulomb = 50.0 } }
@@ -34,6 +24,7 @@ strokes = ["lower", "short"]
 first = { name = "tilt", port = "gravity", size = { tilt_deg = 3.0 }, signed = true }
 second = { name = "viscous", port = "torque", size = { viscous = 15.0 } }
 """
+)
 TOO_FAST = {"start_angle_deg": -50.0, "target_angle_deg": 40.0, "shell": True, "supply_V": 60.0}
 RAISE = {"start_angle_deg": 20.0, "target_angle_deg": -45.0, "shell": False, "supply_V": 27.0}
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from armid.record import read_campaign
+from input_texts import SUITE_HEAD
 from stand import RefusalError, families
 from stand.arm import KNOWN, Arm
 from stand.blind.campaign import SUITE, key_path, main
@@ -24,19 +25,9 @@ LISTED = {
     "tachometer_lag", "tachometer_offset", "controller_delay", "gyro_lag", "gyro_bias", "gyro_scale", "drive_gain",
     "torque_offset",
 }  # fmt: skip
-SMALL = """
-[suite]
-bandwidth_hz = 40.0
-noise_deg_s = [0.25, 0.30]
-duration_s = [1.2, 1.3]
-rest_s = 0.2
-margin = 0.1
-controls = 1
-[suite.ranges]
-p0 = [2.6e6, 3.5e6]
-k = [0.6, 1.1]
-eta3 = [0.45, 0.70]
-n = [0.9, 1.5]
+SMALL = (
+    SUITE_HEAD.replace("[1.0, 1.1]", "[1.2, 1.3]")
+    + """\
 [[suite.effects]]
 name = "gyro_bias"
 port = "output"
@@ -46,6 +37,7 @@ sizes = [{ gyro_bias_deg_s = 0.4 }]
 [suite.one_stroke]
 effects = ["none"]
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -3,19 +3,11 @@
 import json
 from pathlib import Path
 
-SUITE = """
-[suite]
-bandwidth_hz = 40.0
-noise_deg_s = [0.25, 0.30]
-duration_s = [1.0, 1.1]
-rest_s = 0.2
-margin = 0.1
-controls = 1
-[suite.ranges]
-p0 = [2.6e6, 3.5e6]
-k = [0.6, 1.1]
-eta3 = [0.45, 0.70]
-n = [0.9, 1.5]
+from input_texts import SUITE_HEAD
+
+SUITE = (
+    SUITE_HEAD
+    + """\
 [[suite.effects]]
 name = "supply_sag"
 port = "supply"
@@ -23,6 +15,7 @@ form = "resistance of both motors"
 matching = true
 sizes = [{ supply_sag = 0.010 }]
 """
+)
 STUDY = """\
 name = "tiny_blind"
 kind = "close_loop"
