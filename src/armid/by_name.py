@@ -44,10 +44,7 @@ PAPER_IDENTIFIER, PAPER_FITNESS, PAPER_BUDGET, PAPER_WINDOW = "pso", "similarity
 
 
 class Opened(NamedTuple):
-    """What a call on a campaign works with: all that is registered, the records, the model, overrides.
-
-    bounds, fixed: name -> (low, high) and value that were given, SI.
-    """
+    """What a call on a campaign works with; bounds and fixed as they were given, SI."""
 
     registry: Registry
     campaign: Campaign
@@ -61,7 +58,6 @@ class Opened(NamedTuple):
         return {**sensor_effects(self.campaign.plant), **self.registry.effects}
 
     def space(self) -> "Space":
-        """Return the space that is searched."""
         from armid.problem.space import space_of
 
         return space_of(self.model, self.campaign.parameters, self.bounds, self.fixed)
@@ -182,10 +178,7 @@ def effect_of(given: Any, effects: Mapping[str, Effect]) -> Effect:
 
 
 def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
-    """Return what is registered under a name.
-
-    Raises ArmidError with the nearest valid name.
-    """
+    """Return what is registered under a name, or refuse it with the nearest one."""
     if name not in known:
         raise ArmidError(f"{what} '{name}' is not known: {nearest(str(name), known)}")
     return known[name]

@@ -47,7 +47,6 @@ def points() -> "Iterator[ContractPoint]":
 
 
 def versions() -> tuple[bool, str]:
-    """Compare the installed packages with what armid declares."""
     from packaging.requirements import Requirement
 
     needed = [r for r in map(Requirement, requires("armid") or ()) if r.marker is None or r.marker.evaluate()]
@@ -57,7 +56,6 @@ def versions() -> tuple[bool, str]:
 
 
 def cache() -> tuple[bool, str]:
-    """Write into the cache folder."""
     from armid.engine.cache import cache_folder, unusable
 
     folder = cache_folder()
@@ -66,7 +64,6 @@ def cache() -> tuple[bool, str]:
 
 
 def compiler() -> tuple[bool, str]:
-    """Compile a function."""
     import numba
 
     return numba.njit(lambda x: 2.0 * x)(1.5) == 3.0, f"numba {numba.__version__} compiles"
@@ -83,7 +80,6 @@ def simulation() -> tuple[bool, str]:
 
 
 def threads() -> tuple[bool, str]:
-    """Simulate a population on one thread and on two."""
     import numpy as np
     from joblib import cpu_count
 

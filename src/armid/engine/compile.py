@@ -36,10 +36,7 @@ SLOW_S, MOST_NAMED = 2.0, 3
 
 
 def compile_model(model: Model) -> tuple[Kernel, int]:
-    """Return `simulate` of a model, compiled at its first call, and its lane width; a model is compiled once.
-
-    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
-    """
+    """Return `simulate` of a model, compiled at its first call, and its lane width; a model is compiled once."""
     with LOCK:
         if model not in KERNELS:
             kernel = load_module(kernel_parts(model, LANE_WIDTH)).simulate
@@ -51,8 +48,7 @@ def compile_model(model: Model) -> tuple[Kernel, int]:
 def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
     """Stand around the first call of a kernel, which compiles it: tell so where that takes more than 2 s.
 
-    Python's garbage collector is kept still meanwhile: the compiler makes millions of objects that live to its end, and
-    looking through them takes a fifth of its time.
+    Python's garbage collector is kept still meanwhile: the compiler makes millions of objects that live to its end.
     """
     if getattr(kernel, "signatures", True):
         yield

@@ -94,20 +94,14 @@ class KernelParts:
 
 
 def kernel_parts(model: Model, width: int) -> KernelParts:
-    """Return what the module of a model is made of, `width` candidates side by side.
-
-    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
-    """
     return Emitter(model).parts(width)
 
 
 def generate_module(model: Model, width: int) -> str:
-    """Return the self-contained text of the module that simulates a model, `width` candidates side by side."""
     return kernel_parts(model, width).text()
 
 
 def listed(names: list[str], prefix: str = "") -> str:
-    """Return `prefix_a, prefix_b, ` with a comma behind each name."""
     return "".join(f"{prefix}{n}, " for n in names)
 
 
@@ -146,8 +140,6 @@ def use_lines(effect: str, nulls: Mapping[str, float]) -> list[str]:
 
 
 class Emitter:
-    """Write the equations of one model's module."""
-
     def __init__(self, model: Model) -> None:
         self.model, self.graph = model, model.graph
         self.sources = SourceText()
@@ -155,7 +147,6 @@ class Emitter:
         self.strengths = strengths_of(model)
 
     def parts(self, width: int) -> KernelParts:
-        """Return what the template is filled with."""
         model = self.model
         rates = [f"rate__{k.replace('.', '__')}" for k in model.states]
         latch_guards = [f"guard__{k.replace('.', '__')}" for k in model.latches]
@@ -200,7 +191,6 @@ class Emitter:
         return [k for k in self.graph.nodes if k in needed and self.graph.is_static(k) and not self.empty_port(k)]
 
     def empty_port(self, key: str) -> bool:
-        """Tell whether a node is a port to which nothing is added."""
         return self.graph.nodes[key].kind == "port" and not self.graph.nodes[key].terms
 
     def assignments(self, wanted: list[str], static: bool) -> list[str]:
@@ -217,7 +207,6 @@ class Emitter:
         return f"{variable(key)} = {taken} if used_{node.owner} else splat({IDLE[node.kind]})"
 
     def expression(self, key: str) -> str:
-        """Return the right-hand side of a node."""
         node = self.graph.nodes[key]
         if node.function is None:
             return " + ".join(map(variable, node.terms)) or "0.0"
@@ -228,7 +217,6 @@ class Emitter:
         return f"{name}({', '.join(f'{local_name(argument)}={variable(bound)}' for argument, bound in node.arguments)})"
 
     def evaluation(self, name: str, arguments: list[str], wanted: list[str], static: bool = False) -> str:
-        """Return a compiled function that evaluates nodes."""
         return self.function(name, arguments, self.assignments(wanted, static), [variable(k) for k in wanted])
 
     def function(self, name: str, arguments: list[str], lines: list[str], results: list[str]) -> str:

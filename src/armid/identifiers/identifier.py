@@ -71,7 +71,6 @@ class Identifier:
 
 
 def accepts(function: Callable[..., Any], *arguments: object, **named: object) -> bool:
-    """Say whether a function can be called with such arguments."""
     try:
         inspect.signature(function).bind(*arguments, **named)
     except (TypeError, ValueError):
@@ -80,10 +79,7 @@ def accepts(function: Callable[..., Any], *arguments: object, **named: object) -
 
 
 def refuse_unknown(given: Iterable[str], known: Iterable[str], whose: str, unsaid: Iterable[str] = ()) -> None:
-    """Raise ArmidError for an option that nobody knows, naming the nearest that is known.
-
-    unsaid: options that are known too, and are named only where they are near.
-    """
+    """Refuse an unknown option with the nearest known one; unsaid: those that are named only where near."""
     names, further = list(known), list(unsaid)
     for name in given:
         if name not in (*names, *further):
@@ -122,14 +118,12 @@ def checked_population(name: str, value: Any) -> int:
 
 
 def checked_flag(name: str, value: Any) -> bool:
-    """Return an option as it is; refuse with ArmidError what is neither true nor false."""
     if not isinstance(value, bool | np.bool_):
         raise ArmidError(f"{name} is {value!r}, expected true or false")
     return bool(value)
 
 
 def checked_choice(name: str, value: Any, known: tuple[str, ...]) -> str:
-    """Return an option as it is; refuse with ArmidError what is none of the known words."""
     if value not in known:
         raise ArmidError(f"{name} is {value!r}, {nearest(str(value), known)}")
     return str(value)

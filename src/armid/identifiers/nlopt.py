@@ -37,7 +37,6 @@ class NloptSearch(DeclaredSearch):
         checked("tolerance", self.tolerance)
 
     def search(self, task: SearchTask) -> Search:
-        """Search from the task's start; the evaluated candidates are the result."""
         cube, seed = task.cube, int(task.random.integers(1, SEEDS))
         return local_search(task, lambda ask, start: self.descend(cube, seed, ask, start))
 
@@ -59,7 +58,6 @@ class NloptSearch(DeclaredSearch):
             calls.error = None
 
     def objective(self, cube: Cube, ask: Asker) -> "Objective":
-        """Return what NLopt calls: (point, gradient to be filled or empty) -> fitness."""
         height = Height()
 
         def value(u: Array, gradient: Array) -> float:

@@ -71,7 +71,6 @@ def as_identifier(name: str, obj: Any) -> Identifier:
 
 
 def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
-    """Return a fresh algorithm of a class, which is not told its budget."""
     return algorithm()
 
 
@@ -91,7 +90,6 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
 
 
 def needed(function: Callable[..., Any]) -> list[str]:
-    """Return the arguments that have no default."""
     return [name for name, p in arguments_of(function).items() if p.default is p.empty]
 
 

@@ -106,11 +106,7 @@ def import_emps(folder: str | Path | None, out: str | Path) -> Path:
 
 
 def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
-    """Return gain [N/V], and header -> values of a record's CSV file, from one file of the set.
-
-    Raises ArmidError for a file that is missing or no MATLAB file, for a missing variable, for series of different
-    length, and for times that are not even or too slow for the velocity filter.
-    """
+    """Return gain [N/V], and header -> values of a record's CSV file, from one file of the set."""
     # half a second to load, which only this import is worth
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
@@ -147,10 +143,9 @@ def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
 def velocity_of(position: Array, interval: float) -> Array:
     """Return the velocity [m/s] of an encoder position [m], both (n_samples,), sampled every `interval` seconds.
 
-    A Butterworth low-pass of order 4 with its cutoff at 100 Hz runs forward and backward, so that no phase is shifted
-    (-6 dB at 100 Hz), then differences are central. On EMPS it leaves less than 0.01 mm/s of the encoder's 50 nm steps,
-    and the best fit of a free-running model is within 0.01 mm/s of the one to unfiltered differences; at 40 Hz it is
-    not.
+    A Butterworth low-pass of order 4 with its cutoff at 100 Hz runs forward and backward, so that no phase is shifted,
+    then differences are central. On EMPS the best fit of a free-running model is within 0.01 mm/s of the one to
+    unfiltered differences; at 40 Hz it is not.
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -212,7 +207,6 @@ def import_dfki(folder: str | Path, out: str | Path, holdout: str | None = None)
 
 
 def read_dfki(folder: Path, file: str) -> dict[str, Array]:
-    """Return header -> values of one file of the set; refuse a missing file or column with ArmidError."""
     path = folder / file
     if not path.is_file():
         raise ArmidError(f"{folder}: {file} does not exist there, the folder results/ of the set, or its files in one "

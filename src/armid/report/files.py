@@ -12,11 +12,7 @@ if TYPE_CHECKING:
 
 
 def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
-    """Write each named table as CSV and LaTeX and each figure as PNG and SVG.
-
-    path_of: file name -> where to write it. The bytes depend on the document and the versions of the packages only: no
-    date, no place.
-    """
+    """Write each named table as CSV and LaTeX and each figure as PNG and SVG; the bytes hold no date and no place."""
     for table in document.tables:
         path_of(f"{table.name}.csv").write_text(csv(table), encoding="utf-8")
         if table.most:

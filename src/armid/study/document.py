@@ -42,22 +42,10 @@ def report_of(
 ) -> Document:
     """Return the document of a study as far as it was run; nothing is drawn yet.
 
-    Parameters
-    ----------
-    results
-        As `load_study` gives them.
-    key
-        File of a truth that was kept from a study of loops. It is not opened here: the report says what scores it.
-    own
-        Analyses of a user, name -> function of the runs.
-    again
-        Command that makes the report again, "" for the plain one.
-
-    Raises
-    ------
-    ArmidError
-        When no run has ended, for a key to a study that knows its truths, for a kind of study that nobody knows, and
-        for an analysis of a user that returns no table and no figure.
+    key: file of a truth that was kept from a study of loops, which is not opened here. own: analyses of a user. again:
+    command that makes the report again, "" for the plain one.
+    Raises ArmidError when no run has ended, for a key to a study that knows its truths, for a kind of study that nobody
+    knows, and for an analysis of a user that returns no table and no figure.
     """
     study, own = results.study, own or {}
     kind = known_kind(study)
@@ -142,10 +130,7 @@ def write_report(document: Document, files: NewFiles) -> None:
 
 
 def known_kind(study: dict[str, Any]) -> str:
-    """Return the kind of a study.
-
-    Raises ArmidError for one that this version does not know.
-    """
+    """Return the kind of a study; refuse one that this version does not know."""
     kind = str(study.get("kind", IDENTIFIES))
     if kind not in KIND_NAMES:
         raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of {', '.join(KIND_NAMES)} is expected")
@@ -173,7 +158,6 @@ def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
 
 
 def lowest_fitness(evidence: Evidence) -> str:
-    """Return who came to the lowest median fitness, of each fitness."""
     done = evidence.runs[evidence.runs["status"] == "done"]
     if done.empty:
         return "No run has a result."
@@ -187,7 +171,6 @@ def percent(value: float) -> str:
 
 
 def state_of(study: dict[str, Any]) -> str:
-    """Return how much of the study was run."""
     planned, done, failed = (int(study[key]) for key in ("n_planned", "n_done", "n_failed"))
     what = "campaigns" if study.get("kind") == CLOSES_LOOP else "runs"
     lost = f", {failed} of them failed" if failed else ""
@@ -223,7 +206,6 @@ def loop_facts(study: dict[str, Any], scored: bool) -> tuple[str, ...]:
 
 
 def origin(study: dict[str, Any]) -> str:
-    """Return where the records come from."""
     read = [c for c in study["cases"] if c.get("campaign")]
     parts = [SYNTHETIC] if len(read) < len(study["cases"]) else []
     if read:
@@ -233,7 +215,6 @@ def origin(study: dict[str, Any]) -> str:
 
 
 def versions(study: dict[str, Any]) -> str:
-    """Return the packages that made the runs."""
     named = sorted(dict(study.get("versions") or {}).items())
     return f"Versions: {', '.join(f'{name} {version}' for name, version in named)}."
 

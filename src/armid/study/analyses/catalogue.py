@@ -33,20 +33,14 @@ OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
 
 
 def check_names(own: OwnAnalyses) -> None:
-    """Refuse an analysis of a user that is called like one of ours.
-
-    Raises ArmidError.
-    """
+    """Refuse an analysis of a user that is called like one of ours."""
     for name in own:
         if name in {a.name for a in ANALYSES}:
             raise ArmidError(f"analyses: '{name}' is there already, give yours another name")
 
 
 def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:
-    """Return a section for each analysis of a user that returns something.
-
-    runs: one row a run; each function gets a copy. Raises ArmidError for what is no table and no figure.
-    """
+    """Return a section for each analysis of a user that returns something; each gets a copy of the runs."""
     # before a plug-in imports it: no window is opened, and the figures look alike
     pyplot()
     sections = []

@@ -56,10 +56,7 @@ RUNS = Analysis("runs", "Runs", lambda found: (runs_table(found.runs, found.para
 
 
 def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Table:
-    """Return mean and median relative error of each parameter, and the tail of the largest, one line a variant.
-
-    runs: outcomes; estimates: one row a run and parameter; published: the paper's values, empty without any.
-    """
+    """Return mean and median relative error of each parameter, and the tail of the largest, one line a variant."""
     names = list(dict.fromkeys(estimates["parameter"]))
     rows = [paper_row(published, names)] if len(published) else []
     by = ["setting", "variant"]
@@ -93,7 +90,6 @@ def tail(errors: np.ndarray) -> dict[str, float]:
 
 
 def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
-    """Return the paper's line: errors recomputed from its printed values."""
     errors = published.pivot(index="case", columns="parameter", values="relative_error")
     largest = errors.max(axis=1).to_numpy()
     row: dict[str, object] = {
@@ -110,7 +106,7 @@ def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
 
 
 def values(runs: DataFrame, estimates: DataFrame) -> Table:
-    """Return one line a setting, variant and parameter. runs: outcomes; estimates: a row a run and parameter."""
+    """Return one line a setting, variant and parameter."""
     joined = estimates.merge(runs[["run", "train_rmse", "holdout_rmse"]], on="run")
     frame = joined.groupby(["setting", "variant", "parameter", "unit"], sort=False).agg(
         n=("run", "size"), median=("value", "median"), deviation=("value", lambda v: v.std(ddof=0)),
@@ -121,7 +117,6 @@ def values(runs: DataFrame, estimates: DataFrame) -> Table:
 
 
 def runs_table(runs: DataFrame, parameters: DataFrame) -> Table:
-    """Return the counts. runs: outcomes; parameters: one row a run and parameter."""
     held = set(parameters.loc[parameters["at_bound"].astype(bool), "run"])
     marked = runs.assign(done=runs["status"] == "done", held=runs["run"].isin(held))
     frame = marked.groupby(["setting", "variant"], sort=False).agg(
