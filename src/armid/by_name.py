@@ -153,7 +153,6 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
 
 
 def toml(value: Any) -> str:
-    """Return a value of a table's `attrs` as TOML has it."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + " }"
     if isinstance(value, list | tuple):
@@ -178,7 +177,6 @@ def effect_of(given: Any, effects: Mapping[str, Effect]) -> Effect:
 
 
 def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
-    """Return what is registered under a name, or refuse it with the nearest one."""
     if name not in known:
         raise ArmidError(f"{what} '{name}' is not known: {nearest(str(name), known)}")
     return known[name]

@@ -171,7 +171,6 @@ def name_of(thing: Any, found_under: str) -> str:
 
 
 def kind_of(thing: Any, where: str) -> str:
-    """Tell of which kind a user's object is; refuse with ArmidError one of no kind."""
     for kind, accepts in ACCEPTS.items():
         if accepts(thing):
             return kind

@@ -213,7 +213,6 @@ def identifiability_command(
 
 
 def read_point(path: Path) -> dict[str, float]:
-    """Return name -> value of the result of an identification."""
     try:
         parameters = json.loads(path.read_text(encoding="utf-8"))["parameters"]
         return {str(name): float(entry["value"]) for name, entry in parameters.items()}

@@ -70,7 +70,6 @@ def compiler() -> tuple[bool, str]:
 
 
 def simulation() -> tuple[bool, str]:
-    """Simulate the stored motion."""
     import numpy as np
 
     from armid.engine import calibrate, simulate

@@ -38,8 +38,6 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """The commands by name, each imported when it is asked for."""
-
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         # click looks for the nearest name there

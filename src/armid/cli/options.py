@@ -163,7 +163,6 @@ def given(
 
 
 def examples(*lines: str) -> str:
-    """Return what stands below the options of a command's help."""
     # \b keeps click from joining the lines
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
@@ -189,7 +188,6 @@ def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> 
 
 
 def value_of(text: str) -> float | int | bool | str:
-    """Return true or false, a whole number, a number, or the word itself."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):

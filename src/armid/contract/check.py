@@ -201,7 +201,6 @@ def replay_at(candidate: Array, record: Record, model: Model) -> Replay:
 
 
 def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:
-    """Return a failing point for each mistake that a screen has found, a passing one where there is none."""
     wrong = [ContractPoint(f"plausible ({s.kind})", False, s.sentence) for s in found]
     return wrong or [ContractPoint("plausible", True, "no sign, unit, clock or manoeuvre of a record looks wrong")]
 

@@ -50,7 +50,6 @@ def check_plant(plant: Plant) -> Iterator[ContractPoint]:
 
 
 def plant_declared(model: Model) -> list[ContractPoint]:
-    """Check what can be told of a plant without moving; idle are switches that nobody asks for, and static guards."""
     plant, graph = model.plant, model.graph
     ports = ", ".join(plant.ports) or "none"
     asked = {key for node in graph.nodes.values() for key in node.needs}
@@ -121,7 +120,6 @@ def siblings(plants: Mapping[str, Plant]) -> list[Plant]:
 
 
 def composed(form: Effect, plants: Mapping[str, Plant]) -> tuple[list[Model], list[str]]:
-    """Return the models of an effect with each plant that takes it, and why the others do not."""
     models, refusals = [], []
     for plant in siblings(plants):
         try:
@@ -265,7 +263,6 @@ def finite(model: Model, manoeuvres: list[Manoeuvre], spread: Array) -> Contract
 
 
 def deterministic(model: Model, manoeuvre: Manoeuvre, candidates: Array) -> ContractPoint:
-    """Tell whether the same candidates give the same signal again, bit for bit."""
     runs = [np.moveaxis(simulate(model, manoeuvre, candidates).outputs, 1, 0) for _ in range(2)]
     differ = np.flatnonzero([not np.array_equal(a, b, equal_nan=True) for a, b in zip(*runs, strict=True)])
     text = f"candidate {differ[0] + 1} moves differently when it is simulated again" if differ.size else (

@@ -107,7 +107,6 @@ class BrokenError(Exception):
 
 
 def raising(identifier: Identifier) -> ContractPoint:
-    """Tell whether an error of the problem comes out as it is and leaves no thread behind."""
     before = set(threading.enumerate())
     seen = 0
 
@@ -153,7 +152,6 @@ def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: 
 
 @contextmanager
 def disturbed(noise: int) -> Iterator[None]:
-    """Put the global random generators into some state for a while."""
     kept, kept_by_numpy = random.getstate(), np.random.get_state()
     random.seed(noise)
     np.random.seed(noise)

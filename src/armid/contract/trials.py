@@ -59,7 +59,6 @@ def middle(p: Parameter) -> float:
 
 
 def over_box(model: Model, n_candidates: int) -> Array:
-    """Return candidates spread over the bounds of all parameters, (n_candidates, n_parameters)."""
     parameters = model.parameters.values()
     low, high = (np.array([getattr(p, side) for p in parameters]) for side in ("low", "high"))
     return probes(low, high, n_candidates)
@@ -84,7 +83,6 @@ def away(model: Model, effect: Effect, share: float) -> Array:
 
 
 def corners(model: Model, effect: Effect) -> Array:
-    """Return nominal values with every combination of the bounds of an effect's free parameters."""
     names = [f"{effect.name}.{p.name}" for p in effect.parameters if p.fixed is None]
     bounds = [(model.parameters[n].low, model.parameters[n].high) for n in names]
     values = dict(zip(model.parameters, nominal(model), strict=True))

@@ -138,7 +138,6 @@ def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: st
 
 
 def switch_weights(candidates: Array, run: Simulation) -> Array | None:
-    """Return weights of the parameters in the time of the first switch (least squares), None without a switch."""
     if not run.switch_times or len(candidates) < 2 * candidates.shape[1] + 2:
         return None
     times = np.array(next(iter(run.switch_times.values())))

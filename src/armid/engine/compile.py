@@ -98,7 +98,6 @@ def load_module(parts: KernelParts) -> ModuleType:
 
 
 def compile_error(error: Exception) -> ArmidError:
-    """Return the error to raise for an equation that cannot be compiled, naming the equation where numba names it."""
     text, equation = str(error), re.compile(r"(?:\bdef |<function )f__(\w+)")
     found = equation.search(text) or equation.search(definition_above(error))
     name = f"the equation '{found[1].replace('__scalar', '').replace('__', '.')}'" if found else "an equation"
@@ -118,7 +117,6 @@ def cause(text: str) -> str:
 
 
 def definition_above(error: Exception) -> str:
-    """Return the head of the function in which numba met the error."""
     place = getattr(error, "loc", None) or re.search(r"Raised from (?P<filename>.+) \((?P<line>\d+)\)", str(error))
     if place is None:
         return ""

@@ -66,7 +66,6 @@ class KernelParts:
     wide: bool
 
     def text(self) -> str:
-        """Return the text of the module."""
         # Imported here: a module that is in the cache is not generated again.
         from jinja2 import Environment, StrictUndefined
 
@@ -112,7 +111,6 @@ def each(text: str, names: list[str], separator: str = "\n") -> str:
 
 
 def nested(names: list[str], function: str, prefix: str) -> str:
-    """Return the maximum or minimum of prefixed names, two at a time."""
     first = f"{prefix}{names[0]}" if names else ""
     return f"{function}(" * (len(names) - 1) + first + "".join(f", {prefix}{n})" for n in names[1:])
 
@@ -182,7 +180,6 @@ class Emitter:
         return KernelParts(equations, width, **names, driven_start=bool(at_start), jumping_guards=jumping, wide=wide)
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:
-        """Tell whether nodes depend on one of the wanted ones."""
         return any(k in wanted or self.uses(list(self.graph.nodes[k].needs), wanted) for k in keys)
 
     def fixed_keys(self, moving: list[str]) -> list[str]:
@@ -194,7 +191,6 @@ class Emitter:
         return self.graph.nodes[key].kind == "port" and not self.graph.nodes[key].terms
 
     def assignments(self, wanted: list[str], static: bool) -> list[str]:
-        """Return one line for each node that leads to the wanted ones."""
         return [self.line(n.key, static) for n in self.graph.order(wanted)
                 if self.graph.is_static(n.key) == static or n.kind == "initial" or self.empty_port(n.key)]  # fmt: skip
 
@@ -220,7 +216,6 @@ class Emitter:
         return self.function(name, arguments, self.assignments(wanted, static), [variable(k) for k in wanted])
 
     def function(self, name: str, arguments: list[str], lines: list[str], results: list[str]) -> str:
-        """Return a compiled function that evaluates lines and returns a tuple."""
         result = f"({', '.join(results)}{',' if len(results) == 1 else ''})"
         body = "\n".join(f"    {line}" for line in [*lines, f"return {result}"])
         return f"@compiled\ndef {name}({', '.join(arguments)}):\n{body}\n"
@@ -234,7 +229,6 @@ class Emitter:
 
 
 def wrapped_by_lane(name: str, definition: ast.FunctionDef) -> str:
-    """Return a function with control flow, called once for each lane."""
     arguments = ast.unparse(definition.args)
     lanes = ", ".join(f"lane({a.arg}, i)" for a in definition.args.args)
     scalar = ast.unparse(definition).replace(f"def {name}(", f"def {name}__scalar(", 1)

@@ -158,7 +158,6 @@ class Prepared:
 
 
 def as_population(model: Model, population: ArrayLike) -> Array:
-    """Return the population as float64, (n_candidates, n_parameters); refuse another shape with ArmidError."""
     candidates = np.atleast_2d(np.asarray(population, dtype=np.float64))
     if candidates.ndim != 2 or candidates.shape[1] != len(model.parameters):
         raise ArmidError(f"a population of shape {candidates.shape} was given: (n_candidates, "

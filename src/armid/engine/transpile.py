@@ -39,7 +39,6 @@ class SourceText:
     functions: dict[str, Callable[..., Any]] = field(default_factory=dict)
 
     def add(self, name: str, function: Callable[..., Any]) -> None:
-        """Add one function under a new name, with the helpers that it calls."""
         plain = plain_function(function)
         self.functions[name] = plain
         definition = with_values(definition_of(plain), plain)
@@ -177,7 +176,6 @@ class Names(ast.NodeTransformer):
         return node
 
     def note_call(self, called: Any) -> None:
-        """Note whether a function of numpy or math is one that lanes do not have."""
         self.is_scalar |= callable(called) and called not in LANE_FUNCTIONS
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -200,7 +198,6 @@ class Names(ast.NodeTransformer):
                          "numpy, math, numbers and plain functions are expected")  # fmt: skip
 
     def replacement(self, name: str, value: Any) -> ast.AST:
-        """Return what stands for an outside name in the generated module."""
         if isinstance(value, ModuleType) and value in (np, math):
             return ast.Name("np" if value is np else "math", ast.Load())
         if isinstance(value, NUMBERS):

@@ -55,7 +55,6 @@ class Product:
 
 
 def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> Record:
-    """Return a record of a machine whose constants differ by relative shares, name -> share."""
     if not shares:
         return record
     pieces, whole = (

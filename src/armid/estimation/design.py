@@ -103,7 +103,6 @@ def offers(
 
 
 def gain(fisher: Array, more: Array, by: str) -> float:
-    """Return by what factor deviations shrink from one information matrix to a larger one."""
     known = BOX * np.eye(len(fisher))
     if by == VOLUME:
         volumes = np.linalg.slogdet(more + known)[1] - np.linalg.slogdet(fisher + known)[1]
@@ -167,7 +166,6 @@ def keyed(plant: Plant, records: Sequence[Record]) -> Iterator[Feasible]:
 
 
 def key_levels(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> tuple[float | bool, ...]:
-    """Return the values that a key takes in the grid, in its own unit."""
     if key.boolean:
         return (True, False)
     if key.low is not None and key.high is not None and is_place(plant, key):

@@ -287,8 +287,6 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
 
 
 def errors_entry(errors: Errors | None) -> dict[str, Any] | None:
-    """Return errors as JSON can hold them, null for what is not finite, None for none."""
-
     def without_nan(value: Any) -> Any:
         if isinstance(value, dict):
             return {k: without_nan(v) for k, v in value.items()}

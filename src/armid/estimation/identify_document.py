@@ -50,13 +50,11 @@ LINE = 60
 
 
 def figures_of(found: Identification) -> dict[str, Callable[[], Any]]:
-    """Return name -> what draws a figure; nothing converges where nothing was searched."""
     convergence = {"convergence": lambda: convergence_figure(found)} if len(found.trace[0]) else {}
     return {"fit": lambda: fit_figure(found), **convergence}
 
 
 def fit_figure(found: Identification) -> Any:
-    """Draw measured and simulated signal of each record, the residual below."""
     replays = chosen(found)
     figure, axes = record_axes(len(replays), 4.4, (3, 1.4))
     for pair, replay in zip(axes, replays, strict=True):
@@ -204,7 +202,6 @@ def identify_document(
 
 
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return parameters, errors, and what stands against them."""
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
     first = f"{lead(free)}: {'; '.join(f'{name} = {held_text(p)}' for name, p in free.items())}."
     train, holdout = result["error"]["train"], result["error"]["holdout"]
@@ -227,7 +224,6 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
 
 
 def lead(free: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return whether the parameters were found, and whether their intervals hold."""
     doubts = {p.get("interval_doubt", "") for p in free.values()}
     if not any(doubts):
         return "Found, with 95 % intervals"
@@ -237,12 +233,10 @@ def lead(free: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def held_text(p: Mapping[str, Any]) -> str:
-    """Return a stored parameter, with its interval where it holds."""
     return value_text(p if p.get("interval_holds", True) else {**p, "low": None})
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
-    """Return the parameters: value, unit, 95 % interval, bounds, remark."""
     rows = []
     for name, p in result["parameters"].items():
         unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
@@ -349,7 +343,6 @@ def interval_doubts(found: Identification) -> dict[str, str]:
 
 
 def far_from_minimum(found: Identification) -> bool:
-    """Tell whether a least-squares step from here would be many standard deviations long."""
     return bool(np.nan_to_num(np.abs(found.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
 
 
@@ -420,7 +413,6 @@ def bound_remark(found: Identification, i: int) -> str:
 
 
 def convergence_remarks(found: Identification) -> list[str]:
-    """Return what is to be said of a search that has not come to the minimum, or of one that does not carry over."""
     said = []
     if far_from_minimum(found):
         steps = np.abs(np.nan_to_num(found.information.step))
@@ -448,7 +440,6 @@ def noise_remarks(found: Identification) -> list[str]:
 
 
 def misfit_remarks(found: Identification) -> list[str]:
-    """Return on which records the residual is more than the noise, and what follows."""
     pairs = zip(judged_by(found.fitness, found.train_replays), found.information.levels, strict=True)
     above = [(level.rms / r.record.noise.rms if r.record.noise.rms else np.inf, r.name)
              for r, level in pairs if level.from_residual]  # fmt: skip

@@ -177,7 +177,6 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
 
 
 def inverse(matrix: Array) -> Array:
-    """Return the inverse of an information matrix, infinite variance for what it does not determine."""
     scale = np.sqrt(np.diag(matrix))
     seen = np.isfinite(scale) & (scale > 0.0)
     result = np.full(matrix.shape, np.nan)
@@ -207,7 +206,6 @@ def collinear(information: Information, above: float = 0.95) -> list[tuple[str, 
 
 
 def level_of(replay: Replay, space: Space, x: Array) -> Level:
-    """Return the measured noise of a record, or its residual where that is far above the noise."""
     noise = replay.record.noise
     residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
     rms = float(np.sqrt(np.mean(residual**2)))

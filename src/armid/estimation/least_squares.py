@@ -37,7 +37,6 @@ TOLERANCE = 1e-9
 
 
 def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
-    """Return which of the free parameters x (SI) lie on a bound, shape (n_free,)."""
     low, high = space.low[space.free], space.high[space.free]
     margin = AT_BOUND * (high - low)
     return np.asarray((x <= low + margin) | (x >= high - margin))
@@ -62,7 +61,6 @@ class LeastSquaresProblem:
         return self.space.high[self.space.free] - self.space.low[self.space.free]
 
     def shares(self, x: Array) -> Array:
-        """Return free parameters (SI) as shares of their range, shape (n_free,)."""
         return np.asarray((x - self.space.low[self.space.free]) / self.span)
 
     def values(self, z: Array) -> Array:
@@ -87,7 +85,6 @@ class LeastSquaresProblem:
         return np.asarray(self.measured - self.signals(np.atleast_2d(Z)))
 
     def chi2(self, Z: Array) -> Array:
-        """Return the sum of squares of candidates, (n_candidates,), infinite where one diverges."""
         total = np.sum(self.residuals(Z) ** 2, axis=1)
         return np.where(np.isfinite(total), total, np.inf)
 

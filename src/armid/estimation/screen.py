@@ -147,12 +147,10 @@ class Trial:
         return record
 
     def signals(self, record: Record, Z: Array) -> list[Array]:
-        """Return each output of a file at candidates in shares, (n_candidates, n_samples), 0 where one diverges."""
         problem = self.problem([record])
         return [np.nan_to_num(x) for x in signals_of(problem.replays, self.space.complete(problem.values(Z)))]
 
     def likeness(self, record: Record) -> float:
-        """Return the largest cosine, either sign, between what was measured and what candidates do."""
         problem, Z = self.problem([record]), self.spread([record])
         signals = problem.signals(Z)
         products, sizes = signals @ problem.measured, np.linalg.norm(signals, axis=1)
@@ -201,7 +199,6 @@ class Trial:
 
 
 def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Array]:
-    """Return what is wrong with the train records, and the candidate that fits those that are right."""
     z, before = trial.fit(train)
     if trial.errors(train, z).max() <= TOLERABLE:
         return [], z
@@ -339,7 +336,6 @@ def told_as(other: Record) -> Mend:
 
 
 def driven_as(piece: Piece, constants: Mapping[str, float], inputs: Mapping[str, Array]) -> Piece:
-    """Return a piece with the constants and inputs of another, as long as both last."""
     told = with_constants(piece, constants)
     n = min([piece.window.stop, *map(len, inputs.values())])
     shorter = replace(told, window=slice(piece.window.start, n)).until_window_end()

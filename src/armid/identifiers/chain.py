@@ -49,7 +49,6 @@ def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> 
 
 
 def shares_of(given: Any, n_phases: int) -> list[float]:
-    """Return the share of the budget of each phase, the last gets the rest."""
     if given is None:
         shares = [0.5**phase for phase in range(1, n_phases)]
     else:
@@ -123,7 +122,6 @@ class Seen:
         return True
 
     def see(self, X: Array, told: Told) -> Told:
-        """Count candidates and keep the best; return what was told of them."""
         self.used += len(X)
         self.best.see(X, told.F)
         return told

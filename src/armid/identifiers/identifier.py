@@ -95,7 +95,6 @@ def checked(name: str, value: Any, least: float = 0.0, expected: str = "a number
 
 
 def checked_share(name: str, value: Any, most: float = 1.0) -> float:
-    """Return an option as a float; refuse with ArmidError what is not above 0 or too small to count, or too large."""
     expected = f"a number above 0 and at most {most:g}"
     share = checked(name, value, SMALLEST_SHARE, expected)
     if share > most:
@@ -104,7 +103,6 @@ def checked_share(name: str, value: Any, most: float = 1.0) -> float:
 
 
 def checked_count(name: str, value: Any, most: int = LARGEST_COUNT) -> int:
-    """Return an option as an int; refuse with ArmidError what is no whole number above 0, or above the most."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise ArmidError(f"{name} is {value!r}, expected a whole number above 0")
     if value > most:
@@ -113,7 +111,6 @@ def checked_count(name: str, value: Any, most: int = LARGEST_COUNT) -> int:
 
 
 def checked_population(name: str, value: Any) -> int:
-    """Return a number of candidates at a time as an int; refuse with ArmidError what could not be kept."""
     return checked_count(name, value, LARGEST_POPULATION)
 
 

@@ -40,7 +40,6 @@ class LeastSquares(DeclaredSearch):
         return local_search(task, lambda ask, start: self.descend(cube, ask, start))
 
     def descend(self, cube: Cube, ask: Asker, start: Array) -> None:
-        """Minimise from a point of the unit cube."""
         from scipy.optimize import least_squares
 
         residual = Residual(self, cube, ask)

@@ -75,7 +75,6 @@ def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
 
 
 def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:
-    """Return what a user's function makes; refuse with ArmidError anything but an algorithm."""
     algorithm = factory(budget)
     if not isinstance(algorithm, Algorithm):
         raise ArmidError(f"identifier '{name}' returned a {type(algorithm).__name__}, expected an Algorithm of pymoo")
@@ -133,7 +132,6 @@ class Value:
         self.least, self.most = np.inf, -np.inf
 
     def __call__(self, x: ArrayLike) -> float | Array:
-        """Return the fitness of a candidate, (n_parameters,), or of several, (n_candidates, n_parameters)."""
         if self.error is not None:
             raise self.error
         asked = np.asarray(x, dtype=np.float64)

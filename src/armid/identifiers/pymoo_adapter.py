@@ -152,7 +152,6 @@ class DeclaredSearch(ABC):
 
 
 def built_search(kind: type[DeclaredSearch], budget: int, **options: Any) -> SearchAlgorithm:
-    """Return a search as an algorithm; refuse with ArmidError an unknown option and a bad value."""
     refuse_unknown(options, [f.name for f in fields(kind)], f"'{kind.name}'")
     return SearchAlgorithm(kind(**options).search, budget)
 
@@ -172,7 +171,6 @@ def search_of(algorithm: Algorithm, task: SearchTask) -> Search:
 
 
 def takes_start(algorithm: Algorithm) -> bool:
-    """Tell whether an algorithm can be told where to start: pymoo's local ones can, and whatever has an `x0`."""
     return isinstance(algorithm, SearchAlgorithm | LocalSearch) or hasattr(algorithm, "x0")
 
 

@@ -93,7 +93,6 @@ class Cube:
         return np.asarray(np.minimum(np.maximum(x, self.low), self.high))
 
     def point(self, x: Array) -> Array:
-        """Return a candidate of the box as a point of the unit cube, (n_parameters,)."""
         span = self.high - self.low
         u = np.divide(x - self.low, span, out=np.full(len(span), 0.5), where=span > 0.0)
         return np.asarray(np.minimum(np.maximum(u, 0.0), 1.0))
@@ -140,7 +139,6 @@ def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> S
 
 
 def pulled(u: Array) -> Array:
-    """Return a point of the unit cube pulled inside by 0.1 % of the range where it sits on a bound."""
     return np.asarray(np.minimum(np.maximum(u, PULLED), 1.0 - PULLED))
 
 

@@ -36,7 +36,6 @@ class Node:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Keys that must be known before."""
         return self.terms or tuple(key for _, key in self.arguments)
 
     def value(self, known: Mapping[str, Any]) -> Any:
@@ -48,8 +47,6 @@ class Node:
 
 @dataclass
 class Graph:
-    """Hold every node by key, in the order of declaration."""
-
     nodes: dict[str, Node] = field(default_factory=dict)
 
     def add(self, node: Node) -> None:
@@ -94,7 +91,6 @@ class Graph:
 
 
 def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:
-    """Bind every equation of the plant and its effects."""
     graph = Graph()
     for key, kind in leaves(plant, effects):
         graph.add(Node(key, kind))
@@ -135,7 +131,6 @@ def corrected(value: float, error: float) -> float:
 
 
 def switched_at_start(guard: float) -> Any:
-    """Return 1 where a one-way switch has switched before the start, else 0."""
     return np.where(guard <= 0.0, 1.0, 0.0)
 
 
@@ -151,7 +146,6 @@ def leaves(plant: Plant, effects: tuple[Effect, ...]) -> list[tuple[str, str]]:
 
 
 def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
-    """Add the equations of an effect, or of the plant, each bound to what it asks for."""
     owner, prefix = ("", "") if effect is None else (effect.name, f"{effect.name}__")
     who = f"plant '{plant.name}'" if effect is None else f"effect '{owner}'"
 
@@ -276,8 +270,6 @@ class Rename(ast.NodeTransformer):
 
 
 class Insert(ast.NodeTransformer):
-    """Put expressions in the place of names."""
-
     def __init__(self, known: dict[str, ast.expr]) -> None:
         self.known = known
 

@@ -121,7 +121,6 @@ def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def finite_or_inf(values: Array, failed: NDArray[np.bool_]) -> Array:
-    """Return values, (n,), with +inf for those that failed or are no finite number."""
     good = np.isfinite(values) & ~failed
     return values if good.all() else np.where(good, values, np.inf)
 
@@ -148,7 +147,6 @@ def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
 
 
 def as_fitness(name: str, obj: Fitness | Callable[..., Any]) -> Fitness:
-    """Return a Fitness as it is, or make one of a plain function, whose records then join by duration."""
     return obj if isinstance(obj, Fitness) else Fitness(name, obj, note="a function of the user")
 
 
@@ -161,7 +159,6 @@ def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
 
 
 def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
-    """Return the mean of (x - x')^2 over the mean of x^2 [1], (n_candidates,)."""
     from armid.problem.similarity import as_series, sums_of_squares
 
     x, rows = as_series(measured, simulated)

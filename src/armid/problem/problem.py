@@ -45,7 +45,6 @@ class Replay:
 
     @cached_property
     def place(self) -> int:
-        """Which output of the plant the record holds."""
         names = [o.name for o in self.model.plant.outputs]
         return names.index(self.record.output) if self.record.output else 0
 

@@ -66,7 +66,6 @@ def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
 
 
 def fits_starts(replays: Sequence[Replay]) -> bool:
-    """Tell whether the start of any piece is to be fitted."""
     return any(piece.shown_start for r in replays for piece in r.pieces)
 
 
@@ -194,6 +193,5 @@ class Start:
         return np.array([self.seen(slope) for slope in slopes]).reshape(shape)
 
     def cost(self, constants: Array, residual: Array, misfit: float) -> Any:
-        """Return J of `with_starts`, of one start and its residual or of many."""
         shown, width = self.shown
         return np.sum(residual**2, axis=-1) / misfit + np.sum(((constants - shown) / width) ** 2, axis=-1)

@@ -312,7 +312,6 @@ def overrides_of(
 
 
 def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
-    """Return qualified name -> table, also where the name was written as nested tables."""
     flat: dict[str, object] = {}
     for name, table in tables.items():
         inner = {key: value for key, value in table.items() if isinstance(value, dict)}

@@ -223,7 +223,6 @@ def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordShe
 
 
 def key_value(key: ManoeuvreKey, value: object, where: str) -> float:
-    """Return the constant (SI) that a key of the plant sets."""
     if key.boolean:
         if isinstance(value, bool):
             return float(value)
@@ -262,7 +261,6 @@ def range_of(key: ManoeuvreKey) -> str:
 
 
 def campaign_path(path: str | Path) -> Path:
-    """Return the campaign.toml that a folder or a file stands for; refuse with ArmidError where there is none."""
     if not os.path.exists(path):
         raise ArmidError(f"campaign {quoted(str(path))} does not exist, a folder with a {NAME} is expected")
     if os.path.isfile(path):
@@ -273,7 +271,6 @@ def campaign_path(path: str | Path) -> Path:
 
 
 def record_path(folder: Path, file: str, where: str) -> Path:
-    """Return where the file of a record is."""
     pure = PurePosixPath(file.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
         raise ArmidError(f"{where}: file {quoted(file)} leads out of the campaign's folder, a file inside is expected")

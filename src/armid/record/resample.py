@@ -119,7 +119,6 @@ def printed_resolution(times: Array, interval: float) -> float:
 
 
 def irregularity_of(times: Array) -> Irregularity | None:
-    """Return how far the intervals are from their median, None when only slow drift is there."""
     intervals = np.diff(times)
     median = float(np.median(intervals))
     relative = intervals / median

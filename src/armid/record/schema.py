@@ -29,7 +29,6 @@ class KindError(Exception):
 
 
 def part(kind: Kind, value: object, path: str) -> Any:
-    """Return a part of a value as its kind wants it."""
     try:
         return kind(value)
     except KindError as error:
@@ -50,7 +49,6 @@ def above_zero(value: object) -> float:
 
 
 def share(value: object) -> float:
-    """Return a number from 0 to below 1."""
     if not 0.0 <= number(value) < 1.0:
         raise KindError(value)
     return number(value)

@@ -160,7 +160,6 @@ def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tu
 
 
 def window_at(index: int, n: int, n_samples: int) -> int:
-    """Return the first sample of a window of n samples around one, at the ends of the signal beside it."""
     return max(min(max(index - (n - 1) // 2, 0), n_samples - n), 0)
 
 

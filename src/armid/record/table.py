@@ -131,7 +131,6 @@ def wrong_line(path: Path, file: str, error: ValueError) -> ArmidError:
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Yield (number from 1, line without its end), whatever ends the lines."""
     with path.open(encoding="latin-1") as lines:
         for number, line in enumerate(lines, start=1):
             yield number, line.rstrip("\n").encode("latin-1")
@@ -215,8 +214,6 @@ def si_factor(header: str) -> float:
 
 
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
-    """Return the sentence for a column that is not there, naming a look-alike in another unit where there is one."""
-
     def quantity_of(header: str) -> str:
         return next((q for q in QUANTITIES if header == q or header.startswith(f"{q}_")), header)
 

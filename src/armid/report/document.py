@@ -186,8 +186,6 @@ class Line:
 
 @dataclass(frozen=True)
 class Listing:
-    """Lines that are shown as they are; folded: on a page only when asked for."""
-
     kind: ClassVar[str] = "listing"
     title: str
     lines: tuple[Line, ...]
@@ -199,8 +197,6 @@ Part = Table | Figure | Gallery | Text | Sentences | Listing
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A heading with what stands under it: a paragraph, then parts."""
-
     title: str
     parts: tuple[Part, ...]
     text: str = ""
@@ -239,7 +235,6 @@ class Document:
 
     @property
     def figures(self) -> tuple[Figure, ...]:
-        """All figures in order, without those of galleries."""
         return tuple(p for s in self.sections for p in s.parts if isinstance(p, Figure))
 
 
@@ -313,7 +308,6 @@ def remark_parts(first: Sequence[str], rest: Sequence[str]) -> tuple[Sentences, 
 
 
 def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) -> tuple[Table, ...]:
-    """Return a table of the correlations of the estimates, none for a single one."""
     rows = [(name, *row.values()) for name, row in correlation.items()]
     note = "Near +1 or -1: a change of one is made up for by the other."
     columns = ["parameter", *(Column(name, name, "+.3f") for name in correlation)]
@@ -321,7 +315,6 @@ def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) ->
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as people list them."""
     return " and ".join(([", ".join(names[:-1])] if names[1:] else []) + list(names[-1:]))
 
 
@@ -367,7 +360,6 @@ def others_text(*errors: Mapping[str, Any] | None) -> str:
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:
-    """Return the RMSE of stored errors in the unit that people read, without the unit."""
     return "not finite" if error["rmse"] is None else f"{shown(error['rmse'], unit)[0]:.4g}"
 
 

@@ -43,7 +43,6 @@ def frame_of(table: Table) -> "DataFrame":
 
 
 def latex(table: Table) -> str:
-    """Return the rows that are shown as a LaTeX float with booktabs rules."""
     from pandas import DataFrame
 
     frame = DataFrame([[c.text for c in row] for row in table.cells()], columns=[c.header for c in table.columns])

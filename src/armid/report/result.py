@@ -252,7 +252,6 @@ class NewFiles:
 
 
 def beside() -> str:
-    """Return how folders of files on their way in begin, of any process of this machine."""
     return f".armid-{sha256(platform.node().encode()).hexdigest()[:8]}-"
 
 

@@ -59,12 +59,10 @@ def pyplot() -> Any:
 
 
 def look(i: int) -> dict[str, Any]:
-    """Return colour and dashes of the i-th of up to 21 lines."""
     return {"color": COLOURS[i % len(COLOURS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)]}
 
 
 def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list[Any]]:
-    """Return a figure and n axes in rows of so many columns, each of this size [inch]."""
     plt = pyplot()
     columns = max(1, min(columns, n))
     rows = -(-n // columns)
@@ -180,7 +178,6 @@ def panel_height(n_lines: int) -> float:
 
 
 def row_names(axis: Any, i: int, names: Sequence[str]) -> None:
-    """Name the rows of the i-th panel, two panels side by side: the left one carries the names."""
     axis.set_yticks(range(len(names)), names if i % 2 == 0 else [""] * len(names))
 
 

@@ -229,7 +229,6 @@ def _simulated_case(
 
 
 def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, where: str) -> dict[str, Any]:
-    """Return one manoeuvre, its constants laid over those of the study."""
     manoeuvre = validated(ManoeuvreSpec, table, where, [key.key for key in plant.keys])
     record = RecordSheet(file="", role=manoeuvre.role, constants=manoeuvre.constants, keys=manoeuvre.keys)
     constants = record_constants(plant, spec.constants, record, where)
@@ -265,7 +264,6 @@ def _check_truth(case: Case, where: str) -> None:
 
 
 def _check_windows(case: Case, spec: StudySpec, where: str) -> None:
-    """Refuse a window that holds too little of a manoeuvre."""
     for window in spec.windows_s:
         if window == WHOLE:
             continue
@@ -323,7 +321,6 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
 
 def _with_signal(record: Record, measured: Array) -> Record:
-    """Return the record with another signal over its whole length, in one piece."""
     pieces = (Piece(record.manoeuvre, measured, slice(0, measured.size)),)
     return replace(record, measured=measured, pieces=pieces, whole_pieces=pieces)
 

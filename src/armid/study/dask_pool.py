@@ -85,7 +85,6 @@ class DaskPool:
 
 
 def _connected(address: str) -> tuple[Any, Any]:
-    """Return a client of a cluster, and the error of a lost worker."""
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:

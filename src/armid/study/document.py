@@ -130,7 +130,6 @@ def write_report(document: Document, files: NewFiles) -> None:
 
 
 def known_kind(study: dict[str, Any]) -> str:
-    """Return the kind of a study; refuse one that this version does not know."""
     kind = str(study.get("kind", IDENTIFIES))
     if kind not in KIND_NAMES:
         raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of {', '.join(KIND_NAMES)} is expected")
@@ -220,7 +219,6 @@ def versions(study: dict[str, Any]) -> str:
 
 
 def made_section(results: StudyResults, again: str) -> Section:
-    """Return commands, the study's file and the equations of its models."""
     study = results.study
     plugins = [word for name in study.get("plugins", ()) for word in ("--plugin", str(name))]
     run = shlex.join(["armid", "study", str(study.get("file", f"{study['name']}.toml")), *plugins])

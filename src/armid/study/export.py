@@ -89,8 +89,6 @@ def instance_numbers(found: DataFrame) -> dict[int, int]:
 
 
 def lines(trace: RunTrace, used: int) -> Iterator[str]:
-    """Yield the improvements of a run as text, every digit kept, from evaluation 1 to the last one."""
-
     def line(evaluation: int, value: float, x: np.ndarray) -> str:
         return " ".join([str(evaluation), repr(value), *(repr(float(v)) for v in x)]) + "\n"
 

@@ -32,8 +32,6 @@ class LoopCase:
 
 @dataclass(frozen=True, eq=False)
 class LoopStudy:
-    """A study of loops that was read and found possible."""
-
     kind: ClassVar[str] = CLOSES_LOOP
     labels: ClassVar[list[str]] = [CLOSES_LOOP]
 
@@ -106,7 +104,6 @@ class LoopStudy:
 
     @staticmethod
     def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
-        """Close the loop on one campaign, on one thread."""
         began = time.process_time()
         registry, folder = cache.registry, cache.folder / settings["campaigns"] / settings["case"]
         if _digest(folder) != settings["digest"]:

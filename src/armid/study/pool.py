@@ -57,7 +57,6 @@ class WorkerSetup:
 
 
 def performed_apart(setup: WorkerSetup, run: ClaimedRun) -> Outcome:
-    """Perform one run in a worker process of its own."""
     worker = WorkerProcess(setup)
     try:
         return worker.perform([run])[0]
@@ -116,7 +115,6 @@ class LocalPool:
             worker.stop()
 
     def _hand_out(self) -> None:
-        """Give each worker what it needs to go on, the least busy first."""
         for n in range(AHEAD):
             for worker in self.workers:
                 if self._waiting and worker.held <= n:
@@ -155,7 +153,6 @@ class WorkerProcess:
         self._send()
 
     def seconds_left(self) -> float:
-        """Return how long the present run may still take [s]."""
         limit = self.setup.time_limit if self._ready else START_S
         return self._since + limit - self._clock() if self._sent or not self._ready else limit
 

@@ -205,7 +205,6 @@ def _runs(connection: sqlite3.Connection) -> pd.DataFrame:
 
 
 def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:
-    """Return one row a run and free parameter, with the truth of its case beside."""
     found = pd.read_sql_query(PARAMETERS, connection)
     truths = {(case["name"], name): v for case in study["cases"] for name, v in case["truth"].items()}
     keys = zip(found.pop("case"), found["parameter"], strict=True)
@@ -220,7 +219,6 @@ def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.Dat
 
 
 def _versions(connection: sqlite3.Connection) -> dict[str, str]:
-    """Return package -> version; several where runs were made on several."""
     query = "SELECT DISTINCT t.text FROM plan JOIN runs r USING (run) JOIN texts t ON t.hash = r.versions"
     found: dict[str, list[str]] = {}
     for (text,) in connection.execute(query):

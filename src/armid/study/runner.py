@@ -223,7 +223,6 @@ class ProgressBar:
             self._bar.stop()
 
     def update(self, counts: Counts, outcome: Outcome | None) -> None:
-        """Move the bar: counts at the start, and a run that has finished since."""
         if outcome is None:
             self._began = time.monotonic()
         else:

@@ -188,8 +188,6 @@ class SuiteSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class EntrySpec:
-    """Declare an [[identifiers]] entry; what is not given is the study's."""
-
     name: str = field(metadata=key(text, "the name of an identifier"))
     label: str | None = field(default=None, metadata=LINE)
     budget: int | None = field(default=None, metadata=key(count, "a whole number above 0"))
@@ -294,7 +292,6 @@ class StudyRegistry:
         return self.registry.identifiers
 
     def identifier(self, name: str, where: str) -> Identifier:
-        """Return an identifier, also a chain or a multistart."""
         try:
             return identifier_of(name, self.identifiers)
         except ArmidError as error:
@@ -319,7 +316,6 @@ def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
 
 
 def lookup(there: Mapping[str, Any], name: str, what: str, where: str) -> Any:
-    """Return what is registered under a name."""
     if name not in there:
         raise unknown_name(what, name, there, where)
     return there[name]

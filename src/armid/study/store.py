@@ -201,7 +201,6 @@ class Store:
         return is_new
 
     def _text(self, text: str) -> str:
-        """Keep a text once, and return its hash."""
         digest = hashlib.sha256(text.encode()).hexdigest()[:16]
         self._connection.execute("INSERT OR IGNORE INTO texts VALUES (?, ?)", (digest, text))
         return digest
@@ -266,7 +265,6 @@ def opened(path: Path) -> sqlite3.Connection:
 
 
 def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = False) -> None:
-    """Refuse a file that is no store of this version."""
     try:
         # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
         is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
@@ -350,7 +348,6 @@ def corruption_guard(file: Path, what: str) -> Iterator[None]:
 
 
 def description_of(file: Path, text: str) -> dict[str, Any]:
-    """Return the description of a study; refuse what is none."""
     with corruption_guard(file, "the description of the study"):
         found = json.loads(text)
     missing = [word for word in WORDS if not isinstance(found, dict) or word not in found]

@@ -52,7 +52,6 @@ class Tuned:
 
 
 def tunable(study: Study) -> list[Entry]:
-    """Return the identifiers of a study whose options have ranges here and were not set by the study."""
     return [entry for entry in study.entries if entry.name in RANGES and not entry.options]
 
 

@@ -179,7 +179,6 @@ class Evidence:
 
     @cached_property
     def groups(self) -> dict[str, dict[str, NDArray[np.intp]]]:
-        """Setting -> variant -> positions of its runs."""
         rows = self.runs.groupby(["setting", "variant"], sort=False).indices
         return {s: {v: np.asarray(rows[s, v]) for v in self.variants if (s, v) in rows} for s in self.settings}
 
@@ -202,7 +201,6 @@ class Evidence:
 
     @cached_property
     def published(self) -> DataFrame:
-        """Published values case by case, empty without any."""
         return published_values(self.study)
 
     @cached_property
@@ -267,7 +265,6 @@ def budget_texts(runs: DataFrame, study: dict[str, Any]) -> list[str]:
 
 
 def noise_text(noise_deg_s: float) -> str:
-    """Return a noise level in words; NaN is the noise that the records have of their own."""
     if np.isnan(noise_deg_s):
         return "as recorded"
     return NOISE_FREE if noise_deg_s == 0.0 else f"{noise_deg_s:g} deg/s"
@@ -283,7 +280,6 @@ def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
 
 
 def published_values(study: dict[str, Any]) -> DataFrame:
-    """Return case, parameter, truth, published [SI] and relative error of the cases that carry a published result."""
     rows = []
     for case in study["cases"]:
         truth = case.get("truth") or {}

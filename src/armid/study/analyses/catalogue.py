@@ -54,7 +54,6 @@ def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:
 
 
 def part(file: str, title: str, found: Any) -> Part:
-    """Return a table or a figure of a user; numbers are shown with six digits."""
     if not isinstance(found, DataFrame):
         return Figure(file, title, "", lambda: found)
     frame = found if isinstance(found.index, RangeIndex) else found.reset_index()
@@ -63,7 +62,6 @@ def part(file: str, title: str, found: Any) -> Part:
 
 
 def digits(kind: Any) -> str:
-    """Return the format of a column's numbers, "" for text and truth values."""
     if is_bool_dtype(kind) or not is_numeric_dtype(kind):
         return ""
     return ".0f" if is_integer_dtype(kind) else ".6g"

@@ -125,7 +125,6 @@ def summary(rows: DataFrame) -> Table:
 
 
 def cramer_rao_figure(rows: DataFrame) -> Any:
-    """Draw one panel a parameter: standard deviation over bound with its 95 % interval, a colour a case."""
     names, cases = (list(dict.fromkeys(rows[key])) for key in ("parameter", "case"))
     places = {group: i for i, group in enumerate(dict.fromkeys(zip(rows["variant"], rows["setting"], strict=True)))}
     figure, axes = panels(len(names), 2, 6.8, 1.6 + 0.5 * len(places))

@@ -47,14 +47,12 @@ ERRORS = Analysis("errors", "Where the errors are", parts, "largest error by ide
 
 
 def error_map(runs: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
-    """Return the median over the seeds of the largest relative error, variants by cases in the orders given."""
     medians = runs.groupby(["variant", "case"], sort=False)["largest_error"].median().unstack("case")
     there = [v for v in variants if v in medians.index]
     return medians.reindex(index=there, columns=[c for c in cases if c in medians.columns])
 
 
 def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
-    """Draw one panel a setting, variants by cases; infinite where the median run failed."""
     import seaborn as sns
     from matplotlib.colors import LogNorm
 

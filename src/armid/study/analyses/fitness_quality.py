@@ -60,7 +60,6 @@ def fitness_quality(runs: DataFrame) -> Table:
 
 
 def rank_correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    """Return Spearman's correlation of two samples where both are finite."""
     from scipy.stats import spearmanr
 
     both = np.isfinite(first) & np.isfinite(second)
@@ -71,7 +70,6 @@ def rank_correlation(first: NDArray[np.float64], second: NDArray[np.float64]) ->
 
 
 def fitness_quality_figure(runs: DataFrame) -> Any:
-    """Draw one panel a setting: largest error of each run [%] against 1 - S, a colour a fitness."""
     settings = list(dict.fromkeys(runs["setting"]))
     names = list(dict.fromkeys(runs["fitness"]))
     figure, axes = panels(len(settings), 2, 6.8, 5.2)

@@ -34,7 +34,6 @@ def loop_runs(loops: DataFrame) -> DataFrame:
 
 
 def over_noise(report: Mapping[str, Any], when: str) -> float:
-    """Return the error on the records held out over the noise, NaN without such records."""
     error = report["error"][when]["holdout"]
     return np.nan if error is None else float(error["rmse"] / report["noise_rms"])
 

@@ -42,7 +42,6 @@ RUNS_COLUMNS = (
 
 
 def main_table(evidence: Evidence) -> Table:
-    """Return the table that is printed: errors where truths are known, else values."""
     if not evidence.knows_truth:
         return values(evidence.runs, evidence.estimates)
     is_table1 = evidence.study.get("report") == "table1"
@@ -84,7 +83,6 @@ def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Tab
 
 
 def tail(errors: np.ndarray) -> dict[str, float]:
-    """Return median, 95th percentile and worst of the largest error of a run; infinite where failed runs reach in."""
     middle, p95 = np.quantile(errors, [0.5, 0.95], method="inverted_cdf")
     return {"largest_median": float(middle), "largest_p95": float(p95), "largest_worst": float(errors.max())}
 
@@ -106,7 +104,6 @@ def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
 
 
 def values(runs: DataFrame, estimates: DataFrame) -> Table:
-    """Return one line a setting, variant and parameter."""
     joined = estimates.merge(runs[["run", "train_rmse", "holdout_rmse"]], on="run")
     frame = joined.groupby(["setting", "variant", "parameter", "unit"], sort=False).agg(
         n=("run", "size"), median=("value", "median"), deviation=("value", lambda v: v.std(ddof=0)),

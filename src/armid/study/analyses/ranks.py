@@ -104,7 +104,6 @@ def friedman(blocks: Array) -> tuple[float, float]:
 
 
 def pair_tests(blocks: DataFrame, runs: DataFrame) -> DataFrame:
-    """Return the tests of all pairs, Holm's correction over all of them."""
     from statsmodels.stats.multitest import multipletests
 
     samples = {v: g["largest_error"].to_numpy() for v, g in runs.groupby("variant", sort=False)}
@@ -231,7 +230,6 @@ BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", class_parts, "wh
 
 
 def final_values(evidence: Evidence, setting: str) -> DataFrame:
-    """Return the fitness that a variant ends with, one row a case that all ran, one column a variant."""
     runs = evidence.of(setting)
     floors = runs["case"].map({c["name"]: c["floor"] for c in evidence.study["cases"]}).astype(float) + NEAR_TRUTH
     raised = runs.assign(value=np.maximum(runs["value"].where(runs["status"] == "done", np.inf), floors))
@@ -346,6 +344,5 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
 
 
 def with_ratios(against: DataFrame) -> str:
-    """Return the variants with the ratio of what the swarm leaves to what they leave."""
     lines = zip(against["variant"], against["ratio"], strict=True)
     return ", ".join(f"{variant} (leaves {ratio:.2g} times as much)" for variant, ratio in lines) or "nobody"

@@ -127,7 +127,6 @@ def strictest(line: Array) -> tuple[int, float]:
 
 
 def powers_around(lines: Iterable[Array]) -> tuple[float, float]:
-    """Return the powers of ten around all numbers that are finite."""
     finite = np.concatenate([y[np.isfinite(y)] for y in lines])
     if not finite.size:
         return 1.0, 10.0
@@ -184,7 +183,6 @@ def data_profile(hits: Array, n_parameters: NDArray[np.integer[Any]], grid: Arra
 
 
 def data_profile_figure(evidence: Evidence) -> Any:
-    """Draw one row of panels a setting, one column a share that may be left, and one line a variant."""
     kept, n_free, columns = evidence.histories, evidence.n_free, len(SHARES_LEFT)
     figure, axes = panels(len(evidence.groups) * columns, columns, 6.6, panel_height(len(evidence.colours)))
     what = [(setting, share) for setting in evidence.groups for share in SHARES_LEFT]

@@ -55,7 +55,6 @@ def wilson(successes: int, n: int, confidence: float = 0.95) -> tuple[float, flo
 
 
 def success(rates: DataFrame) -> Table:
-    """Return one line a setting and variant, one column a tolerance."""
     keys = ["setting", "variant", "n"]
     frame = rates.drop_duplicates(keys)[keys].reset_index(drop=True)
     columns = [SETTING, VARIANT, N_RUNS]
@@ -71,7 +70,6 @@ def success(rates: DataFrame) -> Table:
 
 
 def success_figure(rates: DataFrame) -> Any:
-    """Draw one panel a setting, one row a variant, one colour a tolerance, with Wilson intervals."""
     settings = list(dict.fromkeys(rates["setting"]))
     means = rates.groupby("variant", sort=False)["rate"].mean()
     variants = [str(v) for v in means.sort_values(ascending=False, kind="stable").index]

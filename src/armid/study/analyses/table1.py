@@ -136,7 +136,6 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) 
 
 
 def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence[str]) -> Any:
-    """Draw one panel a parameter: our relative errors [%] of all rows and seeds as boxes, the paper's as diamonds."""
     from matplotlib.lines import Line2D
 
     names = [n for n in dict.fromkeys(published["parameter"]) if n in set(estimates["parameter"])]

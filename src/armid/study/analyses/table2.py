@@ -89,7 +89,6 @@ def one_row(group: DataFrame) -> dict[str, object]:
 
 
 def table2_records(estimates: DataFrame) -> Table:
-    """Return mean, deviation and bound of each record, SI, for the CSV file."""
     keys = ["setting", "variant", "case", "parameter", "unit"]
     rows = [
         dict(zip(keys, k, strict=True)) | spread(g["value"])._asdict()
@@ -115,7 +114,6 @@ def spread(values: ArrayLike) -> Spread:
 
 
 def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
-    """Draw one panel a parameter: the result of each run, a colour a record, lines by identifier and setting."""
     from matplotlib.lines import Line2D
 
     names = list(dict.fromkeys(estimates["parameter"]))
@@ -146,7 +144,6 @@ def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
 
 
 def draw_group(axis: Any, group: DataFrame, height: int, factor: float) -> None:
-    """Draw the runs of one identifier and setting, the records above each other, truth and bound behind."""
     records = list(dict.fromkeys(group["case"]))
     for k, record in enumerate(records):
         own = group[group["case"] == record]
