@@ -85,11 +85,6 @@ def opened(
         Of tables; or a plant of the user that campaign.toml names.
     model : Model
         In place of the declared one.
-
-    Raises
-    ------
-    ArmidError
-        For whatever of them cannot be used.
     """
     refuse_others(effects, window, bounds, fix)
     registry = load_registry(plugins)
@@ -226,11 +221,6 @@ def identify(
     -------
     Identification
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.estimation.identify import identify as run
     from armid.estimation.screen import screen
@@ -295,11 +285,6 @@ def examine(
     -------
     Examination
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.estimation.examine import examine as run
 
@@ -345,11 +330,6 @@ def close_loop(
     -------
     ClosedLoop
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.loop import close_loop as run
 
@@ -410,11 +390,6 @@ def simulate(
     -------
     SimulatedCampaign or Simulation
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.engine import simulate as run
     from armid.estimation.simulated import SimulatedCampaign, candidate_of, simulated_table

@@ -1,6 +1,6 @@
 """`armid doctor`: whether armid works here."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import requires, version
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -70,11 +70,7 @@ def compiler() -> tuple[bool, str]:
 
 
 def simulation() -> tuple[bool, str]:
-    import numpy as np
-
-    from armid.engine import calibrate, simulate
-
-    error = np.abs(simulated(simulate, calibrate, 1)[0, ::100] - TRAJECTORY).max()
+    error = abs(simulated(1)[0, ::100] - TRAJECTORY).max()
     return bool(error <= TOLERANCE), f"within {error:.1g} rad/s of the stored trajectory, {TOLERANCE:g} is allowed"
 
 
@@ -82,14 +78,14 @@ def threads() -> tuple[bool, str]:
     import numpy as np
     from joblib import cpu_count
 
-    from armid.engine import calibrate, simulate
-
-    one, two = (simulated(simulate, calibrate, n) for n in (1, 2))
-    return np.array_equal(one, two), f"{cpu_count()} processors; two threads give the same bits as one"
+    same = np.array_equal(simulated(1), simulated(2))
+    return same, f"{cpu_count()} processors; two threads give the same bits as one"
 
 
-def simulated(simulate: "Callable[..., Any]", calibrate: "Callable[..., Any]", n_threads: int) -> "Any":
+def simulated(n_threads: int) -> Any:
     import numpy as np
+
+    from armid.engine import calibrate, simulate
 
     arm = PLANTS["shell_transfer_arm"]
     constants = {"theta_C": np.radians(-48.0), "theta_D": np.radians(22.0), "shell": 1.0, "U": 28.0}

@@ -391,15 +391,10 @@ def ranked(found: Identification) -> list[str]:
     if found.n_failed:
         said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
     return said + [
-        f"{r.name}: the engine is off by up to {engine_error_text(r)} even at its "
-        "finest steps: the equations are stiff there, or switch somewhere without a guard."
+        "{}: the engine is off by up to {:.2g} {} even at its finest steps: the equations are stiff there, or switch "
+        "somewhere without a guard.".format(r.name, *shown(r.engine_error, r.record.unit))
         for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)
     ]  # fmt: skip
-
-
-def engine_error_text(replay: Replay) -> str:
-    value, unit = shown(replay.engine_error, replay.record.unit)
-    return f"{value:.2g} {unit}"
 
 
 def bound_remark(found: Identification, i: int) -> str:

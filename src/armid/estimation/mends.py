@@ -58,10 +58,6 @@ class Suspicion:
     before: float = np.nan
     after: float = np.nan
 
-    @property
-    def improvement(self) -> float:
-        return self.before / self.after
-
 
 @dataclass(frozen=True)
 class Mend:

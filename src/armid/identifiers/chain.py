@@ -172,7 +172,9 @@ def of_phases(
     options: Mapping[str, Any], phases: Sequence[Identifier], own: Sequence[str], whose: str
 ) -> tuple[Identifier, ...]:
     """Return the phases with their options: NAME.OPTION belongs to each of that name; own: those of the whole."""
-    named: dict[str, dict[str, Any]] = {simple_name(phase): {} for phase in phases}
+    # of a multistart the name of the local one
+    names = [phase.name.rpartition(":")[2] for phase in phases]
+    named: dict[str, dict[str, Any]] = {name: {} for name in names}
     for key, value in options.items():
         name, dot, option = key.partition(".")
         if dot and name in named:
@@ -180,15 +182,8 @@ def of_phases(
         elif key not in own:
             known = [*own, *(f"{phase}.{option or key}" for phase in named)]
             raise ArmidError(f"{whose} has no option '{key}', {nearest(key, known)}")
-    return tuple(phase.with_options(told(phase, named[simple_name(phase)])) for phase in phases)
-
-
-def simple_name(phase: Identifier) -> str:
-    """Return the name by which options call a phase: that of the local one for a multistart."""
-    return phase.name.rpartition(":")[2]
-
-
-def told(phase: Identifier, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options as the phase itself wants them: a multistart passes them on by name."""
-    prefix = f"{simple_name(phase)}." if phase.name != simple_name(phase) else ""
-    return {f"{prefix}{option}": value for option, value in options.items()}
+    return tuple(
+        # a multistart passes options on by name
+        phase.with_options(named[n] if phase.name == n else {f"{n}.{option}": v for option, v in named[n].items()})
+        for phase, n in zip(phases, names, strict=True)
+    )

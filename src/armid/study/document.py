@@ -14,7 +14,7 @@ from armid.report.html import html
 from armid.report.markdown import markdown
 from armid.report.result import NewFiles
 from armid.study.analyses.analysis import PAPER, Evidence, wide_runs
-from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, check_names, own_sections
+from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, own_sections
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
 from armid.study.analyses.ranks import class_ranks, suite_answer
@@ -53,7 +53,9 @@ def report_of(
         raise ArmidError(f"study '{study['name']}' knows its truths, a key is not expected")
     if results.runs.empty:
         raise ArmidError(f"study '{study['name']}' has no finished run: nothing can be reported")
-    check_names(own)
+    for name in own:
+        if name in {a.name for a in ANALYSES}:
+            raise ArmidError(f"analyses: '{name}' is there already, give yours another name")
     if kind == IDENTIFIES:
         evidence = Evidence(results)
         found = [Section(a.title, tuple(a.parts(evidence))) for a in (OF_SUITES if evidence.is_suite else ANALYSES)]

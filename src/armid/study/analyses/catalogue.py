@@ -7,7 +7,6 @@ from pandas import DataFrame, RangeIndex
 from pandas.api.types import is_bool_dtype, is_integer_dtype, is_numeric_dtype
 
 from armid.contract.check import parts_of
-from armid.errors import ArmidError
 from armid.report.document import Column, Figure, Part, Section, Table, slug, unlike
 from armid.report.style import pyplot
 from armid.study.analyses.convergence import ANYTIME, CONVERGENCE
@@ -30,13 +29,6 @@ ANALYSES = (
 OF_SUITES = (BY_CLASS, ANYTIME, BEST_FITNESS, SUCCESS, RUNNING_TIME, RUNS)
 # name -> function of the runs, see `armid.contract.check`.
 OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
-
-
-def check_names(own: OwnAnalyses) -> None:
-    """Refuse an analysis of a user that is called like one of ours."""
-    for name in own:
-        if name in {a.name for a in ANALYSES}:
-            raise ArmidError(f"analyses: '{name}' is there already, give yours another name")
 
 
 def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:

@@ -222,11 +222,9 @@ NEAR_TRUTH = 1e-8
 N_BOOTSTRAP = 1000
 
 
-def class_parts(evidence: Evidence) -> Sequence[Part]:
-    return (class_ranks(evidence), swarm_pairs(evidence), problems(evidence)) if evidence.is_suite else ()
-
-
-BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", class_parts, "who is best on which problems of a suite")
+BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", lambda evidence: (
+    (class_ranks(evidence), swarm_pairs(evidence), problems(evidence)) if evidence.is_suite else ()
+), "who is best on which problems of a suite")  # fmt: skip
 
 
 def final_values(evidence: Evidence, setting: str) -> DataFrame:
