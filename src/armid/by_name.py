@@ -69,22 +69,11 @@ def opened(
 ) -> Opened:  # fmt: skip
     """Return what is meant by a campaign, its effects and its overrides; plug-ins run their code.
 
-    Parameters
-    ----------
-    campaign : path, Campaign, or one or several pandas DataFrames
-        Tables have the headers of a campaign's CSV files; `table.attrs` holds the keys of its [[records]] entry.
-    effects : names or Effects
-        To add to those that the campaign declares; NAME:FORM names a form.
-    plugins : FILE.py:attribute
-        Things of the user, whose code is run.
-    window : (begin, end), s
-        What is seen of every record.
-    bounds, fix
-        Name -> (low, high), and value, SI.
-    plant : name or Plant
-        Of tables; or a plant of the user that campaign.toml names.
-    model : Model
-        In place of the declared one.
+    campaign: a path, a Campaign, or one or several pandas DataFrames with the headers of a campaign's CSV files, whose
+    `table.attrs` holds the keys of its [[records]] entry. effects: names or Effects to add to those that the campaign
+    declares; NAME:FORM names a form. plugins: FILE.py:attribute of the user. window: (begin, end), s, what is seen of
+    every record. bounds, fix: name -> (low, high), and value, SI. plant: name or Plant, of tables; or a plant of the
+    user that campaign.toml names. model: in place of the declared one.
     """
     refuse_others(effects, window, bounds, fix)
     registry = load_registry(plugins)

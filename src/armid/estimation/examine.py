@@ -146,24 +146,9 @@ def examine(
 ) -> Examination:
     """Examine the train records of a campaign; holdout records are not looked at.
 
-    Parameters
-    ----------
-    campaign, model, space
-        The records, the model and the box of its parameters.
-    x : array, SI, (n_free,)
-        Free parameters at which sensitivities are taken; None: the least-squares estimate, the records weighed by how
-        far they scatter about it.
-    noise : float, unit of the records
-        Rms to assume in place of what was measured.
-    by : str
-        How offers are ranked, see `Offer`.
-    accuracy : {"standard", "fine"}
-        Of the engine; None: as the noise of each record asks for.
-
-    Raises
-    ------
-    ArmidError
-        When no parameter is free, x is outside the box, or everything diverges.
+    x: free parameters at which sensitivities are taken, SI, (n_free,); None: the least-squares estimate, the records
+    weighed by how far they scatter about it. noise: rms to assume in place of what was measured. by: how offers are
+    ranked, see `Offer`. accuracy: "standard" or "fine", of the engine; None: as the noise of each record asks for.
     """
     if not space.free.any():
         raise ArmidError("no parameter is free: at least one is expected to be examined")

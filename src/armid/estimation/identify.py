@@ -130,27 +130,9 @@ def identify(
 
     Starts of train records in motion are fitted with the parameters, about those of the least-squares estimate. Holdout
     records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so far is
-    judged, `stopped` is "interrupted".
-
-    Parameters
-    ----------
-    campaign, model, space
-        The records, the model and the box of its parameters.
-    fitness, identifier, seed
-        What is minimised, by which method, and the seed of its random numbers.
-    budget : int
-        Simulations; one candidate through all train records counts as one.
-    target : float
-        Fitness at which to stop (the paper's step 7).
-    accuracy : {"standard", "fine"}
-        Of the engine; None: as the noise of each record asks for.
-    progress : callable
-        Called with the meter after each generation.
-
-    Raises
-    ------
-    ArmidError
-        For a negative seed, a fitness that the identifier cannot minimise, and when every candidate diverged.
+    judged, `stopped` is "interrupted". budget: simulations; one candidate through all train records counts as one.
+    seed: of the random numbers. target: fitness at which to stop (the paper's step 7). accuracy: "standard" or "fine",
+    of the engine; None: as the noise of each record asks for. progress: called with the meter after each generation.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ArmidError(f"the seed is {seed!r}, a whole number of at least 0 is expected")

@@ -156,16 +156,9 @@ MOST_NAMED = 6
 def identify_document(
     result: Mapping[str, Any], details: Mapping[str, Any], svgs: Mapping[str, str], again: str
 ) -> Document:
-    """Build the document of an identification from what is stored of it.
+    """Build the document of an identification from result.json and details.json, empty where there is none.
 
-    Parameters
-    ----------
-    result, details : dict
-        result.json and details.json (empty where an earlier version of armid wrote none).
-    svgs : dict
-        Name -> SVG of those of `FIGURES` that are stored.
-    again : str
-        The command that makes the page again.
+    svgs: name -> SVG of those of `FIGURES` that are stored. again: the command that makes the page again.
     """
     unit = result["unit"]
     parameters, errors = parameter_table(result), train_and_holdout(result)

@@ -53,23 +53,9 @@ RESTLESS, FEWEST_INDEPENDENT, LARGE_MEAN = 0.02, 12.0, 0.2
 
 
 def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, ...]:
-    """Look for mistakes in records: what the files show alone, then against the declared model.
+    """Look for mistakes in records: what the files show alone, then against the declared model; the plainest first.
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The records.
-    model : Model
-        The declared model.
-    space : Space
-        The box of its parameters.
-
-    Returns
-    -------
-    tuple of Suspicion
-        What should be looked at, the plainest first; empty where all is as declared.
     """
     seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
     seen += list(given_twice(campaign.records))
