@@ -287,7 +287,7 @@ def simulate_refits(
 
 
 def fitted_again(rival: Rival, feasible: Feasible, white: Whitening, seen: Array) -> tuple[float, Array]:
-    """Return criterion and prediction of a rival after a fit to old and new, infinite for one that diverges."""
+    """Return criterion and prediction of a rival after a fit to old and new; of one that diverges 0 throughout."""
     both = OldAndNew((), rival.records.space, rival=rival, feasible=feasible, white=white, seen=seen)
     start = np.clip(rival.z, 0.0, 1.0)
     if not np.isfinite(both.chi2(start)[0]):

@@ -39,7 +39,7 @@ class Profile:
     values: where it was held, SI, increasing, (n_points,). rise: chi2 above its minimum there, the other free
     parameters fitted again. candidates: those fits, SI. estimate: SI, where the rise is 0. low, high: the 95 %
     interval, the end of the box where it is not bounded inside. deviation: by the curvature, SI, infinite where not
-    determined. box: bounds.
+    determined.
     """
 
     name: str

@@ -83,8 +83,7 @@ def import_emps(folder: str | Path | None, out: str | Path) -> Path:
     """Write the EMPS set as a campaign folder and return it; each record gets `time_s,velocity_m_s,drive_V,position_m`.
 
     folder: where DATA_EMPS.mat (train) and DATA_EMPS_PULSES.mat (holdout) are; None loads them through the package
-    `nonlinear_benchmarks`, which needs the extra `armid[measured]` and, the first time, the internet. out: a new or
-    empty folder.
+    `nonlinear_benchmarks`, which needs the extra `armid[measured]` and, the first time, the internet.
     """
     source = downloaded_folder() if folder is None else Path(folder)
     measured = {name: read_emps(source / f"{name}.mat") for name in EMPS_FILES}

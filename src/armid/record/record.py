@@ -34,8 +34,7 @@ class Noise:
 class Irregularity:
     """How irregular the times of a file are.
 
-    share: of the intervals, off by more than 1 % of the median. largest_gap: in median intervals; at_s: where it
-    begins.
+    share: of the intervals, off by more than 1 % of the median. largest_gap: in median intervals; at_s: its begin.
     """
 
     share: float

@@ -34,8 +34,7 @@ class Column:
     """One column of a table.
 
     key: name in the frame, and in the header of the CSV file. header: heading with the unit; "" where it needs none.
-    digits: format of its numbers, such as ".3g"; "" for text. factor: from the number in the frame (SI) to the one
-    shown.
+    digits: format of its numbers, such as ".3g"; "" for text. factor: from the number in the frame (SI) to that shown.
     """
 
     key: str
@@ -207,8 +206,7 @@ class Document:
     """A whole document.
 
     of: what made it, in a word or two. answer: up to three sentences. warning: what must be known first, "" for
-    nothing. facts: how it was made, a sentence each. main: the parts of the sections that a terminal shows below the
-    answer.
+    nothing. facts: how it was made, a sentence each. main: the parts of the sections that a terminal shows.
     """
 
     title: str

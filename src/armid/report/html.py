@@ -78,8 +78,7 @@ def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Marku
     """Return an SVG as part of a page; refuse what is none.
 
     Elements and attributes that drawings do not need are left out, and so are references to anything outside. prefix:
-    set before each id, so that several can stand on one page; label: read out in place of the picture; where: names it
-    in an error.
+    set before each id, so that several can stand on one page; label: read out in place of the picture.
     """
     try:
         root = ElementTree.fromstring(text)

@@ -13,11 +13,6 @@ from armid.report.document import Column, Part
 from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
 
-# One pass over the traces of a study: when each run first reached a target, and what it had found by then.
-#
-# A trace has hundreds of improvements; of each run only first hits and values on a common grid are kept, so that the
-# memory does not grow with the length of the traces.
-
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 # 51 targets, as COCO takes, five a decade: largest relative errors of the parameters from 100 % to 1e-8 %, and shares
@@ -31,8 +26,7 @@ class Histories:
     """What the traces say, one row a run in the order of the outcomes; shapes (n_runs, n_targets) and (n_runs, n_grid).
 
     grid: simulations. error_hits: first hits of TARGETS by the largest relative error, value_hits: by the share of the
-    way to the best known fitness, infinite for never. errors, values: of the best candidate so far, infinite before the
-    first.
+    way to the best known fitness, infinite for never. errors, values: of the best so far, infinite before the first.
     """
 
     grid: NDArray[np.int64]
@@ -45,7 +39,10 @@ class Histories:
 def histories(
     results: StudyResults, runs: DataFrame, truths: Mapping[str, Mapping[str, float]], floors: Mapping[str, float]
 ) -> Histories:
-    """Read the traces twice, one run at a time: for the first values, then for everything that depends on them."""
+    """Read the traces twice, one run at a time: for the first values, then for everything that depends on them.
+
+    Only first hits and values on a common grid are kept, so that the memory does not grow with the traces.
+    """
     # from 1 to the most simulations of a run, evenly spread in the logarithm
     most = max(int(runs["used"].max()) if len(runs) else 1, 1)
     grid = np.unique(np.round(np.geomspace(1, most, N_GRID)).astype(np.int64))

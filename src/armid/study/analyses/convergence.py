@@ -60,8 +60,7 @@ def band(held_values: Array) -> Array:
 def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array, label: str, floor: float) -> Any:
     """Draw one panel a variant: median as a line, quartiles as a band, a colour a setting.
 
-    own: runs to show, (n_runs,); values: quantity of the best candidate so far, (n_runs, n_grid); floor: smaller values
-    are drawn there.
+    own: runs to show, (n_runs,); values: quantity of the best candidate so far, (n_runs, n_grid); floor: least drawn.
     """
     grid = evidence.histories.grid
     bands: dict[str, dict[str, Array]] = {}
