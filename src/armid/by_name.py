@@ -44,10 +44,7 @@ PAPER_IDENTIFIER, PAPER_FITNESS, PAPER_BUDGET, PAPER_WINDOW = "pso", "similarity
 
 
 class Opened(NamedTuple):
-    """What a call on a campaign works with: all that is registered, the records, the model, overrides.
-
-    bounds, fixed: name -> (low, high) and value that were given, SI.
-    """
+    """What a call on a campaign works with; bounds and fixed as they were given, SI."""
 
     registry: Registry
     campaign: Campaign
@@ -61,7 +58,6 @@ class Opened(NamedTuple):
         return {**sensor_effects(self.campaign.plant), **self.registry.effects}
 
     def space(self) -> "Space":
-        """Return the space that is searched."""
         from armid.problem.space import space_of
 
         return space_of(self.model, self.campaign.parameters, self.bounds, self.fixed)
@@ -73,27 +69,11 @@ def opened(
 ) -> Opened:  # fmt: skip
     """Return what is meant by a campaign, its effects and its overrides; plug-ins run their code.
 
-    Parameters
-    ----------
-    campaign : path, Campaign, or one or several pandas DataFrames
-        Tables have the headers of a campaign's CSV files; `table.attrs` holds the keys of its [[records]] entry.
-    effects : names or Effects
-        To add to those that the campaign declares; NAME:FORM names a form.
-    plugins : FILE.py:attribute
-        Things of the user, whose code is run.
-    window : (begin, end), s
-        What is seen of every record.
-    bounds, fix
-        Name -> (low, high), and value, SI.
-    plant : name or Plant
-        Of tables; or a plant of the user that campaign.toml names.
-    model : Model
-        In place of the declared one.
-
-    Raises
-    ------
-    ArmidError
-        For whatever of them cannot be used.
+    campaign: a path, a Campaign, or one or several pandas DataFrames with the headers of a campaign's CSV files, whose
+    `table.attrs` holds the keys of its [[records]] entry. effects: names or Effects to add to those that the campaign
+    declares; NAME:FORM names a form. plugins: FILE.py:attribute of the user. window: (begin, end), s, what is seen of
+    every record. bounds, fix: name -> (low, high), and value, SI. plant: name or Plant, of tables; or a plant of the
+    user that campaign.toml names. model: in place of the declared one.
     """
     refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
@@ -159,7 +139,6 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
 
 
 def toml(value: Any) -> str:
-    """Return a value of a table's `attrs` as TOML has it."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + " }"
     if isinstance(value, list | tuple):
@@ -184,10 +163,6 @@ def effect_of(given: Any, effects: Mapping[str, Effect]) -> Effect:
 
 
 def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
-    """Return what is registered under a name.
-
-    Raises ArmidError with the nearest valid name.
-    """
     if name not in known:
         raise ArmidError(f"{what} '{name}' is not known: {nearest(str(name), known)}")
     return known[name]
@@ -237,11 +212,6 @@ def identify(
     -------
     Identification
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.estimation.identify import identify as run
     from armid.estimation.screen import screen
@@ -308,11 +278,6 @@ def examine(
     -------
     Examination
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.estimation.examine import examine as run
 
@@ -358,11 +323,6 @@ def close_loop(
     -------
     ClosedLoop
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.loop import close_loop as run
 
@@ -423,11 +383,6 @@ def simulate(
     -------
     SimulatedCampaign or Simulation
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
-
-    Raises
-    ------
-    ArmidError
-        For whatever cannot be used.
     """
     from armid.engine import simulate as run
     from armid.estimation.simulated import SimulatedCampaign, candidate_of, simulated_table

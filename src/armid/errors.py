@@ -55,7 +55,6 @@ BRIEF.maxlist = 12
 
 
 def quoted(value: object) -> str:
-    """Return a value as a short text on one line."""
     if isinstance(value, bool):
         return str(value).lower()
     try:

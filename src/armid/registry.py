@@ -126,10 +126,7 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
 
 
 def load_plugin(plugin: str) -> tuple[str, str, Any]:
-    """Return kind, name and object of `FILE.py:attribute`. This runs the file's code.
-
-    Raises ArmidError when the file or the attribute is missing, the file fails, or the object is none of ours.
-    """
+    """Return kind, name and object of `FILE.py:attribute`. This runs the file's code."""
     path, _, attribute = plugin.rpartition(":")
     if not path or not attribute:
         raise ArmidError(f"plug-in '{plugin}' is not of the form FILE.py:attribute")
@@ -174,7 +171,6 @@ def name_of(thing: Any, found_under: str) -> str:
 
 
 def kind_of(thing: Any, where: str) -> str:
-    """Tell of which kind a user's object is; refuse with ArmidError one of no kind."""
     for kind, accepts in ACCEPTS.items():
         if accepts(thing):
             return kind

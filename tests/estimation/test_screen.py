@@ -219,7 +219,7 @@ MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
 
 @pytest.fixture
 def campaign(root: Path, tmp_path: Path) -> Callable[[str], Path]:
-    """Return a function that makes a fresh, sparser campaign: arm, one (a single record), axis, rubbing (more friction)."""
+    """Return a function that makes a fresh, sparser campaign: arm, one (one record), axis, rubbing (more friction)."""
 
     def made(kind: str) -> Path:
         if kind in ("axis", "rubbing"):

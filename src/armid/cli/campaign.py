@@ -213,10 +213,6 @@ def identifiability_command(
 
 
 def read_point(path: Path) -> dict[str, float]:
-    """Return name -> value of the result of an identification.
-
-    Raises ArmidError for a file that is none.
-    """
     try:
         parameters = json.loads(path.read_text(encoding="utf-8"))["parameters"]
         return {str(name): float(entry["value"]) for name, entry in parameters.items()}

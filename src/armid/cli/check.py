@@ -47,7 +47,6 @@ def check_command(thing: str, on: str | None, time_limit: float, plugins: tuple[
 
 
 def tell_points(title: str, points: "Iterator[ContractPoint]", **about: str) -> None:
-    """Print points as they come and leave with 1 where one does not hold; about: joins them as JSON."""
     # what cannot be tried at all is refused before anything is printed
     first = next(points)
     say(title)
@@ -83,7 +82,6 @@ def limited(points: "Iterator[ContractPoint]", seconds: float) -> "Iterator[Cont
 
 @contextmanager
 def alarm(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError after some seconds, in the main thread of a system that has such a signal."""
     if not hasattr(signal, "setitimer"):
         yield
         return

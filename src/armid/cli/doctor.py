@@ -1,6 +1,6 @@
 """`armid doctor`: whether armid works here."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import requires, version
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -47,7 +47,6 @@ def points() -> "Iterator[ContractPoint]":
 
 
 def versions() -> tuple[bool, str]:
-    """Compare the installed packages with what armid declares."""
     from packaging.requirements import Requirement
 
     needed = [r for r in map(Requirement, requires("armid") or ()) if r.marker is None or r.marker.evaluate()]
@@ -57,7 +56,6 @@ def versions() -> tuple[bool, str]:
 
 
 def cache() -> tuple[bool, str]:
-    """Write into the cache folder."""
     from armid.engine.cache import cache_folder, unusable
 
     folder = cache_folder()
@@ -66,35 +64,28 @@ def cache() -> tuple[bool, str]:
 
 
 def compiler() -> tuple[bool, str]:
-    """Compile a function."""
     import numba
 
     return numba.njit(lambda x: 2.0 * x)(1.5) == 3.0, f"numba {numba.__version__} compiles"
 
 
 def simulation() -> tuple[bool, str]:
-    """Simulate the stored motion."""
-    import numpy as np
-
-    from armid.engine import calibrate, simulate
-
-    error = np.abs(simulated(simulate, calibrate, 1)[0, ::100] - TRAJECTORY).max()
+    error = abs(simulated(1)[0, ::100] - TRAJECTORY).max()
     return bool(error <= TOLERANCE), f"within {error:.1g} rad/s of the stored trajectory, {TOLERANCE:g} is allowed"
 
 
 def threads() -> tuple[bool, str]:
-    """Simulate a population on one thread and on two."""
     import numpy as np
     from joblib import cpu_count
 
-    from armid.engine import calibrate, simulate
-
-    one, two = (simulated(simulate, calibrate, n) for n in (1, 2))
-    return np.array_equal(one, two), f"{cpu_count()} processors; two threads give the same bits as one"
+    same = np.array_equal(simulated(1), simulated(2))
+    return same, f"{cpu_count()} processors; two threads give the same bits as one"
 
 
-def simulated(simulate: "Callable[..., Any]", calibrate: "Callable[..., Any]", n_threads: int) -> "Any":
+def simulated(n_threads: int) -> Any:
     import numpy as np
+
+    from armid.engine import calibrate, simulate
 
     arm = PLANTS["shell_transfer_arm"]
     constants = {"theta_C": np.radians(-48.0), "theta_D": np.radians(22.0), "shell": 1.0, "U": 28.0}

@@ -54,7 +54,6 @@ def list_command(what: str, is_long: bool, plugins: tuple[str, ...]) -> None:
 
 
 def entry(thing: Any) -> dict[str, Any]:
-    """Return what JSON holds of a registered thing: note, parameters of plants and effects, options of identifiers."""
     found: dict[str, Any] = {"note": getattr(thing, "note", "") or (getattr(thing, "__doc__", "") or "").strip()}
     if isinstance(thing, Plant | Effect):
         keys = ("unit", "low", "high", "null", "fixed", "note")
@@ -70,7 +69,6 @@ def entry(thing: Any) -> dict[str, Any]:
 
 
 def long_text(identifier: Any) -> str:
-    """Return an identifier with a line for each of its options."""
     from armid.identifiers import options_of
 
     lines = [f"{identifier.name}: {identifier.note or 'no note'}"]
@@ -119,12 +117,10 @@ def places(effect: Effect, plants: Sequence[Plant]) -> str:
 
 
 def folded(line: str) -> str:
-    """Return a line broken to the width of the list, what follows indented."""
     return textwrap.fill(line, WIDTH, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
 
 
 def parameter_text(parameter: Parameter) -> str:
-    """Return name, unit, bounds and null value of a parameter."""
     text = f"{parameter.name} [{parameter.unit}] from {parameter.low:g} to {parameter.high:g}"
     if parameter.null is not None:
         text += f", null {parameter.null:g}"

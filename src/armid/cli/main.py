@@ -37,8 +37,6 @@ COMMANDS = {
 
 
 class Commands(Heard, click.Group):
-    """The commands by name, each imported when it is asked for."""
-
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         # click looks for the nearest name there
@@ -48,7 +46,6 @@ class Commands(Heard, click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return a command, None for a name that there is not."""
         if cmd_name not in COMMANDS:
             return None
         module, name = COMMANDS[cmd_name].split(":")
@@ -74,7 +71,6 @@ def app() -> None:
 
 
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-    """Print a warning as one line."""
     tell(f"armid: warning: {message}")
 
 
@@ -115,6 +111,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def stop(sentence: str, code: int) -> None:
-    """Print a sentence to the error stream and leave."""
     tell(f"armid: {on_a_line(sentence)}")
     sys.exit(code)

@@ -91,21 +91,12 @@ def filled(file: str, **values: object) -> str:
 
 
 def python_file(template: str, name: str) -> str:
-    """Return the text of a Python file that declares one thing of a user.
-
-    template: a kind, or what STYLES names. name: of the thing, and of the file without its ending.
-    """
+    """Return the text of a Python file that declares one thing; template: a kind, or what STYLES names."""
     return filled(f"{template}.py.txt", name=name)
 
 
 def check_new_name(kind: str, name: str, taken: Collection[str] = (), template: str = "") -> None:
-    """Refuse a name that a starting file could not have.
-
-    taken: names of the same kind that are registered.
-
-    Raises ArmidError for a name that is no Python name (for a campaign: no plain name of a folder), is registered, is
-    used in the file itself, or is that of a module, which the file would hide.
-    """
+    """Refuse a name that a starting file could not have; taken: names of the same kind that are registered."""
     if kind == CAMPAIGN:
         if not FOLDER_NAME.fullmatch(name) or name.endswith("."):
             raise ArmidError(f"campaign '{name}' is no usable name: letters, digits, '_', '-' and '.' are expected")
@@ -138,15 +129,13 @@ def campaign_text(name: str) -> str:
 
 
 def synthetic_records() -> dict[str, dict[str, Array]]:
-    """Return file -> header -> values, shape (401,), of the made-up axis; the same at every call."""
     return {file: record(*told) for file, told in RECORDS.items()}
 
 
 def record(size: float, frequency: float, seed: int) -> dict[str, Array]:
     """Return header -> values of one record: a drive that steps to and fro, and the speed with noise.
 
-    J dv/dt = u - c v with u constant between samples is solved exactly:
-    v' = v exp(-c dt/J) + u/c (1 - exp(-c dt/J)).
+    J dv/dt = u - c v with u constant between samples is solved exactly: v' = v exp(-c dt/J) + u/c (1 - exp(-c dt/J)).
     """
     times = INTERVAL * np.arange(N_SAMPLES)
     drive = np.where(times < FIRST_STEP, 0.0, size * np.sign(np.cos(2.0 * np.pi * frequency * (times - FIRST_STEP))))

@@ -56,7 +56,6 @@ class Command(Heard):
 
 @contextmanager
 def announcing(told: Callable[[str], None]) -> Iterator[None]:
-    """Pass on what takes long and is announced."""
     handler = logging.Handler()
     handler.emit = lambda record: told(record.getMessage())  # type: ignore[method-assign]
     log = logging.getLogger("armid")
@@ -68,8 +67,6 @@ def announcing(told: Callable[[str], None]) -> Iterator[None]:
 
 
 class Group(Heard, click.Group):
-    """Commands below a command."""
-
     command_class = Command
 
 
@@ -77,13 +74,11 @@ command = partial(click.command, cls=Command)
 
 
 def wants(what: str) -> bool:
-    """Tell whether the running command was given --json ("json") or --quiet ("quiet")."""
     context = click.get_current_context(silent=True)
     return context is not None and bool(context.meta.get(f"armid.{what}"))
 
 
 def speaks() -> bool:
-    """Tell whether the running command prints words."""
     return not (wants("json") or wants("quiet"))
 
 
@@ -155,7 +150,6 @@ window_option = click.option("--window", default="", metavar="A:B", help="What i
 
 
 def out_option(text: str, required: bool = False) -> Callable[[Any], Any]:
-    """Return --out DIR with its help."""
     return click.option("--out", required=required, type=click.Path(path_type=Path), metavar="DIR", help=text)
 
 
@@ -170,10 +164,7 @@ def problem_options(function: Callable[..., Any]) -> Callable[..., Any]:
 def given(
     effects: str, plugins: Iterable[str], window: str = "", bounds: Iterable[str] = (), fix: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """Return what --effects, --plugin, --window, --bounds and --fix stand for, as `armid.by_name.opened` takes it.
-
-    Raises ArmidError for whatever of them cannot be used.
-    """
+    """Return what --effects, --plugin, --window, --bounds and --fix stand for, as `armid.by_name.opened` takes it."""
     return {
         "effects": [name for name in effects.split(",") if name.strip()], "plugins": tuple(plugins),
         "window": interval(window, "--window") if window else None, "bounds": intervals(bounds, "--bounds"),
@@ -182,13 +173,11 @@ def given(
 
 
 def examples(*lines: str) -> str:
-    """Return what stands below the options of a command's help."""
     # \b keeps click from joining the lines
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
 
 def number(text: str, option: str) -> float:
-    """Return a number; refuse anything else with one sentence."""
     try:
         return float(text)
     except ValueError as error:
@@ -196,10 +185,7 @@ def number(text: str, option: str) -> float:
 
 
 def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> dict[str, str]:
-    """Return NAME -> text of options of the form NAME=TEXT; `form` is how messages write it.
-
-    Raises ArmidError for another form and for a name given twice.
-    """
+    """Return NAME -> text of options of the form NAME=TEXT; `form` is how messages write it."""
     found: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.partition("=")
@@ -212,7 +198,6 @@ def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> 
 
 
 def value_of(text: str) -> float | int | bool | str:
-    """Return true or false, a whole number, a number, or the word itself."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -228,7 +213,6 @@ def numbers(texts: Iterable[str], option: str) -> dict[str, float]:
 
 
 def interval(text: str, option: str) -> tuple[float, float]:
-    """Return the two numbers of LOW:HIGH."""
     low, colon, high = text.partition(":")
     if not colon:
         raise ArmidError(f"{option} '{text}' is not of the form LOW:HIGH")
@@ -236,13 +220,11 @@ def interval(text: str, option: str) -> tuple[float, float]:
 
 
 def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float]]:
-    """Return NAME -> (low, high)."""
     found = assignments(texts, option, "NAME=LOW:HIGH")
     return {name: interval(value, f"{option} {name}") for name, value in found.items()}
 
 
 def accuracy_of(text: str) -> str | None:
-    """Return the engine's accuracy, None for auto."""
     if text not in ("standard", "fine", "auto"):
         raise ArmidError(f"--accuracy '{text}': {nearest(text, ('standard', 'fine', 'auto'))}")
     return None if text == "auto" else text

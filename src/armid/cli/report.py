@@ -118,10 +118,7 @@ def refuse_damaged_store(file: Path) -> Iterator[None]:
 
 
 def kind_in(folder: Path) -> Kind | None:
-    """Return the kind of result that a folder holds, None for a study, whose store may be named itself.
-
-    Raises ArmidError for a folder without any, and for one with the results of two commands.
-    """
+    """Return the kind of result that a folder holds, None for a study, whose store may be named itself."""
     if folder.name == STUDY or (folder / STUDY).is_file():
         return None
     there = [kind for kind in (LOOP, IDENTIFICATION) if (folder / kind.file).is_file()]

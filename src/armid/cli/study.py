@@ -62,7 +62,6 @@ def study_command(
 
 
 def show_answer(folder: Path) -> list[str]:
-    """Print the answer so far with its table; return its sentences."""
     from armid.study.document import summary_of
     from armid.study.results import load_study
 

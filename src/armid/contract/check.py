@@ -31,10 +31,7 @@ TRUTHS = {"p0": {"row 1": 3.2e6, "row 2": 3.1e6}, "k": {"row 1": 1.0, "row 2": 0
 
 
 def check_analysis(name: str, function: Callable[..., Any]) -> list[ContractPoint]:
-    """Try an analysis on made-up runs of two identifiers, one of which has failed.
-
-    Raises ArmidError for what is no function.
-    """
+    """Try an analysis on made-up runs of two identifiers, one of which has failed."""
     if not callable(function):
         raise ArmidError(f"analysis '{name}' is of type {type(function).__name__}: a function of runs is expected")
     runs = synthetic_runs()
@@ -57,8 +54,6 @@ def parts_of(name: str, found: Any) -> dict[str, Any]:
     """Return title -> DataFrame or matplotlib figure of what an analysis returned.
 
     found: a DataFrame, a figure (or what carries one, such as axes), or a dict, tuple or list of these; None: nothing.
-
-    Raises ArmidError for anything else.
     """
     from matplotlib.figure import Figure
     from pandas import DataFrame
@@ -156,7 +151,6 @@ def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = 
     """Run the contract of a plant, an effect, a fitness, an identifier or an analysis, and yield each point when done.
 
     kind: "plants", "effects", "fitness", "identifiers" or "analyses". plants: those on which an effect is tried.
-    Raises ArmidError for an object that does not even have the form of its kind.
     """
     if kind == "plants":
         yield from check_plant(thing)
@@ -173,8 +167,7 @@ def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = 
 def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[ContractPoint]:
     """Try a campaign that was read: its model composes, and follows every record to its end; records are plausible.
 
-    Free parameters are in the middle of their range; for what is plausible see `screen`. effects: name -> those that
-    it may declare.
+    Free parameters are in the middle of their range. effects: name -> those that it may declare.
     """
     n_train, n_holdout = len(campaign.train), len(campaign.holdout)
     text = f"{n_train} to train on, {n_holdout} held out"
@@ -201,17 +194,13 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
 
 
 def replay_at(candidate: Array, record: Record, model: Model) -> Replay:
-    """Make a record ready to be simulated with one candidate, (1, n_parameters): the engine is calibrated for no other.
-
-    That costs a small part of what the whole box does, and of a long record that is most of a check.
-    """
+    """Make a record ready to be simulated with one candidate; to calibrate the whole box takes far longer."""
     pieces, accuracy = tuple(p.until_window_end() for p in record.pieces), accuracy_for(record, model)
     calibrations = (calibrate(model, p.manoeuvre, candidate, accuracy, spans=False) for p in pieces)
     return Replay(record, model, pieces, tuple(calibrations))
 
 
 def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:
-    """Return a failing point for each mistake that a screen has found, a passing one where there is none."""
     wrong = [ContractPoint(f"plausible ({s.kind})", False, s.sentence) for s in found]
     return wrong or [ContractPoint("plausible", True, "no sign, unit, clock or manoeuvre of a record looks wrong")]
 
@@ -248,7 +237,6 @@ def check_fitness(fitness: Fitness) -> list[ContractPoint]:
 
 
 def trial_series() -> tuple[Array, Array]:
-    """Return a measured bump, (n_samples,), and that bump disturbed more and more, (4, n_samples)."""
     times = INTERVAL * np.arange(300)
     measured = np.sin(12.0 * times) * np.exp(-2.0 * times)
     disturbances = np.array([0.0, 0.05, 0.2, 0.6])
@@ -256,5 +244,4 @@ def trial_series() -> tuple[Array, Array]:
 
 
 def value(fitness: Fitness, measured: Array, simulated: Array) -> Array:
-    """Return the value of each candidate, the function working on copies."""
     return fitness(measured.copy(), simulated.copy(), INTERVAL, NOISE)

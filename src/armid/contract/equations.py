@@ -50,7 +50,6 @@ def check_plant(plant: Plant) -> Iterator[ContractPoint]:
 
 
 def plant_declared(model: Model) -> list[ContractPoint]:
-    """Check what can be told of a plant without moving; idle are switches that nobody asks for, and static guards."""
     plant, graph = model.plant, model.graph
     ports = ", ".join(plant.ports) or "none"
     asked = {key for node in graph.nodes.values() for key in node.needs}
@@ -121,7 +120,6 @@ def siblings(plants: Mapping[str, Plant]) -> list[Plant]:
 
 
 def composed(form: Effect, plants: Mapping[str, Plant]) -> tuple[list[Model], list[str]]:
-    """Return the models of an effect with each plant that takes it, and why the others do not."""
     models, refusals = [], []
     for plant in siblings(plants):
         try:
@@ -132,7 +130,6 @@ def composed(form: Effect, plants: Mapping[str, Plant]) -> tuple[list[Model], li
 
 
 def declared(form: Effect, models: Sequence[Model], refusals: list[str], strict: bool) -> list[ContractPoint]:
-    """Check what can be told of an effect without moving."""
     return [binding([m.plant.name for m in models], refusals), *check_parameters(form.parameters), has_null(form),
             documented(form, strict)]  # fmt: skip
 
@@ -173,7 +170,7 @@ def check_on(effect: Effect, alone: Model, model: Model) -> Iterator[ContractPoi
 
 
 def within(model: Model, part: Model, candidates: Array) -> Array:
-    """Return candidates of a part of a model as candidates of the model, all else nominal, (n, n_parameters)."""
+    """Return candidates of a part of a model as candidates of the model, all else nominal."""
     whole = np.tile(nominal(model), (len(candidates), 1))
     places = list(model.parameters)
     whole[:, [places.index(name) for name in part.parameters]] = candidates
@@ -181,7 +178,6 @@ def within(model: Model, part: Model, candidates: Array) -> Array:
 
 
 def printed(effect: Effect, model: Model) -> ContractPoint:
-    """Tell whether the printed equations show what the effect adds."""
     text = str(model)
     missing = [port for port in effect.adds if f"{effect.name}.{port} = " not in text]
     return finding("printed", missing, "print(model) does not show port {}", "print(model) shows what it adds")
@@ -190,8 +186,7 @@ def printed(effect: Effect, model: Model) -> ContractPoint:
 def null_law(alone: Model, model: Model, manoeuvres: list[Manoeuvre]) -> ContractPoint:
     """Tell whether at null, whatever its other parameters are, the model moves as it does without the effect.
 
-    Where all that it adds is exactly 0 along the motion, that motion is the plant's own, which need not be compiled;
-    else the two are compared.
+    Where all that it adds is exactly 0 along the motion, that motion is the plant's own; else the two are compared.
     """
     population = at_null(alone, N_CANDIDATES)
     if adds_nothing(alone, model, population, manoeuvres):
@@ -222,7 +217,6 @@ def adds_nothing(alone: Model, model: Model, population: Array, manoeuvres: list
 
 
 def acts(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> ContractPoint:
-    """Tell whether the effect moves the signal away from its null."""
     still, moving = nominal(model)[np.newaxis], away(model, effect, AWAY)[np.newaxis]
     moved = max(distance(model, still, model, moving, m) for m in manoeuvres)
     text = f"at {AWAY:.0%} of its range it moves the signal by {moved:.2g} {model.plant.output_unit}"
@@ -259,7 +253,6 @@ def responds(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> Contr
 
 
 def finite(model: Model, manoeuvres: list[Manoeuvre], spread: Array) -> ContractPoint:
-    """Tell whether signal and states of candidates stay finite."""
     failed = 0
     for m in manoeuvres:
         run = simulate(model, m, spread, calibrate(model, m, spread, spans=False).schedule, states=True)
@@ -270,7 +263,6 @@ def finite(model: Model, manoeuvres: list[Manoeuvre], spread: Array) -> Contract
 
 
 def deterministic(model: Model, manoeuvre: Manoeuvre, candidates: Array) -> ContractPoint:
-    """Tell whether the same candidates give the same signal again, bit for bit."""
     runs = [np.moveaxis(simulate(model, manoeuvre, candidates).outputs, 1, 0) for _ in range(2)]
     differ = np.flatnonzero([not np.array_equal(a, b, equal_nan=True) for a, b in zip(*runs, strict=True)])
     text = f"candidate {differ[0] + 1} moves differently when it is simulated again" if differ.size else (
@@ -320,7 +312,6 @@ def binding(fitting: list[str], refusals: list[str]) -> ContractPoint:
 
 
 def has_null(effect: Effect) -> ContractPoint:
-    """Tell whether there is a value at which the effect vanishes."""
     names = [p.name for p in effect.parameters if p.null is not None]
     text = f"vanishes where {', '.join(names)} is null" if names else "no parameter has a null value"
     return ContractPoint("null values", bool(names), text)

@@ -20,9 +20,8 @@ Array = NDArray[np.float64]
 class Trial(Metered):
     """A bent valley in a box of very different units; with holes, simulations fail in a fifth of the box.
 
-    10 (b - a^2)^2 + (a - 0.3)^2 + (c - 0.8)^2 in the unit cube, a sum of three squares. The failures are where a > 0.8.
-    bare: failed simulations come out as NaN instead of the penalty that armid's problems give.
-    watch: called with the candidates before they are evaluated, and may raise.
+    10 (b - a^2)^2 + (a - 0.3)^2 + (c - 0.8)^2 in the unit cube; the failures are where a > 0.8. bare: they come out as
+    NaN instead of the penalty that armid's problems give. watch: called with the candidates before they are evaluated.
     """
 
     def __init__(
@@ -34,7 +33,7 @@ class Trial(Metered):
         self.outside = self.simulated = 0
 
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
-        """Return the height of the valley, (n_candidates,), and the three terms, (n_candidates, 3)."""
+        """Return the height of the valley, (n_candidates,), and the three terms whose squares it sums."""
         if self.watch is not None:
             self.watch(X)
         z = (X - self.xl) / (self.xu - self.xl)
@@ -62,10 +61,7 @@ CUT_AT = 217
 
 
 def check_identifier(identifier: Identifier) -> Iterator[ContractPoint]:
-    """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed.
-
-    Each point is yielded when it is done.
-    """
+    """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed."""
     try:
         meter, problem = run(identifier, 1)
     except BudgetIgnoredError as error:
@@ -95,7 +91,7 @@ def check_identifier(identifier: Identifier) -> Iterator[ContractPoint]:
 def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -> ContractPoint:
     """Tell whether it searches on and improves where a fifth of the box fails; bare: with NaN instead of a penalty.
 
-    undisturbed: the run without failures; one that ends before a third of it has been stopped by a failure.
+    One that ends before a third of the undisturbed run has been stopped by a failure.
     """
     meter, problem = run(identifier, 1, Trial(Meter(BUDGET), holes=True, bare=bare))
     log = meter.log()
@@ -111,7 +107,6 @@ class BrokenError(Exception):
 
 
 def raising(identifier: Identifier) -> ContractPoint:
-    """Tell whether an error of the problem comes out as it is and leaves no thread behind."""
     before = set(threading.enumerate())
     seen = 0
 
@@ -157,7 +152,6 @@ def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: 
 
 @contextmanager
 def disturbed(noise: int) -> Iterator[None]:
-    """Put the global random generators into some state for a while."""
     kept, kept_by_numpy = random.getstate(), np.random.get_state()
     random.seed(noise)
     np.random.seed(noise)

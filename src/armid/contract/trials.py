@@ -22,7 +22,7 @@ GRAVITY = 0.4
 
 @dataclass(frozen=True)
 class ContractPoint:
-    """Hold one point of a contract: its name, whether it holds, and what was seen."""
+    """One point of a contract: its name, whether it holds, and what was seen."""
 
     name: str
     passed: bool
@@ -47,22 +47,18 @@ def check_parameters(parameters: Iterable[Parameter]) -> list[ContractPoint]:
 
 
 def finding(name: str, wrong: list[str], says: str, otherwise: str) -> ContractPoint:
-    """Return a finding that fails where names are wrong, and tells them."""
     return ContractPoint(name, not wrong, says.format(", ".join(wrong)) if wrong else otherwise)
 
 
 def nominal(model: Model) -> Array:
-    """Return nominal or middle values, effects at their null, (n_parameters,)."""
     return np.array([middle(p) if p.null is None else p.null for p in model.parameters.values()])
 
 
 def middle(p: Parameter) -> float:
-    """Return the nominal value, else the fixed one, else the middle of the range."""
     return next((v for v in (p.nominal, p.fixed) if v is not None), 0.5 * (p.low + p.high))
 
 
 def over_box(model: Model, n_candidates: int) -> Array:
-    """Return candidates spread over the bounds of all parameters, (n_candidates, n_parameters)."""
     parameters = model.parameters.values()
     low, high = (np.array([getattr(p, side) for p in parameters]) for side in ("low", "high"))
     return probes(low, high, n_candidates)
@@ -87,7 +83,6 @@ def away(model: Model, effect: Effect, share: float) -> Array:
 
 
 def corners(model: Model, effect: Effect) -> Array:
-    """Return nominal values with every combination of the bounds of an effect's free parameters."""
     names = [f"{effect.name}.{p.name}" for p in effect.parameters if p.fixed is None]
     bounds = [(model.parameters[n].low, model.parameters[n].high) for n in names]
     values = dict(zip(model.parameters, nominal(model), strict=True))
@@ -115,10 +110,7 @@ def from_null(model: Model, effect: Effect, shares: Array) -> Array:
 
 
 def trial_manoeuvres(plant: Plant) -> list[Manoeuvre]:
-    """Return two manoeuvres of a plant: there and back; inputs are a sine and a sawtooth over their typical range.
-
-    An input without one moves over half the effort scale, per unit of gain.
-    """
+    """Return two manoeuvres of a plant: there and back; inputs are a sine and a sawtooth over their typical range."""
     times = INTERVAL * np.arange(N_SAMPLES)
     shapes = (np.sin(9.0 * times), 2.0 * ((1.3 * times) % 1.0) - 1.0)
     gain = next((c.value for c in plant.constants if c.name == "gain"), 1.0)
@@ -167,7 +159,6 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
     """Return the recorded signals of one candidate, (n_outputs, n_samples), error about 1e-9 of their size.
 
     DOP853, restarted at every kink and switch, and at every sample where inputs drive the machine.
-    candidate: whole parameter vector, SI. Raises ArmidError when scipy does not get on.
     """
     plain = PlainModel(model, manoeuvre, candidate)
     times, states = manoeuvre.times(), plain.start()
@@ -193,10 +184,7 @@ def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Ar
 
 
 class PlainModel:
-    """Evaluate the equations of a model with plain functions.
-
-    candidate: whole parameter vector, SI; manoeuvre: constants, inputs and time grid.
-    """
+    """Evaluate the equations of a model with plain functions, at one whole candidate, SI."""
 
     def __init__(self, model: Model, manoeuvre: Manoeuvre, candidate: Array) -> None:
         self.graph = model.graph
@@ -238,10 +226,6 @@ class PlainModel:
         return float(np.interp(place, np.arange(len(samples)), samples))
 
     def rates(self, time: float, states: Array, closed: Latches) -> Array:
-        """Return the time derivatives.
-
-        Raises ArmidError when they are asked for too often: the integrator does not get on.
-        """
         self.n_rates += 1
         if self.n_rates > MOST_RATES:
             raise ArmidError(f"scipy does not get beyond {time:.3g} s: the equations are stiff there, or jump where no "

@@ -51,7 +51,6 @@ class KeptCode:
 
     @property
     def cache_path(self) -> str | None:
-        """Where files are."""
         folder = kept_in()
         return None if folder is None else str(folder)
 
@@ -145,7 +144,6 @@ def kept_in() -> Path | None:
 
 @cache
 def tell(sentence: str) -> None:
-    """Warn once."""
     warnings.warn(sentence, stacklevel=2)
 
 

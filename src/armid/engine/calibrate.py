@@ -32,10 +32,7 @@ MOST_VALUES, PART = 2**23, 8
 
 @dataclass(frozen=True)
 class Calibration:
-    """Hold a schedule and the error that was measured for it on the probes.
-
-    error: [unit of the first output], of all outputs the largest as a share of the output's size.
-    """
+    """A schedule and the error that was measured for it on the probes, of all outputs the largest share of its size."""
 
     schedule: Schedule
     error: float
@@ -43,10 +40,7 @@ class Calibration:
 
 
 def accuracy_against(noise: Mapping[str, float], model: Model) -> str:
-    """Return "fine" where noise would not hide the standard error of an output, else "standard".
-
-    noise: output -> rms [its unit]; "" for the only output of a plant.
-    """
+    """Return "fine" where noise (output -> rms) would not hide the standard error of an output, else "standard"."""
     sizes = {o.name: size for o, size in zip(model.plant.outputs, model.plant.sizes, strict=True)}
     sizes[""] = model.plant.sizes[0]
     hidden = all(rms >= NOISE_HIDES * ALLOWED[STANDARD] * sizes[name] for name, rms in noise.items())
@@ -136,10 +130,7 @@ def calibrate(
 
 
 def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str) -> Calibration:
-    """Return the finest of the calibrations of parts of the candidates: a long record would fill the memory with all.
-
-    Its error is the largest of all parts. Steps over several samples are not looked for.
-    """
+    """Return the finest of the calibrations of parts of the candidates: all at once would fill the memory."""
     parts = [candidates[first : first + PART] for first in range(0, len(candidates), PART)]
     found = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
     schedule = max((c.schedule for c in found), key=lambda s: s.substeps)
@@ -147,7 +138,6 @@ def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: st
 
 
 def switch_weights(candidates: Array, run: Simulation) -> Array | None:
-    """Return weights of the parameters in the time of the first switch (least squares), None without a switch."""
     if not run.switch_times or len(candidates) < 2 * candidates.shape[1] + 2:
         return None
     times = np.array(next(iter(run.switch_times.values())))
@@ -163,10 +153,7 @@ def switch_weights(candidates: Array, run: Simulation) -> Array | None:
 def long_steps(
     model: Model, manoeuvre: Manoeuvre, candidates: Array, schedule: Schedule, run: Simulation, allowed: float
 ) -> NDArray[np.int64] | None:
-    """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may.
-
-    Where next to all candidates have switched, nothing can be tried: the steps stay as they are.
-    """
+    """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may."""
     if not model.latches or model.plant.inputs or manoeuvre.n_samples < 2 * LONGEST:
         return None
     lasting = LASTING * model.plant.scales.speed
@@ -196,7 +183,6 @@ def long_steps(
 
 
 def difference(a: Simulation, b: Simulation, model: Model) -> float:
-    """Return the largest difference of two simulations where both hold [unit of the first output]."""
     good, (x, y) = ~(a.failed | b.failed), (run.joint(model.plant.sizes) for run in (a, b))
     # row by row: of a long record all differences at once would fill the memory
     return max((float(np.max(np.abs(x[i] - y[i]))) for i in np.flatnonzero(good)), default=0.0)

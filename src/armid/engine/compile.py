@@ -36,10 +36,7 @@ SLOW_S, MOST_NAMED = 2.0, 3
 
 
 def compile_model(model: Model) -> tuple[Kernel, int]:
-    """Return `simulate` of a model, compiled at its first call, and its lane width; a model is compiled once.
-
-    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
-    """
+    """Return `simulate` of a model, compiled at its first call, and its lane width; a model is compiled once."""
     with LOCK:
         if model not in KERNELS:
             kernel = load_module(kernel_parts(model, LANE_WIDTH)).simulate
@@ -51,8 +48,7 @@ def compile_model(model: Model) -> tuple[Kernel, int]:
 def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
     """Stand around the first call of a kernel, which compiles it: tell so where that takes more than 2 s.
 
-    Python's garbage collector is kept still meanwhile: the compiler makes millions of objects that live to its end, and
-    looking through them takes a fifth of its time.
+    Python's garbage collector is kept still meanwhile: the compiler makes millions of objects that live to its end.
     """
     if getattr(kernel, "signatures", True):
         yield
@@ -102,7 +98,6 @@ def load_module(parts: KernelParts) -> ModuleType:
 
 
 def compile_error(error: Exception) -> ArmidError:
-    """Return the error to raise for an equation that cannot be compiled, naming the equation where numba names it."""
     text, equation = str(error), re.compile(r"(?:\bdef |<function )f__(\w+)")
     found = equation.search(text) or equation.search(definition_above(error))
     name = f"the equation '{found[1].replace('__scalar', '').replace('__', '.')}'" if found else "an equation"
@@ -122,7 +117,6 @@ def cause(text: str) -> str:
 
 
 def definition_above(error: Exception) -> str:
-    """Return the head of the function in which numba met the error."""
     place = getattr(error, "loc", None) or re.search(r"Raised from (?P<filename>.+) \((?P<line>\d+)\)", str(error))
     if place is None:
         return ""

@@ -66,7 +66,6 @@ class KernelParts:
     wide: bool
 
     def text(self) -> str:
-        """Return the text of the module."""
         # Imported here: a module that is in the cache is not generated again.
         from jinja2 import Environment, StrictUndefined
 
@@ -95,20 +94,14 @@ class KernelParts:
 
 
 def kernel_parts(model: Model, width: int) -> KernelParts:
-    """Return what the module of a model is made of, `width` candidates side by side.
-
-    Raises ArmidError when the source of an equation cannot be taken over, naming the equation.
-    """
     return Emitter(model).parts(width)
 
 
 def generate_module(model: Model, width: int) -> str:
-    """Return the self-contained text of the module that simulates a model, `width` candidates side by side."""
     return kernel_parts(model, width).text()
 
 
 def listed(names: list[str], prefix: str = "") -> str:
-    """Return `prefix_a, prefix_b, ` with a comma behind each name."""
     return "".join(f"{prefix}{n}, " for n in names)
 
 
@@ -119,7 +112,6 @@ def each(text: str, names: list[str], separator: str = "\n") -> str:
 
 
 def nested(names: list[str], function: str, prefix: str) -> str:
-    """Return the maximum or minimum of prefixed names, two at a time."""
     first = f"{prefix}{names[0]}" if names else ""
     return f"{function}(" * (len(names) - 1) + first + "".join(f", {prefix}{n})" for n in names[1:])
 
@@ -147,8 +139,6 @@ def use_lines(effect: str, nulls: Mapping[str, float]) -> list[str]:
 
 
 class Emitter:
-    """Write the equations of one model's module."""
-
     def __init__(self, model: Model) -> None:
         self.model, self.graph = model, model.graph
         self.sources = SourceText()
@@ -156,7 +146,6 @@ class Emitter:
         self.strengths = strengths_of(model)
 
     def parts(self, width: int) -> KernelParts:
-        """Return what the template is filled with."""
         model = self.model
         rates = [f"rate__{k.replace('.', '__')}" for k in model.states]
         latch_guards = [f"guard__{k.replace('.', '__')}" for k in model.latches]
@@ -192,7 +181,6 @@ class Emitter:
         return KernelParts(equations, width, **names, driven_start=bool(at_start), jumping_guards=jumping, wide=wide)
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:
-        """Tell whether nodes depend on one of the wanted ones."""
         return any(k in wanted or self.uses(list(self.graph.nodes[k].needs), wanted) for k in keys)
 
     def fixed_keys(self, moving: list[str]) -> list[str]:
@@ -201,11 +189,9 @@ class Emitter:
         return [k for k in self.graph.nodes if k in needed and self.graph.is_static(k) and not self.empty_port(k)]
 
     def empty_port(self, key: str) -> bool:
-        """Tell whether a node is a port to which nothing is added."""
         return self.graph.nodes[key].kind == "port" and not self.graph.nodes[key].terms
 
     def assignments(self, wanted: list[str], static: bool) -> list[str]:
-        """Return one line for each node that leads to the wanted ones."""
         return [self.line(n.key, static) for n in self.graph.order(wanted)
                 if self.graph.is_static(n.key) == static or n.kind == "initial" or self.empty_port(n.key)]  # fmt: skip
 
@@ -218,7 +204,6 @@ class Emitter:
         return f"{variable(key)} = {taken} if used_{node.owner} else splat({IDLE[node.kind]})"
 
     def expression(self, key: str) -> str:
-        """Return the right-hand side of a node."""
         node = self.graph.nodes[key]
         if node.function is None:
             return " + ".join(map(variable, node.terms)) or "0.0"
@@ -229,11 +214,9 @@ class Emitter:
         return f"{name}({', '.join(f'{local_name(argument)}={variable(bound)}' for argument, bound in node.arguments)})"
 
     def evaluation(self, name: str, arguments: list[str], wanted: list[str], static: bool = False) -> str:
-        """Return a compiled function that evaluates nodes."""
         return self.function(name, arguments, self.assignments(wanted, static), [variable(k) for k in wanted])
 
     def function(self, name: str, arguments: list[str], lines: list[str], results: list[str]) -> str:
-        """Return a compiled function that evaluates lines and returns a tuple."""
         result = f"({', '.join(results)}{',' if len(results) == 1 else ''})"
         body = "\n".join(f"    {line}" for line in [*lines, f"return {result}"])
         return f"@compiled\ndef {name}({', '.join(arguments)}):\n{body}\n"
@@ -247,7 +230,6 @@ class Emitter:
 
 
 def wrapped_by_lane(name: str, definition: ast.FunctionDef) -> str:
-    """Return a function with control flow, called once for each lane."""
     arguments = ast.unparse(definition.args)
     lanes = ", ".join(f"lane({a.arg}, i)" for a in definition.args.args)
     scalar = ast.unparse(definition).replace(f"def {name}(", f"def {name}__scalar(", 1)

@@ -53,7 +53,6 @@ def mixes_lanes(*numba_types: Any) -> bool:
 
 
 def broadcast(builder: Any, value: Any, width: int) -> Any:
-    """Copy one double to every lane."""
     empty = ir.Constant(vector_of(width), ir.Undefined)
     first = builder.insert_element(empty, value, ir.Constant(INT32, 0))
     return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(INT32, width), [0] * width))
@@ -183,8 +182,6 @@ def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
 
 
 def comparison(symbol: str) -> Callable[..., Any]:
-    """Return a comparison that is 1.0 where it holds and 0.0 elsewhere."""
-
     def compute(builder: Any, x: Any, y: Any) -> Any:
         true, false = (broadcast(builder, ir.Constant(DOUBLE, c), x.type.count) for c in (1.0, 0.0))
         compare = builder.fcmp_unordered if symbol == "!=" else builder.fcmp_ordered

@@ -139,8 +139,7 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
 class Prepared:
     """Simulate populations through one manoeuvre, everything but the candidates made ready once.
 
-    starts: of the manoeuvre, in the order of `model.starts`. settings: arguments of the kernel between the candidates
-    and where their results go.
+    settings: arguments of the kernel between the candidates and where their results go.
     """
 
     model: Model
@@ -153,10 +152,7 @@ class Prepared:
     states: bool
 
     def run(self, population: ArrayLike, threads: int = 1, starts: Array | None = None) -> Simulation:
-        """Simulate every candidate; arguments, result and errors as of `simulate`.
-
-        starts: where each candidate starts in place of where the manoeuvre does, (n_candidates, n_starts), SI.
-        """
+        """Simulate every candidate; starts: in place of the manoeuvre's, (n_candidates, n_starts), SI."""
         model = self.model
         candidates = as_population(model, population)
         n = len(candidates)
@@ -178,7 +174,6 @@ class Prepared:
 
 
 def as_population(model: Model, population: ArrayLike) -> Array:
-    """Return the population as float64, (n_candidates, n_parameters); refuse another shape with ArmidError."""
     candidates = np.atleast_2d(np.asarray(population, dtype=np.float64))
     if candidates.ndim != 2 or candidates.shape[1] != len(model.parameters):
         raise ArmidError(f"a population of shape {candidates.shape} was given: (n_candidates, "
@@ -187,7 +182,6 @@ def as_population(model: Model, population: ArrayLike) -> Array:
 
 
 def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
-    """Return the inputs of the plant in order, shape (n_inputs, n_samples)."""
     names = [i.name for i in model.plant.inputs]
     for name in names:
         if name not in manoeuvre.inputs:
@@ -222,10 +216,7 @@ def pool_of(threads: int) -> ThreadPoolExecutor:
 
 
 def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_groups: int, threads: int) -> None:
-    """Fill the results group by group; threads take neighbouring groups.
-
-    Raises ArmidError when an equation cannot be compiled, which shows at the first call.
-    """
+    """Fill the results group by group; threads take neighbouring groups."""
     try:
         if threads < 2 or n_groups < 2:
             kernel(*given, 0, n_groups, *results)
@@ -244,9 +235,7 @@ def along(
 ) -> dict[str, Array]:
     """Return states, inputs, quantities, ports or `time` of one candidate on the samples, name -> (n_samples,), SI.
 
-    candidate: whole, SI, (n_parameters,). names: as equations spell them; an effect's own are qualified
-    (`shell_rocking.twist`), aliases are understood.
-    Raises ArmidError for a name that the model does not have.
+    names: as equations spell them; an effect's own are qualified (`shell_rocking.twist`), aliases are understood.
     """
     run = simulate(model, manoeuvre, candidate[np.newaxis], schedule, states=True)
     times = manoeuvre.times()
@@ -266,5 +255,4 @@ def along(
 
 
 def flat(name: str) -> str:
-    """Return the key of a qualified name."""
     return name.replace(".", "__")

@@ -27,26 +27,18 @@ RESERVED = {"np", "math", "lane", "with_lane", "splat", "WIDTH", "result", "i"}
 
 
 def local_name(name: str) -> str:
-    """Return the name under which a function's argument or variable stands in the generated module."""
     return f"{name}__own" if name in RESERVED else name
 
 
 @dataclass
 class SourceText:
-    """Collect the definitions of functions by their new name, helpers first.
-
-    by_lane: names of those that choose or loop; functions: the Python function of each name.
-    """
+    """Collect the definitions of functions by their new name, helpers first; by_lane: those that choose or loop."""
 
     definitions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     by_lane: set[str] = field(default_factory=set)
     functions: dict[str, Callable[..., Any]] = field(default_factory=dict)
 
     def add(self, name: str, function: Callable[..., Any]) -> None:
-        """Add one function under a new name, with the helpers that it calls.
-
-        Raises ArmidError when its source cannot be read or it uses something that cannot be compiled.
-        """
         plain = plain_function(function)
         self.functions[name] = plain
         definition = with_values(definition_of(plain), plain)
@@ -58,10 +50,7 @@ class SourceText:
         self.definitions[name] = ast.fix_missing_locations(definition)
 
     def add_helper(self, caller: str, name: str, function: Callable[..., Any]) -> str:
-        """Add what a function calls and return its new name.
-
-        Raises ArmidError when the two call each other: numba cannot compile that.
-        """
+        """Add what a function calls and return its new name."""
         plain, helper = plain_function(function), f"{caller}__{name}"
         if any(plain is f for n, f in self.functions.items() if n not in self.definitions):
             raise ArmidError(f"the equation {plain.__qualname__} calls itself: write it as a loop")
@@ -73,15 +62,11 @@ class SourceText:
 
 
 def plain_function(function: Callable[..., Any]) -> Any:
-    """Return the Python function below a decorator or a compiled function."""
     return inspect.unwrap(getattr(function, "py_func", function))
 
 
 def with_values(definition: ast.FunctionDef, function: FunctionType) -> ast.FunctionDef:
-    """Put values in the place of defaults, and make every argument one that can be named.
-
-    Raises ArmidError for a default that is no number.
-    """
+    """Put values in the place of defaults, and make every argument one that can be named."""
     values = function.__defaults__ or ()
     for value in values:
         if not isinstance(value, NUMBERS):
@@ -105,7 +90,6 @@ def number(value: Any) -> ast.expr:
 
 
 def call(function: str, *arguments: ast.expr) -> ast.Call:
-    """Return the expression `np.function(...)`."""
     return ast.Call(ast.Attribute(ast.Name(NUMPY, ast.Load()), function, ast.Load()), list(arguments), [])
 
 
@@ -192,7 +176,6 @@ class Names(ast.NodeTransformer):
         return node
 
     def note_call(self, called: Any) -> None:
-        """Note whether a function of numpy or math is one that lanes do not have."""
         self.is_scalar |= callable(called) and called not in LANE_FUNCTIONS
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -215,7 +198,6 @@ class Names(ast.NodeTransformer):
                          "numpy, math, numbers and plain functions are expected")  # fmt: skip
 
     def replacement(self, name: str, value: Any) -> ast.AST:
-        """Return what stands for an outside name in the generated module."""
         if isinstance(value, ModuleType) and value in (np, math):
             return ast.Name("np" if value is np else "math", ast.Load())
         if isinstance(value, NUMBERS):

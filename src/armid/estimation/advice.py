@@ -36,12 +36,11 @@ TOLERANCE = 1e-5
 
 @dataclass(frozen=True)
 class Advice:
-    """Advise a manoeuvre.
+    """A manoeuvre that is advised.
 
-    manoeuvre: key -> value as campaign.toml would say it. words: the same for people. separates: names of the rivals
-    that its record is expected to tell apart. power: chance that the right one of any two of them wins by more than the
-    threshold, the lowest of the pairs, whichever of the two is right. delta: distance of their predictions after both
-    were fitted again to old and new records, in standard deviations of the noise, of that pair.
+    words: its keys for people. separates: names of the rivals that its record is expected to tell apart. power: chance
+    that the right one of any two of them wins by more than the threshold, the lowest of the pairs, whichever of the two
+    is right. delta: distance of their predictions after both were fitted again, in standard deviations, of that pair.
     """
 
     manoeuvre: Mapping[str, Key]
@@ -53,11 +52,11 @@ class Advice:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """Hold a fitted model that others cannot be told from.
+    """A fitted model that others cannot be told from.
 
-    records: the least-squares problem of the records there are. z: its estimate, shares of the range, (n_free,).
-    criterion: what the loop judges it by, smaller is better; differences are those of chi2 plus what parameters cost.
-    trust: what a sample counts, below 1 where more than noise is left.
+    z: its estimate, shares of the range, (n_free,). criterion: what the loop judges it by, smaller is better;
+    differences are those of chi2 plus what parameters cost. trust: what a sample counts, below 1 where more than noise
+    is left.
     """
 
     name: str
@@ -71,7 +70,6 @@ class Rival:
         return np.asarray(self.whole(self.z[np.newaxis])[0])
 
     def whole(self, Z: Array) -> Array:
-        """Return whole candidates, SI, of shares that may lie outside the box, where they are put onto it."""
         return self.records.space.complete(self.records.values(Z))
 
     @cached_property
@@ -104,10 +102,7 @@ def advise(
     Only manoeuvres that were simulated are returned, ranked by the mean power over pairs, then by the mean distance.
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
     n_samples), into units of white noise, (n_signals, n), None: the mean weight of the records of one output. grid:
-    None: `manoeuvre_grid`. speed_limit: of the gyro, [unit of the signal]. threshold: difference of the criterion at
-    which one model counts as better. threads: among which rivals and manoeuvres are shared.
-
-    Raises ArmidError for fewer than two rivals.
+    None: `manoeuvre_grid`. speed_limit: of the gyro. threshold: difference of the criterion at which a model is better.
     Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
     """
     if len(rivals) < 2:
@@ -147,7 +142,6 @@ def advice_of(rivals: Sequence[Rival], feasible: Feasible, powers: Powers) -> Ad
 
 
 def normal_draws(n_dimensions: int, n_draws: int) -> Array:
-    """Return evenly spread standard normal draws, (n_draws, n_dimensions): the same at every call."""
     return np.asarray(norm.ppf(probes(np.zeros(n_dimensions), np.ones(n_dimensions), n_draws)))
 
 
@@ -158,10 +152,9 @@ def outside(Z: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Hold what one rival predicts for one manoeuvre, whitened: the signal (n_samples,) and its spread.
+    """What one rival predicts for one manoeuvre, whitened: the signal, (n_samples,), and spread, (n_samples, n_free).
 
-    spread: (n_samples, n_free) so that spread spread^T is the covariance of the prediction that the uncertainty of the
-    fitted parameters makes.
+    spread spread^T is the covariance of the prediction that the uncertainty of the fitted parameters makes.
     """
 
     signal: Array
@@ -230,11 +223,7 @@ def chance(right: Prediction, wrong: Prediction, old: float, draws: Array, thres
 
 @dataclass(frozen=True, eq=False)
 class OldAndNew(LeastSquaresProblem):
-    """Pose the old records, as a parabola about their estimate, and one new record as one least-squares problem.
-
-    rival: fitted to the old records. feasible, white: the new record's manoeuvre and what makes its noise white.
-    seen: the new record, whitened, (n_samples,).
-    """
+    """Pose the old records, as a parabola about their estimate, and one new record as one least-squares problem."""
 
     rival: Rival = field(kw_only=True)
     feasible: Feasible = field(kw_only=True)
@@ -252,7 +241,6 @@ class OldAndNew(LeastSquaresProblem):
 
 
 def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Array) -> Array:
-    """Return the whitened signal of candidates in shares of the range, (n_candidates, n_samples)."""
     records = rival.records
     run = simulate(records.model, feasible.manoeuvre, rival.whole(Z), fine_schedule(records.replays))
     places = sorted({r.place for r in records.replays})
@@ -277,9 +265,8 @@ def simulate_refits(
 
     The record is simulated without noise from the right model as it is known by now, once for each draw, and every
     rival is fitted again to old and new. Noise then scatters the difference D of the criteria by twice the distance of
-    the fitted predictions: the chance is Phi((D - threshold)/(2 distance)).
-    draws: standard normal, (n_draws, at least n_free). Returns chances (n_rivals,), of the right one 1, and
-    distances in standard deviations of the noise, (n_rivals,). A draw whose simulation diverges says nothing.
+    the fitted predictions: the chance is Phi((D - threshold)/(2 distance)). draws: standard normal, (n_draws, at least
+    n_free). A draw whose simulation diverges says nothing.
     """
     true = rivals[right]
     chances, distances = [], []
@@ -300,10 +287,7 @@ def simulate_refits(
 
 
 def fitted_again(rival: Rival, feasible: Feasible, white: Whitening, seen: Array) -> tuple[float, Array]:
-    """Return the criterion and the whitened prediction of a rival after a fit to old and new.
-
-    A rival that diverges wherever it starts is as far off as a model can be: the record itself is its distance.
-    """
+    """Return criterion and prediction of a rival after a fit to old and new; of one that diverges 0 throughout."""
     both = OldAndNew((), rival.records.space, rival=rival, feasible=feasible, white=white, seen=seen)
     start = np.clip(rival.z, 0.0, 1.0)
     if not np.isfinite(both.chi2(start)[0]):

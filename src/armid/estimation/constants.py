@@ -31,10 +31,10 @@ NAMED = "constant:"
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """Hold constants that the records know only as one product.
+    """Constants that the records know only as one product.
 
-    names: its members; exponents: of each, the first 1. tolerance: of the product, relative. slope: change of the
-    weighted signal per relative change of the first member, (n_samples,).
+    exponents: of each name, the first 1. tolerance: of the product, relative. slope: change of the weighted signal per
+    relative change of the first member, (n_samples,).
     """
 
     names: tuple[str, ...]
@@ -51,12 +51,10 @@ class Product:
 
     @property
     def column(self) -> Array:
-        """Change of the weighted signal by one tolerance, (n_samples,)."""
         return self.tolerance * self.slope
 
 
 def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> Record:
-    """Return a record of a machine whose constants differ by relative shares, name -> share."""
     if not shares:
         return record
     pieces, whole = (
@@ -67,7 +65,6 @@ def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> R
 
 
 def moved_replay(replay: Replay, shares: Mapping[str, float]) -> Replay:
-    """Return a replay whose machine's constants differ by relative shares, name -> share."""
     return replace(replay, pieces=tuple(moved_piece(p, replay.model.plant, shares) for p in replay.pieces))
 
 
@@ -113,7 +110,6 @@ def products(records: LeastSquaresProblem, z: Array, tolerances: Mapping[str, fl
 
 
 def columns_of(found: Sequence[Product], n_samples: int) -> Array:
-    """Return what one tolerance of each product does to the weighted signal, (n_samples, n_products)."""
     return np.array([p.column for p in found]).reshape(len(found), n_samples).T
 
 
@@ -121,7 +117,6 @@ def common_factors(names: Sequence[str], slopes: Array, found: Sequence[Product]
     """Return in words which parameters the records give only together with constants.
 
     Of each parameter the smallest set of constants and further parameters that makes up for a change of it.
-    names: of the free parameters; slopes: of the weighted signal per relative change of each, (n_samples, n_free).
     """
     if not found or not names:
         return ()

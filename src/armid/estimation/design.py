@@ -43,10 +43,10 @@ UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class Feasible:
-    """Hold a manoeuvre that could be made next.
+    """A manoeuvre that could be made next.
 
-    keys: as campaign.toml would say it, key -> value; of changed inputs: `like`, `size` and `pace`. manoeuvre: with the
-    sampling of `window`, the samples that would count. repeats: file of the train record that it repeats, or "".
+    keys: as campaign.toml would say it; of changed inputs: `like`, `size` and `pace`. manoeuvre: with the sampling of
+    `window`, the samples that would count. repeats: file of the train record that it repeats, or "".
     """
 
     keys: Mapping[str, Key]
@@ -61,11 +61,11 @@ class Feasible:
 
 @dataclass(frozen=True, eq=False)
 class Offer:
-    """Hold what one more record of a manoeuvre would give.
+    """What one more record of a manoeuvre would give.
 
-    before, after: standard deviations, SI, shape (n_free,), infinite where not determined. gain: what offers are ranked
-    by, above 1 where the record helps: by "volume" the mean factor by which deviations shrink (D-optimality), by
-    "worst" the factor of the worst parameter as a share of its range, by "shrinkage" the largest factor of all.
+    before, after: standard deviations, SI, (n_free,), infinite where not determined. gain: what offers are ranked by,
+    above 1 where the record helps: by "volume" the mean factor by which deviations shrink (D-optimality), by "worst"
+    the factor of the worst parameter as a share of its range, by "shrinkage" the largest factor of all.
     """
 
     feasible: Feasible
@@ -88,9 +88,7 @@ def offers(
 
     F' = F + sum over outputs of f J^T J / level^2 with J the sensitivities in the new record; deviations are those of
     F'^-1. Ranking counts the box as a first record, so that what is not determined yet has a finite deviation, too.
-    motions: at the estimate. x: the estimate, SI, (n_free,). fisher: information of the records, in shares of the
-    range, (n_free, n_free). levels: expected of the outputs of the new record, see `expected_levels`. by: "volume",
-    "worst" or "shrinkage".
+    fisher: information of the records in shares of the range; levels: of the outputs of the new record.
     """
     low, span = space.low[space.free], space.high[space.free] - space.low[space.free]
     candidates = space.complete(low + stencil((x - low) / span) * span)
@@ -105,7 +103,6 @@ def offers(
 
 
 def gain(fisher: Array, more: Array, by: str) -> float:
-    """Return by what factor deviations shrink from one information matrix to a larger one."""
     known = BOX * np.eye(len(fisher))
     if by == VOLUME:
         volumes = np.linalg.slogdet(more + known)[1] - np.linalg.slogdet(fisher + known)[1]
@@ -115,10 +112,7 @@ def gain(fisher: Array, more: Array, by: str) -> float:
 
 
 def expected_levels(replays: Sequence[Replay], levels: Sequence[Level]) -> tuple[Level, ...]:
-    """Return the level to expect of each output that the records hold: mean square, mean share of independent samples.
-
-    levels: of the replays.
-    """
+    """Return the level to expect of each output: mean square, mean share of independent samples."""
     places = sorted({r.place for r in replays})
     groups = [[level for r, level in zip(replays, levels, strict=True) if r.place == place] for place in places]
     return tuple(
@@ -172,7 +166,6 @@ def keyed(plant: Plant, records: Sequence[Record]) -> Iterator[Feasible]:
 
 
 def key_levels(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> tuple[float | bool, ...]:
-    """Return the values that a key takes in the grid, in its own unit."""
     if key.boolean:
         return (True, False)
     if key.low is not None and key.high is not None and is_place(plant, key):
@@ -268,7 +261,6 @@ def key_words(key: str, value: Key) -> str:
 
 
 def fine_schedule(replays: Sequence[Replay]) -> Schedule:
-    """Return one schedule for whatever manoeuvre: twice as fine as the finest that the records asked for."""
     return Schedule(FINER * max(c.schedule.substeps for r in replays for c in r.calibrations))
 
 
@@ -276,7 +268,7 @@ class Motions:
     """Simulate manoeuvres and leave out those that the machine could not make.
 
     replays: of the train records, they say how finely to cut time and, for a machine driven by inputs, how far it may
-    move. candidate: whole, SI, the one that must stay feasible. speed_limit: [unit of the signal], the gyro's range.
+    move. candidate: whole, SI, the one that must stay feasible. speed_limit: the gyro's range.
     """
 
     def __init__(self, replays: Sequence[Replay], candidate: Array, speed_limit: float | None = None) -> None:
@@ -291,11 +283,7 @@ class Motions:
         self.extents = self._recorded_extents(replays) if self.model.plant.inputs else {}
 
     def signals(self, grid: Iterable[Feasible], candidates: Array) -> Iterator[tuple[Feasible, Array]]:
-        """Yield each manoeuvre that can be made with the signals of candidates in its window.
-
-        candidates: whole, SI, shape (n_candidates, n_parameters). Signals: of the outputs that the records hold, shape
-        (n_outputs, n_candidates, n_samples).
-        """
+        """Yield each manoeuvre that can be made with its signals, (n_outputs, n_candidates, n_samples)."""
         population = np.concatenate([self.candidate[np.newaxis], candidates])
         for feasible in grid:
             run = simulate(self.model, feasible.manoeuvre, population, self.schedule, states=True)

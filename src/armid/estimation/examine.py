@@ -39,10 +39,10 @@ MOST_TRIED, LARGEST_TRIED = 12, 4
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Hold parameters that the records cannot tell apart.
+    """Parameters that the records cannot tell apart.
 
-    names: in the order of the model. index: collinearity index; a change of one is made up for by the others to within
-    1/index. direction: how they move together, as shares of their ranges, shape (n_names,), its largest component 1.
+    index: collinearity index; a change of one is made up for by the others to within 1/index. direction: how they move
+    together, as shares of their ranges, its largest component 1.
     """
 
     names: tuple[str, ...]
@@ -54,9 +54,8 @@ def groups(fisher: Array, names: tuple[str, ...], critical: float = CRITICAL) ->
     """Return the groups of parameters that move together, the worst first.
 
     The smallest set whose index comes to half of that of all parameters is the first group; then the member that does
-    most harm is taken as known, and the rest is looked at again, until its index is below `critical`.
-    fisher: of the parameters in shares of their range, shape (n_free, n_free); a parameter that is not seen at all has
-    a zero row and is in no group.
+    most harm is taken as known, and the rest is looked at again, until its index is below `critical`. fisher: in shares
+    of the range; a parameter that is not seen at all has a zero row and is in no group.
     """
     scaled, seen = normalised(fisher)
     visible = tuple(n for n, s in zip(names, seen, strict=True) if s)
@@ -75,8 +74,8 @@ def groups(fisher: Array, names: tuple[str, ...], critical: float = CRITICAL) ->
 def collinearity_index(fisher: Array) -> float:
     """Return 1/sqrt(smallest eigenvalue) of the information matrix scaled to a diagonal of 1.
 
-    1 for parameters whose sensitivities are orthogonal, 3e6 (rounding) where one repeats others.
-    fisher: shape (n, n). Source: Brun, Reichert, Kuensch 2001, doi:10.1029/2000WR900350, Eq 14.
+    1 for parameters whose sensitivities are orthogonal, 3e6 (rounding) where one repeats others. Source: Brun,
+    Reichert, Kuensch 2001, doi:10.1029/2000WR900350, Eq 14.
     """
     scaled, _ = normalised(fisher)
     if len(scaled) < 2:
@@ -106,14 +105,12 @@ def smallest(scaled: Array, among: Members, index: float) -> Members:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Examination(Result):
-    """Hold what the train records say about the free parameters at one candidate; it prints itself.
+    """What the train records say about the free parameters at one candidate; it prints itself.
 
-    x: SI, shape (n_free,): the least-squares estimate, or the point that was asked for (given). minimum: the
-    least-squares estimate, (n_free,). information: Cramer-Rao deviations, correlations, Fisher matrix at x. groups:
-    parameters that move together there. combinations: what is known only together with constants, in words. wider:
-    standard deviations that count the tolerances of the constants, SI, (n_free,). profiles: one for each free
-    parameter, about the minimum. offers: what one more record would buy, the best first. ranked_by: by what they are
-    ranked.
+    x: SI, (n_free,): the least-squares estimate, or the point that was asked for (given). minimum: the least-squares
+    estimate. information: at x. combinations: what is known only together with constants, in words. wider: standard
+    deviations that count the tolerances of the constants, SI. profiles: one for each free parameter, about the minimum.
+    offers: what one more record would buy, the best first.
     """
 
     kind: ClassVar[Kind] = IDENTIFIABILITY
@@ -149,24 +146,9 @@ def examine(
 ) -> Examination:
     """Examine the train records of a campaign; holdout records are not looked at.
 
-    Parameters
-    ----------
-    campaign, model, space
-        The records, the model and the box of its parameters.
-    x : array, SI, (n_free,)
-        Free parameters at which sensitivities are taken; None: the least-squares estimate, the records weighed by how
-        far they scatter about it.
-    noise : float, unit of the records
-        Rms to assume in place of what was measured.
-    by : str
-        How offers are ranked, see `Offer`.
-    accuracy : {"standard", "fine"}
-        Of the engine; None: as the noise of each record asks for.
-
-    Raises
-    ------
-    ArmidError
-        When no parameter is free, x is outside the box, or everything diverges.
+    x: free parameters at which sensitivities are taken, SI, (n_free,); None: the least-squares estimate, the records
+    weighed by how far they scatter about it. noise: rms to assume in place of what was measured. by: how offers are
+    ranked, see `Offer`. accuracy: "standard" or "fine", of the engine; None: as the noise of each record asks for.
     """
     if not space.free.any():
         raise ArmidError("no parameter is free: at least one is expected to be examined")

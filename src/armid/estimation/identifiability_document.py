@@ -90,14 +90,12 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
 
 
 def deviation_of(result: Mapping[str, Any], name: str, deviation: float | None) -> str:
-    """Return a stored deviation of a parameter, None for one that is not determined, in words."""
     p = result["parameters"][name]
     value = np.inf if deviation is None else deviation
     return scaled_text(name, p["unit"], p["bound_high"] - p["bound_low"], value, p["value"])
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
-    """Return the parameters: value, deviation, intervals by curvature and by profile, where it is bounded."""
     rows = []
     for name, p in result["parameters"].items():
         unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
@@ -116,20 +114,17 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
 
 
 def interval_text(low: float, high: float) -> str:
-    """Return an interval with as many digits as its width deserves."""
     width = abs(high - low)
     digits = 6 if width == 0.0 else int(np.clip(2 - np.floor(np.log10(width)), 0, 9))
     return f"{low:.{digits}f} to {high:.{digits}f}"
 
 
 def profile_text(profile: Mapping[str, Any], factor: float) -> str:
-    """Return the interval of a stored profile; where it is not bounded inside the box its end is the box."""
     low, high = interval_text(profile["low"] * factor, profile["high"] * factor).split(" to ")
     return f"{low if profile['bounded_low'] else f'box {low}'} to {high if profile['bounded_high'] else f'box {high}'}"
 
 
 def deviation_text(space: Space, i: int, deviation: float, value: float) -> str:
-    """Return a standard deviation of the i-th free parameter in words."""
     place = int(np.flatnonzero(space.free)[i])
     span = float(space.high[place] - space.low[place])
     return scaled_text(space.names[place], space.units[place], span, deviation, value)
@@ -209,7 +204,6 @@ def result_of(found: Examination) -> dict[str, Any]:
 
 
 def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
-    """Return what is known of one free parameter; `value` is where sensitivities were taken."""
     value, half = float(found.x[i]), float(found.information.half_width[i])
     return {
         "value": value, "unit": profile.unit, "deviation": finite(found.information.deviation[i]),
@@ -226,7 +220,6 @@ def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
 
 
 def directions(fisher: Array, names: Sequence[str]) -> list[dict[str, Any]]:
-    """Return the eigenvectors of the information matrix scaled to a diagonal of 1, the weakest first."""
     scaled, seen = normalised(fisher)
     kept = [n for n, s in zip(names, seen, strict=True) if s]
     values, vectors = np.linalg.eigh(scaled) if kept else (np.empty(0), np.empty((0, 0)))
@@ -293,7 +286,6 @@ def profile_remark(found: Examination, profile: Profile) -> str:
 
 
 def point_remarks(found: Examination) -> list[str]:
-    """Return what is to be said of a point that was given, else where the noise of measured starts widens intervals."""
     names, deviation = found.space.free_names, found.information.deviation
     with np.errstate(invalid="ignore", divide="ignore"):
         away = np.nan_to_num(np.abs(found.x - found.minimum) / deviation, nan=0.0, posinf=0.0)
@@ -310,7 +302,6 @@ def point_remarks(found: Examination) -> list[str]:
 
 
 def level_remarks(found: Examination) -> list[str]:
-    """Return what the intervals rest on: noise, residual, or an assumption; records that say the same together."""
     texts: dict[str, list[str]] = {}
     for replay, level in zip(found.replays, found.information.levels, strict=True):
         texts.setdefault(level_text(level, replay.record.unit, replay.record.noise.rms), []).append(replay.name)
@@ -334,7 +325,6 @@ def level_text(level: Level, unit: str, noise: float) -> str:
 
 
 def offer_text(found: Examination, offer: Offer) -> str:
-    """Return an offer in one line: "raise, empty, 24 V from 20 to -40 deg: n from 0.84 % to 0.11 %"."""
     i = offer.best
     before, after = (
         deviation_text(found.space, i, float(d[i]), float(found.x[i])) for d in (offer.before, offer.after)
@@ -354,7 +344,6 @@ def figures_of(found: Examination) -> dict[str, Callable[[], Any]]:
 
 
 def profile_figure(found: Examination) -> Any:
-    """Draw the rise of chi2 along each parameter, the 95 % threshold, the parabola, and the bounds of the box."""
     shown = found.profiles[:MOST_PANELS]
     columns = min(len(shown), 2 if len(shown) <= 4 else 3)
     rows = -(-len(shown) // columns)
@@ -408,7 +397,6 @@ def smooth(profile: Profile, factor: float) -> tuple[Array, Array]:
 
 
 def view(profile: Profile) -> tuple[float, float]:
-    """Return from where to where a profile is drawn: as far as its curve is within the panel."""
     inside = profile.values[profile.rise <= 1.2 * TOP]
     left, right = min(float(inside.min()), profile.low), max(float(inside.max()), profile.high)
     room = SIDE * (right - left) or 1e-3 * (profile.box[1] - profile.box[0])
@@ -483,5 +471,4 @@ def draw_sensitivities(axis: Any, found: Examination, i: int, jacobian: Array) -
 
 
 def title(found: Examination) -> str:
-    """Return campaign and model."""
     return f"{found.campaign.name}: {' + '.join([found.model.plant.name, *(e.name for e in found.model.effects)])}"

@@ -49,12 +49,11 @@ SHAPE_FALLS, NUMBERS_AGREE = 0.9, 0.95
 
 @dataclass(frozen=True)
 class Errors:
-    """Hold errors of one candidate on some records of one output.
+    """Errors of one candidate on some records of one output.
 
-    rmse: pooled over all samples [unit]; nrmse: each record divided by its rms; chi2_per_sample: mean of
-    (residual / noise)^2, None without noise; s, s1, s2: similarity degrees, mean weighted by duration of the records
-    where they are usable, NaN where they are in none. unit: of the output; span: from the smallest to the largest value
-    that was measured [unit].
+    rmse: pooled over all samples; nrmse: each record divided by its rms; chi2_per_sample: mean of (residual / noise)^2,
+    None without noise; s, s1, s2: similarity degrees, mean weighted by duration of the records where they are usable,
+    NaN where they are in none. span: from the smallest to the largest value that was measured.
     """
 
     rmse: float
@@ -69,7 +68,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class JointErrors(Errors):
-    """Hold errors of the plant's first output, NaN where no record holds it, beside those of each output.
+    """Errors of the plant's first output, NaN where no record holds it, beside those of each output.
 
     joint_nrmse: root of the mean square, over the outputs, of rmse over span.
     """
@@ -80,11 +79,10 @@ class JointErrors(Errors):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Result):
-    """Hold the result of one run; it prints itself, and has a table, figures and files.
+    """The result of one run; it prints itself, and has a table, figures and files.
 
     candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
-    (None without such records). trace: evaluations and best fitness at each improvement. suspicions: what a screen of
-    the records found.
+    (None without such records). trace: evaluations and best fitness at each improvement. suspicions: of a screen.
     """
 
     kind: ClassVar[Kind] = IDENTIFICATION
@@ -250,7 +248,6 @@ def versions_of(packages: Sequence[str]) -> dict[str, str]:
 
 
 def record_errors(replay: Replay, candidate: Array) -> Errors:
-    """Return the errors of one whole candidate on one record of one output, infinite where it diverged."""
     measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])
     square = float(mean_square(measured, simulated)[0])
     noise, interval = replay.record.noise.rms, replay.pieces[0].manoeuvre.interval
@@ -263,7 +260,6 @@ def record_errors(replay: Replay, candidate: Array) -> Errors:
 
 
 def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors | None:
-    """Return the joined errors of one whole candidate, None without records."""
     if not replays:
         return None
     plant = replays[0].model.plant
@@ -275,7 +271,6 @@ def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors 
 
 
 def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
-    """Return the joined errors of one whole candidate on records of one output."""
     each = [record_errors(r, candidate) for r in replays]
     n = np.array([r.record.n_samples for r in replays], dtype=float)
     duration = np.array([r.record.duration for r in replays])
@@ -298,8 +293,6 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
 
 
 def errors_entry(errors: Errors | None) -> dict[str, Any] | None:
-    """Return errors as JSON can hold them, null for what is not finite, None for none."""
-
     def without_nan(value: Any) -> Any:
         if isinstance(value, dict):
             return {k: without_nan(v) for k, v in value.items()}
@@ -316,7 +309,6 @@ def outputs_entry(replays: Sequence[Replay]) -> dict[str, dict[str, Any]]:
 
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:
-    """Return file -> errors of one whole candidate on the outputs that it holds."""
     files = dict.fromkeys(r.record.file for r in replays)
     found = {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
     return {file: errors for file, errors in found.items() if errors is not None}

@@ -50,13 +50,11 @@ LINE = 60
 
 
 def figures_of(found: Identification) -> dict[str, Callable[[], Any]]:
-    """Return name -> what draws a figure; nothing converges where nothing was searched."""
     convergence = {"convergence": lambda: convergence_figure(found)} if len(found.trace[0]) else {}
     return {"fit": lambda: fit_figure(found), **convergence}
 
 
 def fit_figure(found: Identification) -> Any:
-    """Draw measured and simulated signal of each record, the residual below."""
     replays = chosen(found)
     figure, axes = record_axes(len(replays), 4.4, (3, 1.4))
     for pair, replay in zip(axes, replays, strict=True):
@@ -158,16 +156,9 @@ MOST_NAMED = 6
 def identify_document(
     result: Mapping[str, Any], details: Mapping[str, Any], svgs: Mapping[str, str], again: str
 ) -> Document:
-    """Build the document of an identification from what is stored of it.
+    """Build the document of an identification from result.json and details.json, empty where there is none.
 
-    Parameters
-    ----------
-    result, details : dict
-        result.json and details.json (empty where an earlier version of armid wrote none).
-    svgs : dict
-        Name -> SVG of those of `FIGURES` that are stored.
-    again : str
-        The command that makes the page again.
+    svgs: name -> SVG of those of `FIGURES` that are stored. again: the command that makes the page again.
     """
     unit = result["unit"]
     parameters, errors = parameter_table(result), train_and_holdout(result)
@@ -204,7 +195,6 @@ def identify_document(
 
 
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return parameters, errors, and what stands against them."""
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
     first = f"{lead(free)}: {'; '.join(f'{name} = {held_text(p)}' for name, p in free.items())}."
     train, holdout = result["error"]["train"], result["error"]["holdout"]
@@ -227,7 +217,6 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
 
 
 def lead(free: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return whether the parameters were found, and whether their intervals hold."""
     doubts = {p.get("interval_doubt", "") for p in free.values()}
     if not any(doubts):
         return "Found, with 95 % intervals"
@@ -237,12 +226,10 @@ def lead(free: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def held_text(p: Mapping[str, Any]) -> str:
-    """Return a stored parameter, with its interval where it holds."""
     return value_text(p if p.get("interval_holds", True) else {**p, "low": None})
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
-    """Return the parameters: value, unit, 95 % interval, bounds, remark."""
     rows = []
     for name, p in result["parameters"].items():
         unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
@@ -349,7 +336,6 @@ def interval_doubts(found: Identification) -> dict[str, str]:
 
 
 def far_from_minimum(found: Identification) -> bool:
-    """Tell whether a least-squares step from here would be many standard deviations long."""
     return bool(np.nan_to_num(np.abs(found.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
 
 
@@ -398,15 +384,10 @@ def ranked(found: Identification) -> list[str]:
     if found.n_failed:
         said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
     return said + [
-        f"{r.name}: the engine is off by up to {engine_error_text(r)} even at its "
-        "finest steps: the equations are stiff there, or switch somewhere without a guard."
+        "{}: the engine is off by up to {:.2g} {} even at its finest steps: the equations are stiff there, or switch "
+        "somewhere without a guard.".format(r.name, *shown(r.engine_error, r.record.unit))
         for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)
     ]  # fmt: skip
-
-
-def engine_error_text(replay: Replay) -> str:
-    value, unit = shown(replay.engine_error, replay.record.unit)
-    return f"{value:.2g} {unit}"
 
 
 def bound_remark(found: Identification, i: int) -> str:
@@ -420,7 +401,6 @@ def bound_remark(found: Identification, i: int) -> str:
 
 
 def convergence_remarks(found: Identification) -> list[str]:
-    """Return what is to be said of a search that has not come to the minimum, or of one that does not carry over."""
     said = []
     if far_from_minimum(found):
         steps = np.abs(np.nan_to_num(found.information.step))
@@ -448,7 +428,6 @@ def noise_remarks(found: Identification) -> list[str]:
 
 
 def misfit_remarks(found: Identification) -> list[str]:
-    """Return on which records the residual is more than the noise, and what follows."""
     pairs = zip(judged_by(found.fitness, found.train_replays), found.information.levels, strict=True)
     above = [(level.rms / r.record.noise.rms if r.record.noise.rms else np.inf, r.name)
              for r, level in pairs if level.from_residual]  # fmt: skip

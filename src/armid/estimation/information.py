@@ -32,11 +32,10 @@ ASSUMED = 1e-3
 
 @dataclass(frozen=True)
 class Level:
-    """Say how far a record scatters about the model.
+    """How far a record scatters about the model.
 
     rms: [unit of the record]; effective_fraction: independent samples per sample; from_residual: the residual was far
-    above the noise, so that the residual itself, with its correlation in time, is what scatters; assumed: nothing was
-    measured, which reports say.
+    above the noise, so that it, with its correlation in time, is what scatters; assumed: nothing was measured.
     """
 
     rms: float
@@ -47,14 +46,12 @@ class Level:
 
 @dataclass(frozen=True)
 class Information:
-    """Hold what the records say about the free parameters at one candidate.
+    """What the records say about the free parameters at one candidate.
 
-    deviation: standard deviation of each, SI, infinite where the records do not determine it, shape (n_free,).
-    correlation: of the estimates, shape (n_free, n_free), NaN where not determined.
-    levels: of the records. step: how far a least-squares step inside the box would move each parameter, in standard
-    deviations, NaN where not determined: far above 1 where a search has not come to the minimum.
-    fisher: information matrix of the parameters in shares of their range, shape (n_free, n_free), weighed with 1 where
-    a record has no noise.
+    deviation: standard deviation of each, SI, (n_free,), infinite where the records do not determine it. correlation:
+    of the estimates, (n_free, n_free), NaN where not determined. step: how far a least-squares step inside the box
+    would move each parameter, in standard deviations: far above 1 where a search has not come to the minimum. fisher:
+    information matrix of the parameters in shares of their range, weighed with 1 where a record has no noise.
     """
 
     names: tuple[str, ...]
@@ -156,10 +153,7 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
 
 
 def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
-    """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,).
-
-    By central differences; nothing for a machine that starts from rest, or where the start is fitted.
-    """
+    """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,)."""
     candidate = records.space.complete(records.values(z)[np.newaxis])
     for outputs in by_file(records.replays):
         replay, row = outputs[0], 0
@@ -183,7 +177,6 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
 
 
 def inverse(matrix: Array) -> Array:
-    """Return the inverse of an information matrix, infinite variance for what it does not determine."""
     scale = np.sqrt(np.diag(matrix))
     seen = np.isfinite(scale) & (scale > 0.0)
     result = np.full(matrix.shape, np.nan)
@@ -213,11 +206,6 @@ def collinear(information: Information, above: float = 0.95) -> list[tuple[str, 
 
 
 def level_of(replay: Replay, space: Space, x: Array) -> Level:
-    """Return the measured noise of a record, or its residual where that is far above the noise.
-
-    A model that lacks something leaves a residual that is large and smooth; intervals from the noise alone would then
-    be too narrow by orders of magnitude.
-    """
     noise = replay.record.noise
     residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
     rms = float(np.sqrt(np.mean(residual**2)))
@@ -255,8 +243,7 @@ def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | 
     """Return the level of each record at a candidate: its noise, or its residual where that is far above the noise.
 
     Without noise there is nothing to weigh a change against: then white noise of 0.1 % of the record's rms speed is
-    assumed, and the level says so. noise: rms [unit of the record] to assume for every record in place of all that.
-    x: free parameters, SI, shape (n_free,).
+    assumed, and the level says so. noise: rms to assume for every record in place of all that.
     """
     if noise is not None:
         if len({r.place for r in replays}) > 1:

@@ -37,7 +37,6 @@ TOLERANCE = 1e-9
 
 
 def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
-    """Return which of the free parameters x (SI) lie on a bound, shape (n_free,)."""
     low, high = space.low[space.free], space.high[space.free]
     margin = AT_BOUND * (high - low)
     return np.asarray((x <= low + margin) | (x >= high - margin))
@@ -47,7 +46,7 @@ def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
 class LeastSquaresProblem:
     """Pose records and a model as min chi2(z), chi2 = |measured - signals(z)|^2 over the box 0 <= z <= 1.
 
-    replays: the records, ready to be simulated. space: the box, SI. A subclass says how signals are weighted.
+    A subclass says how signals are weighted.
     """
 
     replays: tuple[Replay, ...]
@@ -59,11 +58,9 @@ class LeastSquaresProblem:
 
     @property
     def span(self) -> Array:
-        """Range of the free parameters, SI, shape (n_free,)."""
         return self.space.high[self.space.free] - self.space.low[self.space.free]
 
     def shares(self, x: Array) -> Array:
-        """Return free parameters (SI) as shares of their range, shape (n_free,)."""
         return np.asarray((x - self.space.low[self.space.free]) / self.span)
 
     def values(self, z: Array) -> Array:
@@ -72,7 +69,6 @@ class LeastSquaresProblem:
         return np.clip(low + z * self.span, low, high)
 
     def weighted(self, signals: Sequence[Array]) -> Array:
-        """Return signals of all records, (..., n_samples of the record), in units of their noise, end to end."""
         raise NotImplementedError
 
     @cached_property
@@ -89,15 +85,13 @@ class LeastSquaresProblem:
         return np.asarray(self.measured - self.signals(np.atleast_2d(Z)))
 
     def chi2(self, Z: Array) -> Array:
-        """Return the sum of squares of candidates, (n_candidates,), infinite where one diverges."""
         total = np.sum(self.residuals(Z) ** 2, axis=1)
         return np.where(np.isfinite(total), total, np.inf)
 
     def residual_and_slopes(self, z: Array) -> tuple[Array, Array]:
         """Return the residual (n_samples,) and d signal / d z (n_samples, n_free), all in one population.
 
-        Central differences, their steps moved inside the box; where one side diverges the other stands alone, where
-        both do the slope is 0.
+        Where one side of a central difference diverges the other stands alone, where both do the slope is 0.
         """
         signals = self.signals(np.concatenate([z[np.newaxis], stencil(z)]))
         here, slopes, n = signals[0], slopes_of(signals[1:]), len(z)
@@ -123,15 +117,11 @@ def slopes_of(signals: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class WeightedRecords(LeastSquaresProblem):
-    """Weigh the records: chi2(z) = sum over records of weight^2 |residual|^2.
-
-    weights: [1/unit of the record], shape (n_records,).
-    """
+    """Weigh the records: chi2(z) = sum over records of weight^2 |residual|^2."""
 
     weights: tuple[float, ...]
 
     def weighted(self, signals: Sequence[Array]) -> Array:
-        """Return signals of all records, (..., n_samples of the record), weighted and end to end."""
         return np.concatenate([w * s for w, s in zip(self.weights, signals, strict=True)], axis=-1)
 
 
@@ -219,10 +209,7 @@ def estimate(replays: tuple[Replay, ...], space: Space, weights: Sequence[float]
 
 
 def with_fitted_starts(replays: tuple[Replay, ...], space: Space) -> tuple[Replay, ...]:
-    """Return replays whose pieces in motion start where the least-squares estimate starts them, others as they are.
-
-    Raises ArmidError when every candidate diverges.
-    """
+    """Return replays whose pieces in motion start where the least-squares estimate starts them, others as they are."""
     if not fits_starts(replays):
         return replays
     ready = with_starts(replays, likely_candidate(replays, space))
@@ -236,10 +223,7 @@ def with_fitted_starts(replays: tuple[Replay, ...], space: Space) -> tuple[Repla
 
 
 def fit(records: LeastSquaresProblem, z0: Array, tolerance: float = TOLERANCE) -> Array:
-    """Return the local least-squares estimate from a start, both as shares of the range.
-
-    Raises ArmidError when the start diverges.
-    """
+    """Return the local least-squares estimate from a start, both as shares of the range."""
     start = np.clip(z0, 0.0, 1.0)
     if not np.isfinite(records.chi2(start)[0]):
         raise ArmidError("a fit cannot start where the simulation diverges: another start is expected")
@@ -247,10 +231,7 @@ def fit(records: LeastSquaresProblem, z0: Array, tolerance: float = TOLERANCE) -
 
 
 def spread_starts(records: LeastSquaresProblem) -> list[Array]:
-    """Return from where to look for the estimate: the best 4 of 512 candidates of a Kronecker sequence over the box.
-
-    Raises ArmidError when every candidate diverges.
-    """
+    """Return from where to look for the estimate: the best 4 of 512 candidates of a Kronecker sequence over the box."""
     n = int(records.space.free.sum())
     spread = probes(np.zeros(n), np.ones(n), N_SPREAD)
     chi2 = records.chi2(spread)
@@ -272,7 +253,7 @@ REACH = 10.0
 
 @dataclass(eq=False)
 class Descent:
-    """Hold one start on its way down: shares of the range, residual there and its square, damping of the last step."""
+    """One start on its way down: shares of the range, residual there and its square, damping of the last step."""
 
     z: Array
     residual: Array
@@ -288,9 +269,8 @@ def descend(
     """Return the best of the least-squares estimates in the box from some starts that do not diverge, (n_free,).
 
     Levenberg-Marquardt with steps cut at the box, which hold what the box holds (More 1978, doi:10.1007/BFb0067700).
-    starts: shares of the range. tolerance: relative fall of chi2 in one step at which a start has arrived. central:
-    take slopes from central differences, at twice the price, for an estimate to the last digits. limit: chi2 that must
-    be in reach, see REACH; what gives up is where it was then.
+    tolerance: relative fall of chi2 in one step at which a start has arrived. central: take slopes from central
+    differences, at twice the price. limit: chi2 that must be in reach, see REACH; what gives up is where it was then.
     """
     first = np.clip(np.array(starts), 0.0, 1.0)
     paths = [Descent(z, r, float(r @ r)) for z, r in zip(first, records.residuals(first), strict=True)]
@@ -345,7 +325,6 @@ def step_in_box(square: Array, slope: Array, z: Array, damping: float) -> Array:
     """Return the candidate to which a damped step leads.
 
     A parameter that would leave the box stops on it, and the others make up for that.
-    square, slope: J^T J and J^T r with J = d signal / d z and r measured minus simulated.
     """
     scale = np.diag(square)
     damped = square + np.diag(damping * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
@@ -388,8 +367,7 @@ def forward_slopes(records: LeastSquaresProblem, paths: Sequence[Descent]) -> li
 def side_by_side(work: Callable[[S], T], items: Iterable[S], threads: int) -> list[T]:
     """Return the work of each item, in order; the same for any number of threads.
 
-    Fits of several candidates side by side keep two threads busier than the lanes of one fit do: measured on the arm,
-    1.7 of two against 1.3.
+    Fits of several candidates side by side keep two threads busier than the lanes of one fit do.
     """
     tasks = list(items)
     if threads < 2 or len(tasks) < 2:
@@ -400,10 +378,7 @@ def side_by_side(work: Callable[[S], T], items: Iterable[S], threads: int) -> li
 
 
 class Estimates:
-    """Keep estimates in a file as they are made, so that a second start of the same search goes on from them.
-
-    path: of the file, one estimate a line; made with the first.
-    """
+    """Keep estimates in a file, one a line, so that a second start of the same search goes on from them."""
 
     def __init__(self, path: Path) -> None:
         self.path, self._lock = path, Lock()

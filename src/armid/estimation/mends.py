@@ -42,13 +42,12 @@ TIMES = {
 
 @dataclass(frozen=True)
 class Suspicion:
-    """Hold one mistake that the records seem to contain.
+    """One mistake that the records seem to contain.
 
     kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "input", "bounds", "position",
     "noise", "rest", "twice" or "unlike". record: file, "" for every train record; other: the second of two files.
     factor: what the signal or the times are to be multiplied by, for "late" the seconds, for "zero" what is to be added
-    [rad], else NaN. before, after: rms error over rms of the signal, as declared and with the mistake undone, NaN where
-    nothing was simulated.
+    [rad], else NaN. before, after: rms error over rms of the signal, as declared and with the mistake undone.
     """
 
     kind: str
@@ -58,11 +57,6 @@ class Suspicion:
     factor: float = np.nan
     before: float = np.nan
     after: float = np.nan
-
-    @property
-    def improvement(self) -> float:
-        """By what factor the error falls when the mistake is undone."""
-        return self.before / self.after
 
 
 @dataclass(frozen=True)
@@ -201,7 +195,6 @@ def with_measured(record: Record, plant: Plant, measured: Mapping[str, Array], f
 
 
 def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[str, float]:
-    """Return the start constants of a piece; factor: see `with_measured`."""
     old = piece.manoeuvre.constants
     if plant.records_one_speed:
         return {n: factor * v for n, v in old.items() if n.startswith("start_")}

@@ -34,12 +34,12 @@ TOLERANCE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Hold the profile of one parameter.
+    """The profile of one parameter.
 
-    values: where it was held, SI, increasing, shape (n_points,). rise: chi2 above its minimum there, the other free
-    parameters fitted again, (n_points,). candidates: those fits, SI, (n_points, n_free). estimate: SI, where the rise
-    is 0. low, high: the 95 % interval, the end of the box where it is not bounded inside. bounded: on either side
-    inside the box. deviation: standard deviation by the curvature, SI, infinite where not determined. box: bounds, SI.
+    values: where it was held, SI, increasing, (n_points,). rise: chi2 above its minimum there, the other free
+    parameters fitted again. candidates: those fits, SI. estimate: SI, where the rise is 0. low, high: the 95 %
+    interval, the end of the box where it is not bounded inside. deviation: by the curvature, SI, infinite where not
+    determined.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Profile:
 
     @property
     def agrees(self) -> bool:
-        """Tell whether curvature and profile give the same interval, as far as it lies in the box."""
+        """Whether curvature and profile give the same interval, as far as it lies in the box."""
         half = NORMAL_95 * self.deviation
         if not np.isfinite(half):
             return not any(self.bounded)
@@ -72,7 +72,7 @@ class Profile:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Hold one point of a profile: place (share of the range), rise of chi2, whole candidate (shares)."""
+    """One point of a profile: place (share of the range), rise of chi2, whole candidate (shares)."""
 
     place: float
     rise: float
@@ -91,7 +91,7 @@ def profiles(records: LeastSquaresProblem, z: Array) -> tuple[Array, tuple[Profi
     """Return the least-squares minimum and the profile of each free parameter about it.
 
     Where a profile comes upon a lower minimum, all start again from there. records: weighted so that chi2 is that of
-    effective samples. z: a start, as shares of the range, shape (n_free,); the minimum is returned so, too.
+    effective samples. z: a start, as shares of the range; the minimum is returned so, too.
     """
     best = fit(records, z)
     for _ in range(MOST_RESTARTS):
@@ -109,9 +109,7 @@ def profile(records: LeastSquaresProblem, z: Array, i: int) -> Profile:
 
     rise(v) = min over the other free parameters of chi2, given that parameter i is v, minus chi2 at the minimum; the
     interval holds where rise < 3.84, the 95 % point of chi2 with one degree of freedom. Each point starts from the last
-    ones along the curve.
-    z: the minimum, as shares of the range, shape (n_free,). i: the place of the parameter.
-    Source: Raue et al. 2009, doi:10.1093/bioinformatics/btp358.
+    ones along the curve. Source: Raue et al. 2009, doi:10.1093/bioinformatics/btp358.
     """
     residual, slopes = records.residual_and_slopes(z)
     deviation = float(np.sqrt(inverse(slopes.T @ slopes)[i, i]))
@@ -155,8 +153,7 @@ def held_fit(records: LeastSquaresProblem, z: Array, i: int, least: float) -> He
 def walk(held: HeldFit, middle: Point, step: float) -> list[Point]:
     """Return points from the minimum outwards until the rise is well above the threshold, or the box ends.
 
-    step: the first, signed, share of the range; it grows where the profile is flatter than expected and shrinks where
-    it is steeper.
+    step: the first, signed; it grows where the profile is flatter than expected and shrinks where it is steeper.
     """
     points = [middle]
     edge = 1.0 if step > 0.0 else 0.0
@@ -198,7 +195,6 @@ def crossing(held: HeldFit, side: list[Point]) -> tuple[float | None, list[Point
 
 
 def secant(low: Point, high: Point) -> float:
-    """Return the place at which the straight line through two points comes to the threshold."""
     if not np.isfinite(high.rise):
         return 0.5 * (low.place + high.place)
     share = (float(np.sqrt(THRESHOLD)) - low.height) / (high.height - low.height)

@@ -55,23 +55,9 @@ RESTLESS, FEWEST_INDEPENDENT, LARGE_MEAN = 0.02, 12.0, 0.2
 
 
 def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, ...]:
-    """Look for mistakes in records: what the files show alone, then against the declared model.
+    """Look for mistakes in records: what the files show alone, then against the declared model; the plainest first.
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The records.
-    model : Model
-        The declared model.
-    space : Space
-        The box of its parameters.
-
-    Returns
-    -------
-    tuple of Suspicion
-        What should be looked at, the plainest first; empty where all is as declared.
     """
     seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
     seen += list(given_twice(campaign.records))
@@ -107,7 +93,6 @@ class Trial:
         return WeightedRecords(ready, self.space, tuple(1.0 / max(float(np.linalg.norm(x)), 1e-300) for x in moved))
 
     def scaled(self, records: Sequence[Record]) -> "Trial":
-        """Return the trial with the scales that other records show, on which the declared bounds depend."""
         if not self.model.plant.scales_from_records:
             return self
         model = replace(self.model, plant=scaled_plant(self.model.plant, records, ""))
@@ -117,10 +102,7 @@ class Trial:
         return Trial(model, replace(self.space, **kept))
 
     def errors(self, records: Sequence[Record], Z: Array) -> Array:
-        """Return the error of each record at candidates in shares, (n_candidates, n_records), inf where it diverges.
-
-        Of a file with several outputs it is the root of the mean square of theirs.
-        """
+        """Return the error of each record at candidates in shares, (n_candidates, n_records), inf where it diverges."""
         problem, Z = self.problem(records), np.atleast_2d(Z)
         signals = signals_of(problem.replays, self.space.complete(problem.values(Z)))
         squares = [np.sum((w * (signal - r.measured)) ** 2, axis=1)
@@ -137,10 +119,7 @@ class Trial:
         return spread
 
     def thinned(self, record: Record, n_records: int) -> Record:
-        """Return a long record with no more samples than it takes to see how candidates move.
-
-        Every so many-th sample is kept, as long as a simulation from one to the next is that of all samples.
-        """
+        """Return a long record with no more samples than it takes to see how candidates move: every so many-th."""
         step = record.n_samples // most_samples(n_records)
         if step < 2 or len(record.pieces) > 1 or record.pieces[0].start_index:
             return record
@@ -156,26 +135,20 @@ class Trial:
         return record
 
     def signals(self, record: Record, Z: Array) -> list[Array]:
-        """Return each output of a file at candidates in shares, (n_candidates, n_samples), 0 where one diverges."""
         problem = self.problem([record])
         return [np.nan_to_num(x) for x in signals_of(problem.replays, self.space.complete(problem.values(Z)))]
 
     def likeness(self, record: Record) -> float:
-        """Return the largest cosine, either sign, between what was measured and what candidates do."""
         problem, Z = self.problem([record]), self.spread([record])
         signals = problem.signals(Z)
         products, sizes = signals @ problem.measured, np.linalg.norm(signals, axis=1)
         return float(np.nanmax(np.abs(products) / np.maximum(sizes, 1e-300), initial=0.0))
 
     def mends(self, record: Record, Z: Array) -> Iterator[Mend]:
-        """Yield what may be undone in a record; Z: candidates in shares at which its clock is looked at."""
         return mends(self.model.plant, record, self.shift(record, Z))
 
     def shift(self, record: Record, Z: Array) -> int:
-        """Return by how many samples the first piece comes too late, 0 where no shift makes it more like a simulation.
-
-        The largest cosine between measured and simulated signal over candidates and shifts, by cross-correlation.
-        """
+        """Return by how many samples the first piece comes too late, 0 where no shift makes it more alike."""
         piece = record.pieces[0]
         x, n = piece.measured[piece.window], piece.n_samples
         problem = self.problem([replace(record, pieces=(piece,), others=())])
@@ -214,7 +187,6 @@ class Trial:
 
 
 def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Array]:
-    """Return what is wrong with the train records, and the candidate that fits those that are right."""
     z, before = trial.fit(train)
     if trial.errors(train, z).max() <= TOLERABLE:
         return [], z
@@ -255,7 +227,6 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
     """Return the mistake in one of few records, or the exchange of two, with which the model fits all of them well.
 
     Of two or three records no majority says which are right: each mend of each is fitted together with the others.
-    below: see `Trial.fit`.
     """
     if not 1 < len(train) <= FEW:
         return []
@@ -356,7 +327,6 @@ def told_as(other: Record) -> Mend:
 
 
 def driven_as(piece: Piece, constants: Mapping[str, float], inputs: Mapping[str, Array]) -> Piece:
-    """Return a piece with the constants and inputs of another, as long as both last."""
     told = with_constants(piece, constants)
     n = min([piece.window.stop, *map(len, inputs.values())])
     shorter = replace(told, window=slice(piece.window.start, n)).until_window_end()
@@ -448,8 +418,7 @@ def of_position(record: Record) -> Iterator[Suspicion]:
 def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
     """Yield the pairs of records, no repeats of each other, that hold the same samples: one recording given twice.
 
-    Compared are fingerprints of `ALIKE` successive samples in the windows, where these take enough different values.
-    Simulations without noise may well agree.
+    Compared are fingerprints of `ALIKE` successive samples; simulations without noise may well agree.
     """
     records = [r for r in records if not r.is_noise_free]
     if len(records) < 2:

@@ -89,10 +89,7 @@ class SimulatedCampaign(Shown):
 
 
 def candidate_of(model: Model, campaign: Campaign, given: Mapping[str, float]) -> Array:
-    """Return the whole candidate: given values, then what the campaign fixes, then nominal and null values.
-
-    Raises ArmidError for an unknown name, a value that is not finite, and a parameter without any value.
-    """
+    """Return the whole candidate: given values, then what the campaign fixes, then nominal and null values."""
     for name, value in given.items():
         if name not in model.parameters:
             raise ArmidError(f"--set: parameter '{name}' is not in the model: {nearest(name, model.parameters)}")

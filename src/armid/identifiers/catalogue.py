@@ -45,11 +45,7 @@ def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
 
 
 def swarm(budget: int, **options: Any) -> PaperPSO:
-    """Return the paper's swarm with its inertia schedule stretched over the budget.
-
-    budget: number of simulations; below 80 the swarm has that many particles. options: of PaperPSO.
-    Raises ArmidError unless the budget is above 0, and for an unknown option.
-    """
+    """Return the paper's swarm with its inertia schedule stretched over the budget, below 80 with as many particles."""
     budget = checked_count("the budget", budget)
     n_particles = checked_population("n_particles", options.pop("n_particles", min(80, budget)))
     return PaperPSO(**({"n_particles": n_particles, "n_iterations": -(-budget // n_particles)} | options))
@@ -115,7 +111,6 @@ def options_of(identifier: Identifier) -> dict[str, dict[str, Any]]:
 
 
 def defaults_in(function: Any) -> dict[str, Any]:
-    """Return name -> default of the arguments of a function that have one."""
     empty = inspect.Parameter.empty
     parameters = inspect.signature(function).parameters.values()
     return {p.name: p.default for p in parameters if p.default is not empty}

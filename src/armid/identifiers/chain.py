@@ -24,7 +24,6 @@ def chain_of(phases: Sequence[Identifier]) -> Identifier:
 
     Option `share`: of the budget for each phase but the last, "0.5" or "0.5:0.3"; without it each phase has half of
     what is left. Options of a phase carry its name, as in `pso.velocity_limit`.
-    Raises ArmidError for a global one after the first.
     """
     for phase in phases[1:]:
         if phase.is_global and not phase.name.startswith("multistart:"):
@@ -39,7 +38,6 @@ def chain_of(phases: Sequence[Identifier]) -> Identifier:
 
 
 def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> SearchAlgorithm:
-    """Build the algorithm; refuse with ArmidError unknown options, bad shares, and a later phase without a start."""
     told = of_phases(options, phases, ("share",), f"'{'+'.join(phase.name for phase in phases)}'")
     shares = shares_of(options.get("share"), len(phases))
     builds = [partial(phase.build, max(1, round(share * budget))) for phase, share in zip(told, shares, strict=True)]
@@ -51,10 +49,6 @@ def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> 
 
 
 def shares_of(given: Any, n_phases: int) -> list[float]:
-    """Return the share of the budget of each phase, the last gets the rest.
-
-    Raises ArmidError for another number of shares than phases but one, and for shares that leave the last nothing.
-    """
     if given is None:
         shares = [0.5**phase for phase in range(1, n_phases)]
     else:
@@ -67,7 +61,6 @@ def shares_of(given: Any, n_phases: int) -> list[float]:
 
 
 def as_number(part: Any) -> Any:
-    """Return a text as a number where it is one."""
     try:
         return float(part) if isinstance(part, str) else part
     except ValueError:
@@ -129,18 +122,13 @@ class Seen:
         return True
 
     def see(self, X: Array, told: Told) -> Told:
-        """Count candidates and keep the best; return what was told of them."""
         self.used += len(X)
         self.best.see(X, told.F)
         return told
 
 
 def multistart_of(local: Identifier) -> Identifier:
-    """Return the identifier that starts a local one from points spread over the box until the budget is used.
-
-    Options of the local one carry its name, as in `bobyqa.tolerance`.
-    Raises ArmidError for a global one.
-    """
+    """Return the identifier that starts a local one, whose options carry its name, from points spread over the box."""
     if local.is_global:
         raise ArmidError(f"identifier '{local.name}' is global, {PREFIX} expects a local one")
     return Identifier(
@@ -150,7 +138,6 @@ def multistart_of(local: Identifier) -> Identifier:
 
 
 def built_multistart(local: Identifier, budget: int, **options: Any) -> SearchAlgorithm:
-    """Build the algorithm; refuse with ArmidError a local one that takes no start, and options that nobody knows."""
     (told,) = of_phases(options, (local,), (), f"'{PREFIX}{local.name}'")
     build = partial(told.build, budget)
     algorithm = build()
@@ -184,12 +171,10 @@ def spread(random: np.random.Generator, n: int) -> Iterator[Array]:
 def of_phases(
     options: Mapping[str, Any], phases: Sequence[Identifier], own: Sequence[str], whose: str
 ) -> tuple[Identifier, ...]:
-    """Return the phases with their options: NAME.OPTION belongs to each phase of that name.
-
-    own: options of the whole, which are passed over; whose: how a message names the whole.
-    Raises ArmidError for an option of no phase; what a phase does not know it refuses itself when it is built.
-    """
-    named: dict[str, dict[str, Any]] = {simple_name(phase): {} for phase in phases}
+    """Return the phases with their options: NAME.OPTION belongs to each of that name; own: those of the whole."""
+    # of a multistart the name of the local one
+    names = [phase.name.rpartition(":")[2] for phase in phases]
+    named: dict[str, dict[str, Any]] = {name: {} for name in names}
     for key, value in options.items():
         name, dot, option = key.partition(".")
         if dot and name in named:
@@ -197,15 +182,8 @@ def of_phases(
         elif key not in own:
             known = [*own, *(f"{phase}.{option or key}" for phase in named)]
             raise ArmidError(f"{whose} has no option '{key}', {nearest(key, known)}")
-    return tuple(phase.with_options(told(phase, named[simple_name(phase)])) for phase in phases)
-
-
-def simple_name(phase: Identifier) -> str:
-    """Return the name by which options call a phase: that of the local one for a multistart."""
-    return phase.name.rpartition(":")[2]
-
-
-def told(phase: Identifier, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options as the phase itself wants them: a multistart passes them on by name."""
-    prefix = f"{simple_name(phase)}." if phase.name != simple_name(phase) else ""
-    return {f"{prefix}{option}": value for option, value in options.items()}
+    return tuple(
+        # a multistart passes options on by name
+        phase.with_options(named[n] if phase.name == n else {f"{n}.{option}": v for option, v in named[n].items()})
+        for phase, n in zip(phases, names, strict=True)
+    )

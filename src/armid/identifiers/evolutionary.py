@@ -32,7 +32,6 @@ VARIANT = re.compile(r"DE/(rand|best|target-to-best)/[12]/(bin|exp|hypercube|lin
 
 
 def checked_variant(name: str, value: Any) -> str:
-    """Return a scheme of differential evolution; refuse with ArmidError what is none."""
     if not isinstance(value, str) or not VARIANT.fullmatch(value):
         raise ArmidError(f"{name} is {value!r}, expected DE/rand|best|target-to-best/1|2/bin|exp|hypercube|line")
     return value
@@ -40,10 +39,7 @@ def checked_variant(name: str, value: Any) -> str:
 
 @dataclass(frozen=True, eq=False)
 class PymooAlgorithm:
-    """Declare an algorithm of pymoo: where it stands, how many individuals it has, and the options that it may get.
-
-    options: option, as pymoo calls it -> check of its value; pymoo would swallow any other.
-    """
+    """An algorithm of pymoo, its default population, and its options with checks: it would swallow any other."""
 
     name: str
     note: str
@@ -52,7 +48,7 @@ class PymooAlgorithm:
     options: Mapping[str, Check]
 
     def __call__(self, budget: int, **options: Any) -> Algorithm:
-        """Return the algorithm; refuse with ArmidError options that pymoo would swallow, and bad values."""
+        """Return the algorithm; refuse options that pymoo would swallow, and bad values."""
         checked_count("the budget", budget)
         refuse_unknown(options, self.options, f"'{self.name}'")
         given = {"pop_size": self.pop_size} | options
@@ -103,7 +99,6 @@ class Cmaes(DeclaredSearch):
         checked("growth", self.growth, 1.0, "a number of at least 1")
 
     def search(self, task: SearchTask) -> Search:
-        """Search from start to start, each until CMA-ES finds nothing more from it."""
         from cma import CMAEvolutionStrategy
 
         def normal(*shape: int) -> Array:
@@ -172,7 +167,6 @@ class UniformSearch(DeclaredSearch):
         checked_population("n_candidates", self.n_candidates)
 
     def search(self, task: SearchTask) -> Search:
-        """Draw for ever."""
         cube = task.cube
         while True:
             yield Ask(cube.candidates(task.random.random((self.n_candidates, cube.n))))
@@ -180,16 +174,12 @@ class UniformSearch(DeclaredSearch):
 
 @dataclass(frozen=True)
 class SobolSearch(UniformSearch):
-    """Draw scrambled Sobol points and learn nothing (Owen 1998, doi:10.1006/jcom.1998.0487).
-
-    n_candidates: drawn at a time, a power of 2 for even points.
-    """
+    """Draw scrambled Sobol points, a power of 2 at a time (Owen 1998, doi:10.1006/jcom.1998.0487)."""
 
     name, note = "sobol", "scrambled Sobol points (scipy), to compare with"
     n_candidates: int = 64
 
     def search(self, task: SearchTask) -> Search:
-        """Draw for ever."""
         from scipy.stats import qmc
 
         points = qmc.Sobol(task.cube.n, rng=task.random)

@@ -95,13 +95,11 @@ def tpe(
 
 
 def needing(package: str, search: Callable[..., Any], note: str) -> Identifier:
-    """Return the identifier of a search that needs a package beside armid's own."""
     made = as_identifier(search.__name__, search)
     return replace(made, build=partial(built_with, package, made), note=note, package=package)
 
 
 def built_with(package: str, identifier: Identifier, budget: int, **options: Any) -> SearchAlgorithm:
-    """Return the algorithm; refuse with ArmidError a package that is missing, and what the search refuses."""
     if find_spec(package) is None:
         raise ArmidError(f"identifier '{identifier.name}' needs the package {package}, which is not installed: "
                          "pip install 'armid[suite]' is expected")  # fmt: skip

@@ -71,7 +71,6 @@ class Identifier:
 
 
 def accepts(function: Callable[..., Any], *arguments: object, **named: object) -> bool:
-    """Say whether a function can be called with such arguments."""
     try:
         inspect.signature(function).bind(*arguments, **named)
     except (TypeError, ValueError):
@@ -80,10 +79,7 @@ def accepts(function: Callable[..., Any], *arguments: object, **named: object) -
 
 
 def refuse_unknown(given: Iterable[str], known: Iterable[str], whose: str, unsaid: Iterable[str] = ()) -> None:
-    """Raise ArmidError for an option that nobody knows, naming the nearest that is known.
-
-    unsaid: options that are known too, and are named only where they are near.
-    """
+    """Refuse an unknown option with the nearest known one; unsaid: those that are named only where near."""
     names, further = list(known), list(unsaid)
     for name in given:
         if name not in (*names, *further):
@@ -99,7 +95,6 @@ def checked(name: str, value: Any, least: float = 0.0, expected: str = "a number
 
 
 def checked_share(name: str, value: Any, most: float = 1.0) -> float:
-    """Return an option as a float; refuse with ArmidError what is not above 0 or too small to count, or too large."""
     expected = f"a number above 0 and at most {most:g}"
     share = checked(name, value, SMALLEST_SHARE, expected)
     if share > most:
@@ -108,7 +103,6 @@ def checked_share(name: str, value: Any, most: float = 1.0) -> float:
 
 
 def checked_count(name: str, value: Any, most: int = LARGEST_COUNT) -> int:
-    """Return an option as an int; refuse with ArmidError what is no whole number above 0, or above the most."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise ArmidError(f"{name} is {value!r}, expected a whole number above 0")
     if value > most:
@@ -117,19 +111,16 @@ def checked_count(name: str, value: Any, most: int = LARGEST_COUNT) -> int:
 
 
 def checked_population(name: str, value: Any) -> int:
-    """Return a number of candidates at a time as an int; refuse with ArmidError what could not be kept."""
     return checked_count(name, value, LARGEST_POPULATION)
 
 
 def checked_flag(name: str, value: Any) -> bool:
-    """Return an option as it is; refuse with ArmidError what is neither true nor false."""
     if not isinstance(value, bool | np.bool_):
         raise ArmidError(f"{name} is {value!r}, expected true or false")
     return bool(value)
 
 
 def checked_choice(name: str, value: Any, known: tuple[str, ...]) -> str:
-    """Return an option as it is; refuse with ArmidError what is none of the known words."""
     if value not in known:
         raise ArmidError(f"{name} is {value!r}, {nearest(str(value), known)}")
     return str(value)

@@ -36,12 +36,10 @@ class LeastSquares(DeclaredSearch):
         checked("tolerance", self.tolerance, 1e-15, "a number of at least 1e-15")
 
     def search(self, task: SearchTask) -> Search:
-        """Search from the task's start; the evaluated candidates are the result."""
         cube = task.cube
         return local_search(task, lambda ask, start: self.descend(cube, ask, start))
 
     def descend(self, cube: Cube, ask: Asker, start: Array) -> None:
-        """Minimise from a point of the unit cube."""
         from scipy.optimize import least_squares
 
         residual = Residual(self, cube, ask)
@@ -73,7 +71,6 @@ class Residual:
         return self.here
 
     def derivative(self, u: Array) -> Array:
-        """Return the derivatives of the residual at a point, (n_total, n_parameters)."""
         assert self.here is not None
         beside = stencil(u, self.options.step, self.options.differences)
         told = self.ask(self.cube.candidates(beside.points), residuals=True)
@@ -84,11 +81,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Stencil:
-    """Hold the points beside u, (n,), at which each parameter is perturbed alone.
-
-    points: (n or 2 n, n); offsets: how far each is from u along its parameter, (n or 2 n,); the first n are one side
-    of each parameter, the next n the other.
-    """
+    """The points beside u at which each parameter is perturbed alone, one side first, and how far each is from u."""
 
     points: Array
     offsets: Array
@@ -114,10 +107,8 @@ def stencil(u: Array, step: float, kind: str) -> Stencil:
 
 
 def slopes(stencil: Stencil, here: Array, there: Array) -> Array:
-    """Return derivatives with respect to the parameters, (n, m).
+    """Return derivatives with respect to the parameters, (n, m); where a side failed the other serves, else 0.
 
-    here: m values at u, (m,); there: at the stencil's points, (n or 2 n, m), rows with no finite number where a
-    simulation failed: the other side serves then, and where both failed the derivative is 0.
     With offsets a, b: f' = (d_a b/a - d_b a/b)/(b - a), second order for any a, b; (f(u + a) - f(u))/a for one of them.
     """
     with np.errstate(invalid="ignore"):

@@ -60,9 +60,10 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     if isinstance(obj, Algorithm):
         raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} built already, {expected}")
     if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
-        return Identifier(name, partial(without_budget, obj), "a class of the user")
+        return Identifier(name, lambda budget: obj(), "a class of the user")
     if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
-        refuse_unknown(needed(obj), SEARCH_ARGUMENTS, f"what is given to a search such as '{name}'")
+        needed = [argument for argument, p in arguments_of(obj).items() if p.default is p.empty]
+        refuse_unknown(needed, SEARCH_ARGUMENTS, f"what is given to a search such as '{name}'")
         return Identifier(name, partial(searching, name, obj), "a search of the user",
                           is_global="start" not in arguments_of(obj))  # fmt: skip
     if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
@@ -70,13 +71,7 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
 
 
-def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
-    """Return a fresh algorithm of a class, which is not told its budget."""
-    return algorithm()
-
-
 def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:
-    """Return what a user's function makes; refuse with ArmidError anything but an algorithm."""
     algorithm = factory(budget)
     if not isinstance(algorithm, Algorithm):
         raise ArmidError(f"identifier '{name}' returned a {type(algorithm).__name__}, expected an Algorithm of pymoo")
@@ -88,11 +83,6 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
         return dict(inspect.signature(function).parameters)
     except (TypeError, ValueError):
         return {}
-
-
-def needed(function: Callable[..., Any]) -> list[str]:
-    """Return the arguments that have no default."""
-    return [name for name, p in arguments_of(function).items() if p.default is p.empty]
 
 
 def searching(name: str, function: Callable[..., Any], budget: int, **options: Any) -> SearchAlgorithm:
@@ -135,7 +125,6 @@ class Value:
         self.least, self.most = np.inf, -np.inf
 
     def __call__(self, x: ArrayLike) -> float | Array:
-        """Return the fitness of a candidate, (n_parameters,), or of several, (n_candidates, n_parameters)."""
         if self.error is not None:
             raise self.error
         asked = np.asarray(x, dtype=np.float64)

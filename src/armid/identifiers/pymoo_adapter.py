@@ -37,12 +37,10 @@ PLAIN = ["F", "G", "H"]
 class SearchAlgorithm(Algorithm):  # type: ignore[misc]
     """Ask and tell a search as pymoo expects it of an algorithm; what the search asks for at once is one generation.
 
-    method: makes the search; budget: simulations after which the run ends when no termination is given.
-    of_pymoo: options of pymoo's Algorithm, such as termination, callback, seed.
-    All that is random comes from `random_state`. Only the evaluator evaluates. `opt` is the best candidate so far.
-    A search that comes to its own end ends the run. It is closed when the run ends, fails or is dropped.
-    Raises ArmidError for an unknown option, and in `setup` for a problem that has no finite box, has constraints or
-    has several objectives.
+    method: makes the search; budget: simulations after which the run ends when no termination is given. of_pymoo:
+    options of pymoo's Algorithm, such as termination, callback, seed. All that is random comes from `random_state`.
+    `opt` is the best candidate so far. A search that comes to its own end ends the run. It is closed when the run ends,
+    fails or is dropped.
     """
 
     def __init__(self, method: Method, budget: int, **of_pymoo: Any) -> None:
@@ -71,7 +69,6 @@ class SearchAlgorithm(Algorithm):  # type: ignore[misc]
             raise
 
     def infill(self) -> Population:
-        """Propose what the search asks for."""
         if self.problem is None:
             raise ArmidError("the search has no problem yet, expected a call of setup(problem) first")
         if not self.is_initialized:
@@ -106,10 +103,7 @@ class SearchAlgorithm(Algorithm):  # type: ignore[misc]
         """Leave `opt` as `_advance` has set it."""
 
     def _told(self, infills: Population | None) -> Told:
-        """Read what was evaluated; a failed candidate gets +inf.
-
-        Residual vectors are taken off the individuals: kept there they would fill the memory.
-        """
+        """Read what was evaluated; a failed candidate gets +inf. Kept residual vectors would fill the memory."""
         n = 0 if infills is None else len(infills)
         assert self._asked is not None
         if n != len(self._asked.X) or infills is None:
@@ -151,7 +145,6 @@ class DeclaredSearch(ABC):
 
     @classmethod
     def identifier(cls) -> Identifier:
-        """Return the identifier of the search, as an algorithm of pymoo."""
         return Identifier(
             cls.name, partial(built_search, cls), cls.note, is_global=cls.is_global, uses_gradient=cls.uses_gradient,
             needs_residuals=cls.needs_residuals,
@@ -159,16 +152,12 @@ class DeclaredSearch(ABC):
 
 
 def built_search(kind: type[DeclaredSearch], budget: int, **options: Any) -> SearchAlgorithm:
-    """Return a search as an algorithm; refuse with ArmidError an unknown option and a bad value."""
     refuse_unknown(options, [f.name for f in fields(kind)], f"'{kind.name}'")
     return SearchAlgorithm(kind(**options).search, budget)
 
 
 def search_of(algorithm: Algorithm, task: SearchTask) -> Search:
-    """Return the search that a fresh algorithm makes of a task.
-
-    Raises ArmidError when the task has a start and the algorithm takes none.
-    """
+    """Return the search that a fresh algorithm makes of a task; refuse a start that it does not take."""
     if isinstance(algorithm, SearchAlgorithm):
         return algorithm.method(task)
     if task.start is not None:
@@ -182,7 +171,6 @@ def search_of(algorithm: Algorithm, task: SearchTask) -> Search:
 
 
 def takes_start(algorithm: Algorithm) -> bool:
-    """Tell whether an algorithm can be told where to start: pymoo's local ones can, and whatever has an `x0`."""
     return isinstance(algorithm, SearchAlgorithm | LocalSearch) or hasattr(algorithm, "x0")
 
 
@@ -213,9 +201,8 @@ def can_run_directly(algorithm: Algorithm) -> TypeGuard[SearchAlgorithm]:
 def run_directly(algorithm: SearchAlgorithm, problem: Metered, seed: int, is_over: Callable[[], bool]) -> None:
     """Run a search to its end, or until it is over; the problem's meter keeps what it found.
 
-    Asks for the same candidates in the same order as pymoo's `minimize` with this seed, bit for bit.
-    is_over: called after each evaluation of what was asked for at once, which is a generation of pymoo.
-    Raises ArmidError for a problem that has no finite box.
+    Asks for the same candidates in the same order as pymoo's `minimize` with this seed, bit for bit. is_over: called
+    after each evaluation of what was asked for at once, which is a generation of pymoo.
     """
     bounds_of(problem)
 

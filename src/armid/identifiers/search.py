@@ -43,8 +43,6 @@ class Told(NamedTuple):
 
 
 class Asker(Protocol):
-    """What a routine calls for values."""
-
     def __call__(self, X: Array, residuals: bool = False) -> Told:
         """Return what the candidates X, (n, n_parameters), are worth."""
 
@@ -59,10 +57,10 @@ class NoFitnessError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class SearchTask:
-    """Hold what a search works on: the problem, everything random, and where to start (None: wherever it likes).
+    """What a search works on: the problem, everything random, and where to start (None: wherever it likes).
 
-    ask: answers at once where whoever runs the search lets it, and raises Dropped at the end of the run; a routine
-    that calls for values then needs no thread. None: a search has to yield what it asks for. It may do so in any case.
+    ask: answers at once where whoever runs the search lets it, and raises Dropped at the end of the run; a routine that
+    calls for values then needs no thread. None: a search has to yield what it asks for. It may do so in any case.
     """
 
     problem: Problem
@@ -71,12 +69,10 @@ class SearchTask:
     ask: Asker | None = None
 
     def at(self, start: Array | None) -> "SearchTask":
-        """Return the task with another start, (n_parameters,)."""
         return replace(self, start=start)
 
     @property
     def cube(self) -> "Cube":
-        """The unit cube in which local searches work."""
         return Cube(*bounds_of(self.problem))
 
 
@@ -89,7 +85,6 @@ class Cube:
 
     @property
     def n(self) -> int:
-        """Number of parameters."""
         return len(self.low)
 
     def candidates(self, u: Array) -> Array:
@@ -98,13 +93,11 @@ class Cube:
         return np.asarray(np.minimum(np.maximum(x, self.low), self.high))
 
     def point(self, x: Array) -> Array:
-        """Return a candidate of the box as a point of the unit cube, (n_parameters,)."""
         span = self.high - self.low
         u = np.divide(x - self.low, span, out=np.full(len(span), 0.5), where=span > 0.0)
         return np.asarray(np.minimum(np.maximum(u, 0.0), 1.0))
 
     def drawn(self, random: np.random.Generator) -> Array:
-        """Return a uniform random point of the unit cube."""
         return random.random(self.n)
 
 
@@ -115,14 +108,11 @@ Routine = Callable[[Asker], bool]
 
 
 class Best:
-    """Remember the best candidate of a search."""
-
     def __init__(self) -> None:
         self.x: Array | None = None
         self.f = np.inf
 
     def see(self, X: Array, F: Array) -> None:
-        """Look at candidates (n, n_parameters) and their fitness (n,)."""
         i = int(np.argmin(F))
         if F[i] < self.f:
             self.x, self.f = X[i].copy(), float(F[i])
@@ -131,8 +121,7 @@ class Best:
 def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> Search:
     """Run a routine from the task's start, or from points drawn in the box until one of them has a fitness.
 
-    routine: takes what it asks and its start in the unit cube, (n_parameters,), pulled inside by 0.1 % of the range
-    where it sits on a bound. It runs at once where the task answers at once, else in a thread.
+    It runs at once where the task answers at once, else in a thread.
     """
     cube = task.cube
     start = cube.drawn(task.random) if task.start is None else cube.point(task.start)
@@ -150,15 +139,14 @@ def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> S
 
 
 def pulled(u: Array) -> Array:
-    """Return a point of the unit cube pulled inside by 0.1 % of the range where it sits on a bound."""
     return np.asarray(np.minimum(np.maximum(u, PULLED), 1.0 - PULLED))
 
 
 class Height:
     """Turn fitness values into heights of about 1, and give what failed a height above all that was seen.
 
-    Line searches expect a scale of 1, and a likelihood may be of any. A failure that is much higher than everything
-    else would distort every model that a search fits through it.
+    Line searches expect a scale of 1. A failure that is much higher than everything else would distort every model that
+    a search fits through it.
     """
 
     def __init__(self) -> None:
@@ -166,10 +154,7 @@ class Height:
         self.lowest, self.highest = inf, -inf
 
     def of(self, f: float) -> float:
-        """Return the height of a fitness.
-
-        Raises NoFitnessError while none has been finite: there is nothing to start from.
-        """
+        """Return the height of a fitness; NoFitnessError while none has been finite."""
         if isfinite(f):
             self.scale = self.scale or abs(f) or 1.0
             height = f / self.scale
@@ -202,7 +187,6 @@ class SearchThread:
 def in_thread(routine: Routine) -> Search:
     """Run a routine in a thread that moves only while the search waits for its next question.
 
-    routine: takes a function that evaluates candidates and returns whether any of them has a fitness.
     The thread ends with the routine, and when the search is closed or dropped or the interpreter exits.
     """
     line = SearchThread(routine)

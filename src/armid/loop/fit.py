@@ -31,6 +31,8 @@ ONLY_NOISE = 0.01
 OPEN = 0.05
 # Chance at which noise alone gets an effect added, all candidates together.
 FAMILYWISE = 1e-3
+# A change of n_eff ln(chi2) that no comparison of two models tells from none.
+UNTOLD = 0.5
 # A residual of so many times the noise is the model's: then prediction decides and not significance.
 DWARFED = 10.0
 
@@ -208,14 +210,18 @@ def with_standard_accuracy(fit: Fit) -> Fit:
     return replace(fit_from(replace(records, replays=replays), fit.active, [fit.z]), constants=fit.constants)
 
 
-def with_own_starts(fit: Fit) -> Fit:
-    """Return a fit about the starts that fit it best, where starts of records are fitted (see problem/starts.py)."""
+def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
+    """Return a fit about the starts that fit it best, where starts of records are fitted (see problem/starts.py).
+
+    roughly: only as far as a comparison of models can tell, see UNTOLD.
+    """
     if not fits_starts(fit.records.replays):
         return fit
     for _ in range(MOST_ROUNDS):
         last, records = fit, replace(fit.records, replays=with_starts(fit.records.replays, fit.candidate))
-        fit = replace(fit_from(records, fit.active, [fit.z]), constants=fit.constants)
-        if np.all(np.abs(fit.z - last.z) <= SETTLED) or abs(last.chi2 - fit.chi2) <= SETTLED * fit.chi2:
+        fit = replace(fit_from(records, fit.active, [fit.z], rough=roughly), constants=fit.constants, rough=False)
+        untold = UNTOLD / fit.independent if roughly else 0.0
+        if np.all(np.abs(fit.z - last.z) <= SETTLED) or abs(last.chi2 / fit.chi2 - 1.0) <= max(SETTLED, untold):
             break
     return fit
 

@@ -329,7 +329,7 @@ def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
 def accurate(fit: Fit, library: Library) -> Fit:
     """Return the fit about its own starts, with finer steps where it ended where the engine's are too coarse."""
     finer = library.recalibrated(fit.active, fit.values, fit.misfit)
-    return with_own_starts(fit if finer is None else fit_from(finer, fit.active, [fit.z]))
+    return with_own_starts(fit if finer is None else fit_from(finer, fit.active, [fit.z]), roughly=True)
 
 
 # Shares of their range from which all shapes begin; then each alone from the best of so many places along its range:

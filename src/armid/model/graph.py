@@ -36,7 +36,6 @@ class Node:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Keys that must be known before."""
         return self.terms or tuple(key for _, key in self.arguments)
 
     def value(self, known: Mapping[str, Any]) -> Any:
@@ -48,12 +47,9 @@ class Node:
 
 @dataclass
 class Graph:
-    """Hold every node by key, in the order of declaration."""
-
     nodes: dict[str, Node] = field(default_factory=dict)
 
     def add(self, node: Node) -> None:
-        """Add a node; refuse a second one of its key with ArmidError."""
         if node.key in self.nodes:
             raise ArmidError(f"'{node.key.replace('__', '.')}' is there twice: each effect at most once is expected")
         self.nodes[node.key] = node
@@ -62,10 +58,7 @@ class Graph:
         return [n for n in self.nodes.values() if n.kind in kinds]
 
     def order(self, wanted: Iterable[str]) -> list[Node]:
-        """Return the nodes that are no leaves and lead to the wanted ones, each after what it needs.
-
-        Raises ArmidError when the equations run in a circle.
-        """
+        """Return the nodes that are no leaves and lead to the wanted ones, each after what it needs."""
         done: dict[str, Node] = {}
 
         def visit(key: str, path: tuple[str, ...]) -> None:
@@ -83,10 +76,7 @@ class Graph:
         return [n for n in done.values() if n.kind not in LEAVES]
 
     def values(self, wanted: Iterable[str], known: Mapping[str, Any]) -> dict[str, Any]:
-        """Return key -> value of what is known and of all that leads to the wanted nodes, by their plain functions.
-
-        known: key -> number or array of every leaf that they need.
-        """
+        """Return key -> value of what is known and of all that leads to the wanted nodes, by their plain functions."""
         found = dict(known)
         for node in self.order(wanted):
             found[node.key] = node.value(found)
@@ -101,10 +91,6 @@ class Graph:
 
 
 def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:
-    """Bind every equation of the plant and its effects.
-
-    Raises ArmidError for an unknown name or port, for two effects of one name, and for a circle.
-    """
     graph = Graph()
     for key, kind in leaves(plant, effects):
         graph.add(Node(key, kind))
@@ -145,7 +131,6 @@ def corrected(value: float, error: float) -> float:
 
 
 def switched_at_start(guard: float) -> Any:
-    """Return 1 where a one-way switch has switched before the start, else 0."""
     return np.where(guard <= 0.0, 1.0, 0.0)
 
 
@@ -161,7 +146,6 @@ def leaves(plant: Plant, effects: tuple[Effect, ...]) -> list[tuple[str, str]]:
 
 
 def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
-    """Add the equations of an effect, or of the plant, each bound to what it asks for."""
     owner, prefix = ("", "") if effect is None else (effect.name, f"{effect.name}__")
     who = f"plant '{plant.name}'" if effect is None else f"effect '{owner}'"
 
@@ -187,11 +171,7 @@ def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
 
 
 def bind(function: Equation, label: str, names: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
-    """Return (argument, key) for each argument that has a meaning here; names: name -> key.
-
-    Raises ArmidError for *args and **kwargs, and for a name that nobody offers; an argument with a default may stay
-    unbound.
-    """
+    """Return (argument, key) for each argument that has a meaning here; one with a default may stay unbound."""
     bound = []
     for a in inspect.signature(function).parameters.values():
         if a.kind not in (a.POSITIONAL_OR_KEYWORD, a.POSITIONAL_ONLY):
@@ -224,12 +204,10 @@ def names_for(plant: Plant, effect: Effect | None, initial: bool) -> dict[str, s
 
 
 def spelled(key: str) -> str:
-    """Return a key as `print(model)` writes it."""
     return key.replace("__", ".")
 
 
 def right_hand_side(node: Node) -> str:
-    """Return the text right of the equals sign."""
     if node.function is None:
         return " + ".join(spelled(t) for t in node.terms) or "0"
     expression = returned_expression(node.function)
@@ -292,8 +270,6 @@ class Rename(ast.NodeTransformer):
 
 
 class Insert(ast.NodeTransformer):
-    """Put expressions in the place of names."""
-
     def __init__(self, known: dict[str, ast.expr]) -> None:
         self.known = known
 
@@ -318,10 +294,7 @@ def returned_expression(function: Equation) -> ast.expr | None:
 
 
 def definition_of(function: Equation) -> ast.FunctionDef:
-    """Return the definition, bare of docstring, decorators and annotations; a lambda becomes one `return`.
-
-    Raises ArmidError for anything but a plain Python function whose source can be read and that returns something.
-    """
+    """Return the definition, bare of docstring, decorators and annotations; a lambda becomes one `return`."""
     label = getattr(function, "__qualname__", repr(function))
     if not isinstance(function, FunctionType):
         raise ArmidError(f"the equation {label} is no plain Python function: write it as a def")
@@ -341,10 +314,7 @@ def definition_of(function: Equation) -> ast.FunctionDef:
 
 
 def lambda_definition(function: LambdaType) -> ast.FunctionDef:
-    """Return the definition of a lambda, found in its file by the place of its code.
-
-    Raises ArmidError when the file does not show it.
-    """
+    """Return the definition of a lambda, found in its file by the place of its code."""
     module = inspect.getmodule(function)
     lines = inspect.findsource(function)[0] if module is None else inspect.getsourcelines(module)[0]
     nodes = ast.walk(ast.parse("".join(lines)))
@@ -368,7 +338,6 @@ def is_code_of(node: ast.Lambda, function: LambdaType) -> bool:
 
 
 def make_definition(name: str, arguments: ast.arguments, body: list[ast.stmt]) -> ast.FunctionDef:
-    """Return a definition without annotations."""
     for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
         argument.annotation = None
     empty = ast.parse("def f(): pass").body[0]

@@ -12,10 +12,7 @@ from armid.errors import ArmidError, nearest
 
 
 def check_name(name: str, what: str) -> None:
-    """Refuse a name that equations could not use.
-
-    Raises ArmidError for a name that is not a plain Python identifier, and for `time`, which is the time.
-    """
+    """Refuse a name that equations could not use."""
     if name == "time":
         raise ArmidError(f"{what} 'time' cannot have this name: in the equations, time is the time [s]")
     if not name.isidentifier() or keyword.iskeyword(name) or "__" in name or name != name.strip("_"):

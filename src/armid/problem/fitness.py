@@ -89,10 +89,7 @@ class Fitness:
 
 
 def fitness_of_name(name: str, known: Mapping[str, Fitness]) -> Fitness:
-    """Return the fitness of a name, or of a name and an output: `rmse:hub_angle`.
-
-    Raises ArmidError for an unknown fitness.
-    """
+    """Return the fitness of a name, or of a name and an output: `rmse:hub_angle`."""
     first, _, output = name.partition(":")
     if first not in known:
         raise ArmidError(f"fitness '{first}' is not known: {nearest(first, known)}")
@@ -100,7 +97,7 @@ def fitness_of_name(name: str, known: Mapping[str, Fitness]) -> Fitness:
 
 
 def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
-    """Return what a function asks of a record; refuse with ArmidError what a record cannot give.
+    """Return what a function asks of a record; refuse what a record cannot give.
 
     An argument with a default is the function's own option, unless its name looks like a misspelt one of a record.
     """
@@ -124,17 +121,12 @@ def argument_names(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def finite_or_inf(values: Array, failed: NDArray[np.bool_]) -> Array:
-    """Return values, (n,), with +inf for those that failed or are no finite number."""
     good = np.isfinite(values) & ~failed
     return values if good.all() else np.where(good, values, np.inf)
 
 
 def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike) -> Array:
-    """Return what each record weighs, (n_records,).
-
-    durations: of the records' windows [s], (n_records,); n_samples: of the records, (n_records,).
-    Raises ArmidError for weights that are not above 0.
-    """
+    """Return what each record weighs, (n_records,), from their durations [s] and numbers of samples."""
     ones = np.ones(np.shape(n_samples))
     weight = np.asarray({"duration": durations, "samples": n_samples, "sum": ones}[fitness.join], dtype=np.float64)
     if not ((weight > 0.0) & (weight < np.inf)).all():
@@ -143,11 +135,7 @@ def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike)
 
 
 def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
-    """Join the values of a campaign's records: one finished value per candidate, (n_candidates,), +inf if one failed.
-
-    table: what the fitness returned, (n_records, n_candidates); weight: of `record_weights`, (n_records,).
-    Raises ArmidError for shapes that do not match.
-    """
+    """Join the values of records, (n_records, n_candidates): one for each candidate, +inf if a record failed."""
     if table.ndim != 2 or weight.shape != table.shape[:1] or len(table) == 0:
         raise ArmidError(f"{table.shape} values and {weight.shape} weights of records do not match")
     failed = ~np.asarray(np.isfinite(table).all(axis=0))
@@ -159,18 +147,11 @@ def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
 
 
 def as_fitness(name: str, obj: Fitness | Callable[..., Any]) -> Fitness:
-    """Return a Fitness as it is, or make one of a plain function (measured, simulated) -> value per candidate.
-
-    Records then join by duration. Raises ArmidError as `Fitness` does.
-    """
     return obj if isinstance(obj, Fitness) else Fitness(name, obj, note="a function of the user")
 
 
 def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
-    """Return the mean of (x - x')^2 [signal's unit squared], (n_candidates,).
-
-    measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
-    """
+    """Return the mean of (x - x')^2 [signal's unit squared], (n_candidates,)."""
     from armid.problem.similarity import as_series, sums_of_squares
 
     x, rows = as_series(measured, simulated)
@@ -178,10 +159,6 @@ def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
 
 
 def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
-    """Return the mean of (x - x')^2 over the mean of x^2 [1], (n_candidates,).
-
-    Raises ArmidError for a measured series that is zero throughout.
-    """
     from armid.problem.similarity import as_series, sums_of_squares
 
     x, rows = as_series(measured, simulated)
@@ -192,10 +169,7 @@ def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
 
 
 def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array:
-    """Return the sum of (x - x')^2 / noise^2 [1], (n_candidates,): -2 log likelihood for white noise, up to a constant.
-
-    noise: rms of the measuring noise [signal's unit]. Raises ArmidError unless it is a number above 0.
-    """
+    """Return the sum of (x - x')^2 / noise^2, (n_candidates,): -2 log likelihood for white noise, up to a constant."""
     from armid.problem.similarity import as_series, sums_of_squares
 
     weight = inverse_noise(noise)
@@ -204,7 +178,6 @@ def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array
 
 
 def inverse_noise(noise: float) -> float:
-    """Return 1/noise, the weight of a residual whose noise has this rms [signal's unit]; errors as `chi_square`."""
     if not 0.0 < noise < np.inf:
         raise ArmidError(f"the noise of the record is {noise}, expected an rms above 0 in the signal's unit")
     return 1.0 / noise
@@ -218,10 +191,7 @@ def dissimilarity(
     measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
     slope_threshold: float = 0.2, degree: int = 0,
 ) -> Array:  # fmt: skip
-    """Return 1 - S of Eq 10 per candidate, +inf for one that is not finite; degree 2: 1 - S2 of Eq 14, in steps.
-
-    Other arguments and errors as of `similarity`.
-    """
+    """Return 1 - S of Eq 10 per candidate, +inf for one that is not finite; degree 2: 1 - S2 of Eq 14, in steps."""
     from armid.problem.similarity import scored
 
     values: Array = 1.0 - scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)[degree]

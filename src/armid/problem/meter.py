@@ -227,10 +227,7 @@ class Metered(Problem):  # type: ignore[misc]
         out["F"] = values[:, np.newaxis]
 
     def answered(self, X: Array, residuals: bool = False) -> tuple[Array, Array | None]:
-        """Return what pymoo is told of candidates: fitness, (n_candidates,), and residuals if asked and any is granted.
-
-        Rows of residuals beyond the budget are NaN.
-        """
+        """Return what pymoo is told: fitness, (n_candidates,), and residuals if asked; NaN beyond the budget."""
         granted = len(X) if self.meter is None else self.meter.grant(len(X))
         if not granted:
             if self.meter is not None:
@@ -254,7 +251,6 @@ class Metered(Problem):  # type: ignore[misc]
 
 
 def padded(values: NDArray[Any], n: int, filler: float = 0.0) -> NDArray[Any]:
-    """Return rows with others behind them that hold the filler, n in all."""
     longer = np.full((n, *values.shape[1:]), filler, values.dtype)
     longer[: len(values)] = values
     return longer

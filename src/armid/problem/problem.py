@@ -21,10 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """Simulate the pieces of one record, each on its own calibrated schedule.
-
-    The outputs of one file are a replay each: `signals_of` simulates them together.
-    """
+    """Simulate the pieces of one record, each on its own calibrated schedule; for other outputs see `signals_of`."""
 
     record: Record
     model: Model
@@ -39,18 +36,15 @@ class Replay:
         return [run if c is None else replace(run, outputs=c.corrected(run.outputs)) for run, c in pairs]
 
     def seen(self, runs: Sequence[Simulation]) -> Array:
-        """Return the signal in the windows of all pieces from their simulations, as `signal` does."""
         pairs = ((piece.window, run.outputs[self.place]) for piece, run in zip(self.pieces, runs, strict=True))
         parts = [signal[:, window] if window.start else signal for window, signal in pairs]
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def signal(self, candidates: Array) -> Array:
-        """Return the signal in the windows of all pieces, end to end, shape (n_candidates, n_samples)."""
         return self.seen(self.runs(candidates))
 
     @cached_property
     def place(self) -> int:
-        """Which output of the plant the record holds."""
         names = [o.name for o in self.model.plant.outputs]
         return names.index(self.record.output) if self.record.output else 0
 
@@ -78,18 +72,15 @@ class Replay:
 
     @cached_property
     def prepared(self) -> tuple[Prepared, ...]:
-        """What simulates each piece, made ready at the first call."""
         pairs = zip(self.pieces, self.calibrations, strict=True)
         return tuple(prepare(self.model, piece.manoeuvre, c.schedule) for piece, c in pairs)
 
     @property
     def measured(self) -> Array:
-        """Measured signal in the windows of all pieces, end to end [unit of the record]."""
         return np.concatenate([p.measured[p.window] for p in self.pieces])
 
     @property
     def times(self) -> Array:
-        """Times of these samples [s]."""
         return np.concatenate([p.manoeuvre.times()[p.window] for p in self.pieces])
 
     @property
@@ -110,9 +101,8 @@ def replay_of(
 ) -> Replay:  # fmt: skip
     """Calibrate the engine on candidates spread over the space and make a record ready to be simulated.
 
-    accuracy: "standard", "fine", or None: as the record's noise asks for. known: calibrations of the same model and
-    space by manoeuvre, so that none is calibrated twice; those that are made are added. spans: see `calibrate`.
-    Raises ArmidError for an unknown accuracy.
+    accuracy: None: as the record's noise asks for. known: calibrations of the same model and space by manoeuvre, so
+    that none is calibrated twice; those that are made are added. spans: see `calibrate`.
     """
     spread = space.complete(probes(space.low[space.free], space.high[space.free]))
     wanted = accuracy or accuracy_for(record, model)
@@ -274,10 +264,7 @@ def fitness_of(
     fitness: Fitness, replays: tuple[Replay, ...], measured: list[Array], signals: list[Array], weights: Array,
     sizes: Array,
 ) -> Array:  # fmt: skip
-    """Return the joined fitness of the signals of each record, (n_candidates,).
-
-    weights: of the records, (n_records,); sizes: what their signals are divided by, see `output_sizes`.
-    """
+    """Return the joined fitness of the signals of each record, (n_candidates,); sizes: see `output_sizes`."""
     table = []
     for replay, x, signal, size in zip(replays, measured, signals, sizes, strict=True):
         interval, noise = replay.pieces[0].manoeuvre.interval, replay.record.noise.rms
@@ -287,10 +274,7 @@ def fitness_of(
 
 
 def judged_by(fitness: Fitness, replays: tuple[Replay, ...]) -> tuple[Replay, ...]:
-    """Return the records that a fitness sees: those of the output that it names, else all.
-
-    Raises ArmidError for an output that no record holds.
-    """
+    """Return the records that a fitness sees: those of the output that it names, else all."""
     kept = tuple(r for r in replays if fitness.output in ("", r.record.output))
     if replays and not kept:
         known = dict.fromkeys(r.record.output for r in replays)
@@ -302,8 +286,8 @@ def judged_by(fitness: Fitness, replays: tuple[Replay, ...]) -> tuple[Replay, ..
 def output_sizes(replays: Sequence[Replay]) -> Array:
     """Return what the signals of each record are divided by before they are compared, (n_records,).
 
-    1 where all records hold one output. Else the noise of each output, the root of the mean square over its records, so
-    that each is weighed by its own noise; where one has no noise, the largest value of each output.
+    1 where all records hold one output. Else the noise of each output, the root of the mean square over its records;
+    where one has no noise, the largest value of each output.
     """
     outputs = [r.record.output for r in replays]
     if len(set(outputs)) < 2:
@@ -316,6 +300,5 @@ def output_sizes(replays: Sequence[Replay]) -> Array:
 
 
 def weights_of(fitness: Fitness, replays: tuple[Replay, ...]) -> Array:
-    """Return what each record weighs in a fitness, (n_records,)."""
     records = [r.record for r in replays]
     return record_weights(fitness, [r.duration for r in records], [r.n_samples for r in records])

@@ -80,7 +80,6 @@ def scored(
     measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
     slope_threshold: float = 0.2, failed: float = 0.0, noise: float = 0.0,
 ) -> Array:  # fmt: skip
-    """Return S, S1, S2 of `similarity` as rows, (3, n_candidates), with `failed` for candidates that are not finite."""
     x, rows = as_series(measured, simulated)
     if not (0.0 < interval < np.inf and 0.0 < slope_threshold < np.inf):
         raise ArmidError(f"interval is {interval} and slope_threshold {slope_threshold}, expected numbers above 0")
@@ -103,11 +102,7 @@ def refuse_zero(whole: float) -> None:
 
 
 def as_series(measured: ArrayLike, simulated: ArrayLike) -> tuple[Array, Array]:
-    """Return both as contiguous float64; nothing is copied when they are so already.
-
-    measured: signal's unit, (n_samples,); simulated: signal's unit, (n_candidates, n_samples).
-    Raises ArmidError for shapes that do not match and for a measured value that is no finite number.
-    """
+    """Return both as contiguous float64; nothing is copied when they are so already."""
     x = np.ascontiguousarray(measured, dtype=np.float64)
     rows = np.ascontiguousarray(simulated, dtype=np.float64)
     if x.ndim != 1 or x.size == 0:

@@ -39,7 +39,6 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
     J(s) = |x - y(s)|^2 / max(1, m) + |(s - s_reader) / 3 deviations|^2 with squares over those of the noise and m the
     mean square that no start brings down: a model that lacks something must not be made up for by a start that the
     first samples rule out.
-    candidate: whole, SI, (n_parameters,).
     """
     found: list[Replay] = []
     for outputs in by_file(replays):
@@ -53,10 +52,7 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
 
 
 def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
-    """Return the whole candidate of 48 spread over the box that comes nearest to the records, each from its best start.
-
-    Each start by one linear step from that of the reader. Returns SI, (n_parameters,).
-    """
+    """Return the whole candidate of 48 over the box that comes nearest to the records, each from its best start."""
     spread = space.complete(probes(space.low[space.free], space.high[space.free], N_PROBES))
     chi2 = np.zeros(len(spread))
     for outputs in by_file(replays):
@@ -70,7 +66,6 @@ def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
 
 
 def fits_starts(replays: Sequence[Replay]) -> bool:
-    """Tell whether the start of any piece is to be fitted."""
     return any(piece.shown_start for r in replays for piece in r.pieces)
 
 
@@ -94,7 +89,6 @@ class Start:
 
     @property
     def names(self) -> list[str]:
-        """Names of the constants that are fitted, none where none is."""
         return list(self.pieces[0].shown_start)
 
     @property
@@ -118,10 +112,7 @@ class Start:
         return np.concatenate([p.measured[p.window] for p in self.pieces])
 
     def signals(self, starts: Array, population: Array) -> Array:
-        """Return the outputs of the file, each candidate from its own start, (n_outputs, n_candidates, n_samples).
-
-        starts: (n_candidates, n_constants).
-        """
+        """Return the outputs of the file, each candidate from its own start, (n_outputs, n_candidates, n_samples)."""
         first, prepared = self.outputs[0], self.outputs[0].prepared[self.index]
         whole = np.tile(prepared.starts, (len(starts), 1))
         whole[:, [first.model.starts.index(name) for name in self.names]] = starts
@@ -134,14 +125,10 @@ class Start:
         return np.asarray(self.weights * np.concatenate([signal[:, piece.window] for signal, piece in pairs], axis=1))
 
     def residual(self, signals: Array) -> Array:
-        """Return what is measured minus what is simulated, over the noise, (n_candidates, n_seen)."""
         return np.asarray(self.weights * self.measured - self.seen(signals))
 
     def linear(self, constants: Array, population: Array) -> tuple[Array, Array]:
-        """Return signals and d signal / d constant about one start, all in one population, by central differences.
-
-        Their shapes: (n_outputs, n_candidates, n_samples) and (n_constants, n_outputs, n_candidates, n_samples).
-        """
+        """Return signals and d signal / d constant about one start, all in one population, by central differences."""
         n, moves = len(constants), MOVE * self.size * np.eye(len(constants))
         starts = np.concatenate([constants[np.newaxis], constants + moves, constants - moves])
         found = self.signals(np.repeat(starts, len(population), axis=0), np.tile(population, (len(starts), 1)))
@@ -163,10 +150,7 @@ class Start:
         return float(np.sum((residual - np.linalg.lstsq((slopes / scale).T, residual)[0] @ (slopes / scale)) ** 2))
 
     def answer(self, constants: Array, slopes: Array, misfit: float) -> tuple[Array, Array]:
-        """Return gain and offset of a step, (n_constants, n_seen) and (n_constants,); misfit: mean square that is left.
-
-        slopes: over the noise, (n_constants, n_seen).
-        """
+        """Return gain and offset of a step, (n_constants, n_seen) and (n_constants,); misfit: that is left."""
         shown, width = self.shown
         held = misfit / width**2
         normal = slopes @ slopes.T + np.diag(held)
@@ -174,10 +158,7 @@ class Start:
         return np.asarray(both[:, :-1]), np.asarray(both[:, -1])
 
     def fitted(self, candidate: Array) -> list[Piece]:
-        """Return the piece of each output from the best start of a candidate, ready to correct those of others.
-
-        Where the candidate diverges from the start that there is, the pieces stay as they are.
-        """
+        """Return the piece of each output from the best start of a candidate, as it is where the candidate diverges."""
         pieces, constants, population = self.pieces, self.constants, candidate[np.newaxis]
         if not self.names:
             return pieces
@@ -208,11 +189,9 @@ class Start:
         return [replace(piece, manoeuvre=manoeuvre, correction=correction) for piece in pieces]
 
     def seen_slopes(self, slopes: Array) -> Array:
-        """Return what is seen of slopes, as `seen` does, (n_constants, n_candidates, n_seen)."""
         shape = (len(slopes), slopes.shape[2], len(self.weights))
         return np.array([self.seen(slope) for slope in slopes]).reshape(shape)
 
     def cost(self, constants: Array, residual: Array, misfit: float) -> Any:
-        """Return J of `with_starts`, of one start and its residual or of many."""
         shown, width = self.shown
         return np.sum(residual**2, axis=-1) / misfit + np.sum(((constants - shown) / width) ** 2, axis=-1)

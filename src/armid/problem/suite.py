@@ -75,10 +75,9 @@ CLASSES = (
 
 @dataclass(frozen=True)
 class Definition:
-    """Declare a problem of the suite; its instances differ in the truth, and in the noise where there is any.
+    """A problem of the suite; its instances differ in the truth, and in the noise where there is any.
 
-    free: parameter of an effect -> bounds, SI, beside the four of the paper's arm. strokes: manoeuvres, one record
-    each. duration_s: of each record. noise_deg_s: rms of the white noise. fitness: what is minimised.
+    free: parameter of an effect -> bounds, SI, beside the four of the paper's arm. strokes: one record each.
     """
 
     free: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -353,7 +352,6 @@ class SuiteProblem(Problem):  # type: ignore[misc]
 
 @cache
 def first_of(problem_name: str) -> SuiteProblem:
-    """Return the first instance of a problem, which keeps what was measured of it."""
     return SuiteProblem(problem_name, 1)
 
 

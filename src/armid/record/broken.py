@@ -25,10 +25,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Broken:
-    """Hold samples of one kind: "gap", "clipped", "stuck" or "spikes".
-
-    samples: of the record's grid, (n_samples,), True where it is broken. from_s, to_s: the first and the last [s].
-    """
+    """Samples of one kind: "gap", "clipped", "stuck" or "spikes"; samples: (n_samples,), True where it is broken."""
 
     kind: str
     samples: Mask
@@ -37,7 +34,6 @@ class Broken:
 
     @property
     def count(self) -> int:
-        """How many samples are no data."""
         return int(self.samples.sum())
 
 

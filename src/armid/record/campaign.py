@@ -222,10 +222,7 @@ def write_campaign(
 
 
 def record_entries(tables: Sequence[Mapping[str, Any]], keys: Sequence[str], where: str) -> list[RecordSheet]:
-    """Return the [[records]] entries; keys: those of the plant.
-
-    Raises ArmidError for a file that is named twice, a repeat of nothing, and a campaign without a record to train on.
-    """
+    """Return the [[records]] entries; keys: those of the plant."""
     entries = []
     for i, table in enumerate(tables):
         file = table.get("file")
@@ -248,8 +245,7 @@ def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     """Return the plant with the sizes of effort and speed that its train records show, where it asks for that.
 
     Effort = max |gain x drive|, the drive being its first input, or the moment of gravity where the drive rests, and
-    speed = max |measured speed|, or of the change of a position over a hundredth of the record; a holdout record has no
-    say.
+    speed = max |measured speed|, or of the change of a position over a hundredth of the record.
     """
     if not plant.scales_from_records:
         return plant
@@ -274,10 +270,8 @@ def tolerances_of(
 ) -> dict[str, float]:
     """Return the tolerance of each constant above 0: what the campaign tells, by name or as `default`, else the plant.
 
-    What the plant declares as exact, or a record sets (start, target, load), keeps 0 unless it is named.
-    fixed: parameters of the plant that the campaign fixes, which are constants then.
-
-    Raises ArmidError for a constant that the plant does not have.
+    What the plant declares as exact, or a record sets (start, target, load), keeps 0 unless it is named. fixed:
+    parameters of the plant that the campaign fixes, which are constants then.
     """
     declared = {**dict.fromkeys(fixed), **{c.name: c.tolerance for c in plant.constants}}
     for name in told:
@@ -304,14 +298,7 @@ def largest_speed(record: Record) -> float:
 def overrides_of(
     tables: Mapping[str, Mapping[str, Any]], plant: Plant, effects: Mapping[str, Effect], where: str
 ) -> dict[str, Override]:
-    """Return qualified parameter name (`p0`, `coulomb.level`) -> Override.
-
-    tables: [parameters] of the file; an effect's parameter is written [parameters."coulomb.level"] or
-    [parameters.coulomb.level]. plant: with its scales set. effects: all that are known, used or not.
-
-    Raises ArmidError for an unknown parameter, an unknown key, bounds of which low is not below high, and bounds of a
-    parameter that is fixed.
-    """
+    """Return qualified parameter name (`p0`, `coulomb.level`) -> Override; an effect's name may be quoted or nested."""
     known = {p.name: p for p in plant.parameters}
     known |= {f"{e.name}.{p.name}": p for e in effects.values() for p in e.parameters}
     overrides = {}
@@ -325,7 +312,6 @@ def overrides_of(
 
 
 def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
-    """Return qualified name -> table, also where the name was written as nested tables."""
     flat: dict[str, object] = {}
     for name, table in tables.items():
         inner = {key: value for key, value in table.items() if isinstance(value, dict)}
@@ -337,10 +323,7 @@ def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
 
 
 def check_bounds(override: Override, declared: Parameter, where: str) -> None:
-    """Refuse bounds that leave nothing between them, and bounds beside a fixed value; warn of values far outside.
-
-    The declared bound (SI) stands for one that is not given.
-    """
+    """Refuse bounds that leave nothing between them, and bounds beside a fixed value; warn of values far outside."""
     if override.fixed is not None and (override.low, override.high) != (None, None):
         raise ArmidError(f"{where}: 'fixed' and a bound are both there, a fixed value or bounds are expected")
     low = declared.low if override.low is None else override.low

@@ -82,18 +82,8 @@ restart_s = {piece:.1f}
 def import_emps(folder: str | Path | None, out: str | Path) -> Path:
     """Write the EMPS set as a campaign folder and return it; each record gets `time_s,velocity_m_s,drive_V,position_m`.
 
-    Parameters
-    ----------
-    folder : str or Path or None
-        Where DATA_EMPS.mat (train) and DATA_EMPS_PULSES.mat (holdout) are; None loads them through the package
-        `nonlinear_benchmarks`, which needs the extra `armid[measured]` and, the first time, the internet.
-    out : str or Path
-        A new or empty folder.
-
-    Raises
-    ------
-    ArmidError
-        A file is missing or damaged, a variable is missing, or `out` holds something already.
+    folder: where DATA_EMPS.mat (train) and DATA_EMPS_PULSES.mat (holdout) are; None loads them through the package
+    `nonlinear_benchmarks`, which needs the extra `armid[measured]` and, the first time, the internet.
     """
     source = downloaded_folder() if folder is None else Path(folder)
     measured = {name: read_emps(source / f"{name}.mat") for name in EMPS_FILES}
@@ -106,11 +96,7 @@ def import_emps(folder: str | Path | None, out: str | Path) -> Path:
 
 
 def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
-    """Return gain [N/V], and header -> values of a record's CSV file, from one file of the set.
-
-    Raises ArmidError for a file that is missing or no MATLAB file, for a missing variable, for series of different
-    length, and for times that are not even or too slow for the velocity filter.
-    """
+    """Return gain [N/V], and header -> values of a record's CSV file, from one file of the set."""
     # half a second to load, which only this import is worth
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
@@ -147,10 +133,9 @@ def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
 def velocity_of(position: Array, interval: float) -> Array:
     """Return the velocity [m/s] of an encoder position [m], both (n_samples,), sampled every `interval` seconds.
 
-    A Butterworth low-pass of order 4 with its cutoff at 100 Hz runs forward and backward, so that no phase is shifted
-    (-6 dB at 100 Hz), then differences are central. On EMPS it leaves less than 0.01 mm/s of the encoder's 50 nm steps,
-    and the best fit of a free-running model is within 0.01 mm/s of the one to unfiltered differences; at 40 Hz it is
-    not.
+    A Butterworth low-pass of order 4 with its cutoff at 100 Hz runs forward and backward, so that no phase is shifted,
+    then differences are central. On EMPS the best fit of a free-running model is within 0.01 mm/s of the one to
+    unfiltered differences; at 40 Hz it is not.
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -179,22 +164,8 @@ def import_dfki(folder: str | Path, out: str | Path, holdout: str | None = None)
 
     Each record gets `time_s,angular_velocity_rad_s,drive_N_m,angle_rad`, numbers unchanged, and is simulated in pieces
     of 1 s, as the pendulum runs through its unstable upright position. The campaign declares gravity and inertia from
-    CAD (a rod and a point mass, estimates) and leaves nothing free:
-    m g l = g (m l + m_r l/2), J = m l^2 + m_r l^2/3 + gear^2 J_rotor.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Where ddp_measured.csv and direct_collocation_measured.csv are, each with time, position, velocity, torque.
-    out : str or Path
-        A new or empty folder.
-    holdout : str or None
-        The record to hold out; None: both train.
-
-    Raises
-    ------
-    ArmidError
-        A file or column is missing or unreadable, the record to hold out is unknown, or `out` holds something already.
+    CAD (a rod and a point mass, estimates) and leaves nothing free: m g l = g (m l + m_r l/2), J = m l^2 + m_r l^2/3 +
+    gear^2 J_rotor. folder: where ddp_measured.csv and direct_collocation_measured.csv are. holdout: None: both train.
     """
     if holdout is not None and holdout not in DFKI_RECORDS:
         raise ArmidError(f"--holdout '{holdout}' is no record of the set, {nearest(holdout, DFKI_RECORDS)}")
@@ -212,7 +183,6 @@ def import_dfki(folder: str | Path, out: str | Path, holdout: str | None = None)
 
 
 def read_dfki(folder: Path, file: str) -> dict[str, Array]:
-    """Return header -> values of one file of the set; refuse a missing file or column with ArmidError."""
     path = folder / file
     if not path.is_file():
         raise ArmidError(f"{folder}: {file} does not exist there, the folder results/ of the set, or its files in one "
@@ -222,10 +192,7 @@ def read_dfki(folder: Path, file: str) -> dict[str, Array]:
 
 
 def read_columns(path: Path, file: str, names: Collection[str]) -> dict[str, Array]:
-    """Return the named columns of a CSV file; refuse a file or column that is missing with ArmidError.
-
-    file: how messages name it.
-    """
+    """Return the named columns of a CSV file; refuse a file or column that is missing. file: how messages name it."""
     columns = read_table(path, file).columns
     for name in names:
         if name not in columns:

@@ -16,9 +16,8 @@ ORDERS = range(3, 9)
 def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = None) -> Noise:
     """Return the noise of a record.
 
-    rest: samples before the motion [unit], (n_rest,); with fewer than 50 of them the differences of `motion` [unit],
-    (n_rows,), are used. interval: between the samples of rest [s]. times: of the motion [s], (n_rows,), where they are
-    irregular. A signal that moves in coarse steps has at least the noise step/sqrt(12), also where rest shows none.
+    rest: samples before the motion; with fewer than 50 of them the differences of `motion` are used. times: of the
+    motion [s] where they are irregular. A signal that moves in coarse steps has at least the noise step/sqrt(12).
     """
     floor = quantisation_step(motion) / np.sqrt(12.0)
     if rest.size < FEWEST_REST_SAMPLES:
@@ -96,7 +95,6 @@ def quantisation_step(motion: Array) -> float:
 
 
 def smallest_step(motion: Array) -> float:
-    """Return the smallest change between neighbours that is not 0 [unit], 0 for a constant signal."""
     changes = np.abs(np.diff(motion))
     changes = changes[changes > 0]
     return float(np.min(changes)) if changes.size else 0.0

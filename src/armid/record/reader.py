@@ -37,10 +37,7 @@ SATURATED_SAMPLES = 5
 
 @dataclass(frozen=True)
 class SharedEntries:
-    """Hold what the records of a campaign have in common: constants (SI), inputs, hold, gyro range [rad/s].
-
-    folder: what messages put before the name of a file.
-    """
+    """What the records of a campaign have in common; folder: what messages put before the name of a file."""
 
     folder: str
     constants: Mapping[str, float]
@@ -52,10 +49,8 @@ class SharedEntries:
 def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: SharedEntries, where: str) -> Record:
     """Read the record of one [[records]] entry: of the first output in the file, with those of the others.
 
-    plant: the one that the campaign names; its sibling for the record's unit is taken. where: how messages name the
-    entry. Warns with IrregularSamplingWarning where the file is resampled for its uneven times.
-
-    Raises ArmidError for all that makes the record unusable.
+    plant: the one that the campaign names; its sibling for the record's unit is taken. Warns with
+    IrregularSamplingWarning where the file is resampled for its uneven times.
     """
     table = read_table(path, f"{shared.folder}{sheet.file}")
     times = time_column(table)
@@ -95,10 +90,7 @@ def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: SharedEntr
 def manoeuvre_of(
     plant: Plant, shared: SharedEntries, sheet: RecordSheet, table: CsvTable, timing: Timing, *, where: str
 ) -> Manoeuvre:
-    """Return the manoeuvre of a whole record, still without the measured state at its start.
-
-    An optional input without a column has its default throughout.
-    """
+    """Return the manoeuvre of a whole record, still without the measured state at its start."""
     constants = record_constants(plant, shared.constants, sheet, where)
     hold = sheet.hold or shared.hold
     sources = input_columns(plant, {**shared.inputs, **sheet.inputs}, table, where)
@@ -118,8 +110,8 @@ def check_signals(
 ) -> None:  # fmt: skip
     """Refuse a signal that shows no motion, and a speed that is cut off by the range of the gyro.
 
-    signals: SI, (n_rows,). Saturated are 5 samples in a row within one quantisation step of the range; the step is the
-    smallest change between neighbours, but at most a hundredth of the range.
+    Saturated are 5 samples in a row within one quantisation step of the range; the step is the smallest change between
+    neighbours, but at most a hundredth of the range.
     """
     for output, signal in signals.items():
         if is_constant(signal[timing.first :]):
@@ -147,8 +139,7 @@ def check_signals(
 def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: str) -> Record:
     """Return the record with its pieces, each from the state that the tracks tell at its first sample.
 
-    An incomplete last piece is dropped. Raises ArmidError for restarts of a plant that starts from rest, or of a record
-    whose start is given.
+    An incomplete last piece is dropped.
     """
     manoeuvre, length = record.manoeuvre, record.measured.size
     asked = {} if plant.records_one_speed else plant.start_constants
@@ -186,13 +177,7 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
 def tracks_of(
     record: Record, plant: Plant, table: CsvTable, signals: Mapping[Output, Array], timing: Timing
 ) -> dict[str, Track]:
-    """Return the signals from which a start is taken: of a plant that records one speed by constant, else by output.
-
-    signals: as in the file, SI, (n_rows,).
-
-    Raises ArmidError where a position is needed and the file has none. An axis without gravity needs none: it starts at
-    its default.
-    """
+    """Return the signals from which a start is taken: of a plant that records one speed by constant, else by output."""
     times = table.columns[TIME]
     if not plant.records_one_speed:
         return {output.name: track_of(signal, times, timing) for output, signal in signals.items()}
@@ -210,17 +195,12 @@ def tracks_of(
 
 
 def gravity_of(plant: Plant, constants: Mapping[str, float]) -> float:
-    """Return the moment of gravity, 0 for a plant that has none."""
     declared = {c.name: c.value for c in plant.constants}
     return constants.get("gravity_moment", declared.get("gravity_moment", 0.0))
 
 
 def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordSheet, where: str) -> dict[str, float]:
-    """Return the constants of a record's manoeuvre, SI: the campaign's, then its keys, then [records.constants].
-
-    Raises ArmidError for an unknown constant, one that the record's own start sets, a missing key, a value of another
-    kind or outside its range.
-    """
+    """Return the constants of a record's manoeuvre, SI: the campaign's, then its keys, then [records.constants]."""
     known = [c.name for c in plant.constants]
     for what, given in (("constants of the campaign", shared), ("constants", sheet.constants)):
         for name in given:
@@ -243,7 +223,6 @@ def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordShe
 
 
 def key_value(key: ManoeuvreKey, value: object, where: str) -> float:
-    """Return the constant (SI) that a key of the plant sets."""
     if key.boolean:
         if isinstance(value, bool):
             return float(value)
@@ -282,7 +261,6 @@ def range_of(key: ManoeuvreKey) -> str:
 
 
 def campaign_path(path: str | Path) -> Path:
-    """Return the campaign.toml that a folder or a file stands for; refuse with ArmidError where there is none."""
     if not os.path.exists(path):
         raise ArmidError(f"campaign {quoted(str(path))} does not exist, a folder with a {NAME} is expected")
     if os.path.isfile(path):
@@ -293,10 +271,6 @@ def campaign_path(path: str | Path) -> Path:
 
 
 def record_path(folder: Path, file: str, where: str) -> Path:
-    """Return where the file of a record is.
-
-    Raises ArmidError for a name that leads out of the folder (also through a link), is no CSV file, or does not exist.
-    """
     pure = PurePosixPath(file.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
         raise ArmidError(f"{where}: file {quoted(file)} leads out of the campaign's folder, a file inside is expected")

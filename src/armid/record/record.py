@@ -14,13 +14,12 @@ NOISE_FREE = 1e-6
 
 @dataclass(frozen=True)
 class Noise:
-    """Hold what is known of a sensor's noise.
+    """What is known of a sensor's noise.
 
-    rms: [unit of the output], about the mean. mean: [same], not subtracted anywhere; None where no rest was recorded.
-    correlation_time_s: time constant [s] of the exponential correlation with the same sum; 0 for white noise.
-    effective_fraction: independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1]. n_samples: that were looked at.
-    source: "rest" (the arm under its brake) or "differences" (high differences of the motion, which cannot tell a
-    correlation: the noise is taken for white).
+    rms: [unit of the output], about the mean. mean: not subtracted anywhere; None where no rest was recorded.
+    correlation_time_s: of the exponential correlation with the same sum; 0 for white noise. effective_fraction:
+    independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1]. source: "rest" (the arm under its brake) or
+    "differences" (high differences of the motion, which cannot tell a correlation: the noise is taken for white).
     """
 
     rms: float
@@ -33,10 +32,9 @@ class Noise:
 
 @dataclass(frozen=True)
 class Irregularity:
-    """Tell how irregular the times of a file are.
+    """How irregular the times of a file are.
 
-    share: of the intervals, off by more than 1 % of the median interval.
-    largest_gap: largest interval in median intervals; at_s: where it begins [s].
+    share: of the intervals, off by more than 1 % of the median. largest_gap: in median intervals; at_s: its begin.
     """
 
     share: float
@@ -46,14 +44,12 @@ class Irregularity:
 
 @dataclass(frozen=True, eq=False)
 class StartCorrection:
-    """Hold how the signals of a piece answer to its start, and how much of it a candidate lacks.
+    """How the signals of a piece answer to its start, and how much of it a candidate lacks.
 
     Beside a candidate's signals y the start moves by d = gain (x - y) + offset, x what was measured: the d that brings
     x - y - slopes d down, of all outputs of the file together, and does not leave the start that the reader saw.
-
-    places: of the outputs in the plant. slopes: d signal / d start constant, SI, (n_constants, n_outputs, n_samples).
-    gain: (n_constants, n_seen); offset: (n_constants,). measured: samples in the window, the outputs one behind the
-    other, (n_seen,).
+    slopes: d signal / d start constant, SI, (n_constants, n_outputs, n_samples). gain: (n_constants, n_seen); offset:
+    (n_constants,). measured: samples in the window, the outputs one behind the other, (n_seen,).
     """
 
     places: tuple[int, ...]
@@ -76,15 +72,13 @@ class StartCorrection:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Hold what is simulated in one go and compared with its measurement.
+    """What is simulated in one go and compared with its measurement, on one grid.
 
-    manoeuvre: from the piece's first sample on. measured: [unit of the output], (n_samples,), the same grid.
     window: the samples that fitness and errors see. start_index: sample of the record at which the piece begins.
     start_deviation: constant (`start_position`, `start_speed`) -> standard deviation of its measured value, SI; empty
     for a machine that starts from its declared state. n_spent: first samples that told the start of a record that is
     held out, so that they judge nothing. shown_start: constant -> its measured value, SI, where a fit estimates these
-    constants beside the parameters, else empty; correction: what does so, about the constants of the manoeuvre, None
-    before.
+    constants beside the parameters; correction: what does so, None before.
     """
 
     manoeuvre: Manoeuvre
@@ -98,7 +92,6 @@ class Piece:
 
     @property
     def n_samples(self) -> int:
-        """Number of samples in the window."""
         return int(self.window.stop - self.window.start)
 
     @property

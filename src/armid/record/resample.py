@@ -28,12 +28,10 @@ class IrregularSamplingWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Timing:
-    """Tell how the samples of a file come onto an even grid.
+    """How the samples of a file come onto an even grid.
 
-    start, interval: of the grid [s]. n_samples: on the grid. first: row of the first sample at or after the start.
-    earliest: first sample of the grid that was measured and is not before t = 0.
-    resampled: False when the rows from `first` on are the samples of the grid.
-    irregularity: None for even times.
+    first: row of the first sample at or after the start. earliest: first sample of the grid that was measured and is
+    not before t = 0. resampled: False when the rows from `first` on are the samples of the grid.
     """
 
     start: float
@@ -45,19 +43,14 @@ class Timing:
     irregularity: Irregularity | None
 
     def grid(self) -> Array:
-        """Return the times of the grid [s], (n_samples,)."""
         return self.start + self.interval * np.arange(self.n_samples, dtype=np.float64)
 
 
 def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     """Find the even grid of a record.
 
-    times: increasing [s], shape (n_rows,). from_rest: the grid begins at t = 0 exactly (samples before are rest), else
-    at the first sample. The interval is the slope of the times where they are even but for rounding and jitter, else
-    the median interval. Warns with IrregularSamplingWarning when they are not.
-
-    Raises ArmidError for fewer than 20 samples after the start, a plant from rest whose record starts late, intervals
-    too short to be seconds, and times that are mostly gaps.
+    from_rest: the grid begins at t = 0 exactly (samples before are rest), else at the first sample. The interval is the
+    slope of the times where they are even but for rounding and jitter, else the median interval, of which is warned.
     """
     first = 0
     if from_rest:
@@ -109,10 +102,7 @@ def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
 
 
 def rounded(interval: float, offsets: Array) -> float:
-    """Return the roundest interval that the times allow: 0.001 rather than 0.00099999999999.
-
-    offsets: of the times from the fitted line [s], (n_rows,); they tell how exactly its slope is known.
-    """
+    """Return the roundest interval that the times allow: 0.001 rather than 0.00099999999999."""
     doubt = float(np.max(np.abs(offsets))) * np.sqrt(12 / offsets.size) + 1e-9 * interval
     candidates = (float(f"{interval:.{digits}g}") for digits in range(1, 16))
     return next((c for c in candidates if abs(c - interval) * offsets.size <= doubt), interval)
@@ -129,7 +119,6 @@ def printed_resolution(times: Array, interval: float) -> float:
 
 
 def irregularity_of(times: Array) -> Irregularity | None:
-    """Return how far the intervals are from their median, None when only slow drift is there."""
     intervals = np.diff(times)
     median = float(np.median(intervals))
     relative = intervals / median
@@ -150,11 +139,11 @@ def grid_size(times: Array, start: float, interval: float, file: str) -> int:
 
 
 def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear") -> Array:
-    """Return a column on the even grid, shape (n_samples,), from values and times, both (n_rows,).
+    """Return a column on the even grid, (n_samples,), from values and times, both (n_rows,).
 
-    Samples that are on the grid are kept. Else between samples: a straight line, whose error is interval^2/8 times the
-    curvature and which never overshoots at the kinks of a record; `hold` "zero": what the column, holding each value
-    until the next, is on average over the interval that a grid sample begins, so that no impulse comes late.
+    Else than on the grid: a straight line, which never overshoots at the kinks of a record; `hold` "zero": what the
+    column, holding each value until the next, is on average over the interval that a grid sample begins, so that no
+    impulse comes late.
     """
     if not timing.resampled:
         return np.ascontiguousarray(values[timing.first :])
@@ -172,10 +161,10 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
 
 
 def moved_onto_grid(values: Array, times: Array, timing: Timing) -> Array:
-    """Return a noisy column on the even grid, shape (n_samples,), from values and times, both (n_rows,).
+    """Return a noisy column on the even grid, (n_samples,), from values and times, both (n_rows,).
 
-    Each grid sample takes the nearest row, moved along the slope of a parabola through 7 neighbours: the noise
-    stays that of one sample and white, where a line between two rows would take a third off its variance and correlate
+    Each grid sample takes the nearest row, moved along the slope of a parabola through 7 neighbours: the noise stays
+    that of one sample and white, where a line between two rows would take a third off its variance and correlate
     neighbours. Where no row is near, a straight line bridges the gap.
     """
     if not timing.resampled or times.size < NEIGHBOURS:
@@ -190,10 +179,7 @@ def moved_onto_grid(values: Array, times: Array, timing: Timing) -> Array:
 
 
 def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
-    """Return the slope at each row of the least-squares parabola through 7 neighbours, those at the ends beside it.
-
-    v = a + b t + c t^2 with t from the neighbours' mean time; returns b + 2 c t of the row.
-    """
+    """Return the slope at each row of the least-squares parabola through 7 neighbours, those at the ends beside it."""
     first, n = np.clip(rows - NEIGHBOURS // 2, 0, times.size - NEIGHBOURS), NEIGHBOURS
     unit = float(np.median(np.diff(times)))
     middle = sum((times[first + i] for i in range(n)), np.zeros(rows.size)) / n
@@ -215,10 +201,6 @@ SLACK = 1e-3
 
 
 def piece_length(restart_s: float, interval: float, n_samples: int, where: str) -> int:
-    """Return the number of samples in a piece of `restart_s` seconds.
-
-    Raises ArmidError for a length that no piece of the record has, or that holds fewer than 20 samples.
-    """
     length = int(min(restart_s / interval + 0.5, n_samples + 1))
     if length > n_samples:
         raise ArmidError(f"{where}: restart_s is {restart_s:g}, at most the record's {n_samples * interval:.6g} s are "
@@ -230,12 +212,9 @@ def piece_length(restart_s: float, interval: float, n_samples: int, where: str) 
 
 
 def with_window(record: Record, window_s: Sequence[float] | None, where: str) -> Record:
-    """Return the record whose pieces show fitness and errors the samples of a window [s] only.
+    """Return the record whose pieces show fitness and errors the samples of a window [s] only, None: from t = 0 on.
 
-    window_s: begin and end in the record's own time, both included; None: all samples from t = 0 on. A piece of a
-    restarted record with fewer than 20 samples in the window is left out.
-
-    Raises ArmidError for a window that is empty, runs backward, holds fewer than 20 samples or a constant signal.
+    A piece of a restarted record with fewer than 20 samples in the window is left out.
     """
     low, high = window_samples(record, window_s, where)
     if is_constant(record.measured[low:high]):
@@ -255,7 +234,6 @@ def with_window(record: Record, window_s: Sequence[float] | None, where: str) ->
 
 
 def window_samples(record: Record, window_s: Sequence[float] | None, where: str) -> tuple[int, int]:
-    """Return first and one past the last sample of a window, as `with_window` wants it."""
     n_samples, grid = record.measured.size, record.manoeuvre
     low, high = record.earliest, n_samples
     if window_s is not None:
@@ -272,5 +250,4 @@ def window_samples(record: Record, window_s: Sequence[float] | None, where: str)
 
 
 def is_constant(speed: Array) -> bool:
-    """Tell whether a signal never changes."""
     return bool(np.ptp(speed) < 1e-30)

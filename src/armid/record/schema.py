@@ -29,7 +29,6 @@ class KindError(Exception):
 
 
 def part(kind: Kind, value: object, path: str) -> Any:
-    """Return a part of a value as its kind wants it."""
     try:
         return kind(value)
     except KindError as error:
@@ -37,7 +36,6 @@ def part(kind: Kind, value: object, path: str) -> Any:
 
 
 def number(value: object) -> float:
-    """Return a finite number that can be squared safely."""
     # in Python a bool is an int too
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST:
         return float(value)
@@ -51,29 +49,24 @@ def above_zero(value: object) -> float:
 
 
 def share(value: object) -> float:
-    """Return a number from 0 to below 1."""
     if not 0.0 <= number(value) < 1.0:
         raise KindError(value)
     return number(value)
 
 
 def text(value: object) -> str:
-    """Return a text that is not empty."""
     if isinstance(value, str) and value:
         return value
     raise KindError(value)
 
 
 def any_table(value: object) -> dict[str, Any]:
-    """Return a table, whatever it holds."""
     if isinstance(value, dict):
         return value
     raise KindError(value)
 
 
 def one_of(*words: str) -> Kind:
-    """Return the kind of a text that is one of some words."""
-
     def kind(value: object) -> str:
         if text(value) not in words:
             raise KindError(value)
@@ -83,13 +76,10 @@ def one_of(*words: str) -> Kind:
 
 
 def table_of(inner: Kind) -> Kind:
-    """Return the kind of a table whose values are of one kind."""
     return lambda value: {name: part(inner, v, f".{name}") for name, v in any_table(value).items()}
 
 
 def list_of(inner: Kind, shortest: int = 0, longest: float = float("inf")) -> Kind:
-    """Return the kind of a list whose values are of one kind."""
-
     def kind(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list) or not shortest <= len(value) <= longest:
             raise KindError(value)
@@ -158,12 +148,7 @@ SheetT = TypeVar("SheetT", bound="DataclassInstance")
 
 
 def validated(sheet: type[SheetT], table: object, where: str, further: Collection[str] = ()) -> SheetT:
-    """Return a table of the file as what it was declared to be.
-
-    where: how messages name the place. further: keys that the sheet keeps in its field `keys`.
-
-    Raises ArmidError for the first key that is unknown, missing or of another kind.
-    """
+    """Return a table of the file as what it was declared to be; further: keys that go into its field `keys`."""
     if not isinstance(table, dict):
         raise ArmidError(f"{where} is {quoted(table)}, a table is expected")
     declared: list[Field[Any]] = [f for f in fields(sheet) if f.metadata]
@@ -193,10 +178,7 @@ def unknown_name(what: str, name: str, known: Collection[str], where: str) -> Ar
 
 
 def load_toml(path: Path, named: str = "") -> dict[str, Any]:
-    """Return the tables of a TOML file; named: how messages name it, "": by its own name.
-
-    Raises ArmidError, with the line, for what is no UTF-8 text or no TOML.
-    """
+    """Return the tables of a TOML file; named: how messages name it, "": by its own name."""
     where = named or path.name
     try:
         size = path.stat().st_size

@@ -22,10 +22,7 @@ STEPS, TINY = 4, 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Hold a signal from which a start is taken.
-
-    values: [SI], (n_samples,). noise: standard deviation of one sample [SI]. step: of the sensor [SI], 0: a fine one.
-    """
+    """A signal from which a start is taken, SI; noise: deviation of one sample; step: of the sensor, 0: a fine one."""
 
     values: Array
     noise: float
@@ -33,20 +30,14 @@ class Track:
 
 
 def track_of(values: Array, times: Array, timing: Timing) -> Track:
-    """Return a column on the even grid, with its noise from the differences of what is in the file.
-
-    values: [SI], (n_rows,). times: [s], (n_rows,).
-    """
+    """Return a column on the even grid, with its noise from the differences of what is in the file."""
     irregular = times if timing.irregularity else None
     noise = noise_of(np.empty(0), values, timing.interval, irregular)
     return Track(moved_onto_grid(values, times, timing), noise.rms, quantisation_step(values))
 
 
 def state_at(tracks: Mapping[str, Track], index: int) -> State:
-    """Return constants (`start_position`, `start_speed`) and their standard deviations (SI) at one sample.
-
-    A step of the sensor that no motion averages out is counted in full.
-    """
+    """Return constants (`start_position`, `start_speed`) and their standard deviations (SI) at one sample."""
     found = {name: smoothed(t.values, index, t.noise) for name, t in tracks.items()}
     deviations = {name: float(max(d, tracks[name].step / np.sqrt(12.0))) for name, (_, d) in found.items()}
     return {name: value for name, (value, _) in found.items()}, deviations
@@ -66,8 +57,6 @@ def state_shown(
     change, where f, the rates of x, asks for states and constants alone (a position's rate is a speed). Values and
     slopes of the smoothed outputs, each weighed by its deviation, are met by least squares. What no output shows keeps
     its default, with the plant's own size for its deviation.
-
-    given: constants of the record. tracks: output -> its signal. interval: [s]. index: sample at which it starts.
     """
     outputs = VisibleOutputs(plant, given)
     names = [c for c in plant.start_constants.values() if c not in given]
@@ -100,10 +89,7 @@ def state_shown(
 
 
 class VisibleOutputs:
-    """Evaluate those outputs of a plant, and how fast they change, that states and constants alone decide.
-
-    given: constants that replace the plant's defaults, SI.
-    """
+    """Evaluate those outputs of a plant, and how fast they change, that states and constants alone decide."""
 
     def __init__(self, plant: Plant, given: Mapping[str, float]) -> None:
         self.graph, self.plant = Model(plant).graph, plant
@@ -111,7 +97,6 @@ class VisibleOutputs:
         self.known = [s.name for s in plant.states if self.leaves(f"initial__{s.name}") <= set(self.constants)]
 
     def leaves(self, key: str) -> set[str]:
-        """Return the leaves of the graph on which a node depends."""
         node = self.graph.nodes[key]
         if node.function is None and node.kind != "port":
             return {key}
@@ -148,17 +133,14 @@ GROWTH, LONGEST = 1.25, 400
 
 
 def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tuple[float, float]:
-    """Return the value of a signal at one sample and its standard deviation, both in the unit of the signal.
+    """Return the value of a signal at one sample and its standard deviation, or its change from sample to sample.
 
     A polynomial of degree 1 or 2 is fitted to a window around the sample (at the ends of a record beside it), which
     grows from 5 to 400 samples until its squares are more than noise: sum r^2 > noise^2 (f + 3 sqrt(2 f)) with f
     degrees of freedom, or the same for what the next two degrees explain. The value is that of the polynomial with
     these two degrees more on the last window that held, so that its bias is small against its deviation. The window of
-    the smallest deviation wins; a signal without noise is not smoothed.
-
-    values: (n_samples,). noise: standard deviation of one sample, taken for white. slope: return the change from sample
-    to sample instead.
-    Source of the higher degree: Calonico, Cattaneo, Titiunik 2014, doi:10.3982/ECTA11757.
+    the smallest deviation wins; a signal without noise is not smoothed. Source of the higher degree: Calonico,
+    Cattaneo, Titiunik 2014, doi:10.3982/ECTA11757.
     """
     best = float(values[index]), noise
     if slope:
@@ -178,7 +160,6 @@ def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tu
 
 
 def window_at(index: int, n: int, n_samples: int) -> int:
-    """Return the first sample of a window of n samples around one, at the ends of the signal beside it."""
     return max(min(max(index - (n - 1) // 2, 0), n_samples - n), 0)
 
 

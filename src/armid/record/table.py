@@ -31,10 +31,7 @@ POSITIONS = {"position_m": ("m/s", 1.0), "angle_rad": ("rad/s", 1.0), "angle_deg
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
-    """Hold the columns of one file.
-
-    file: name to show. path: where it is. columns: header -> values, shape (n_rows,), all finite.
-    """
+    """The columns of one file; file: name to show; columns: header -> values, (n_rows,), all finite."""
 
     file: str
     path: Path
@@ -53,13 +50,7 @@ class CsvTable:
 
 
 def read_table(path: Path, file: str) -> CsvTable:
-    """Read a CSV file: one header line, then numbers separated by commas; empty lines are skipped.
-
-    file: how messages name it. A million rows of four columns take about a second.
-
-    Raises ArmidError, with the line where there is one, for an empty or unreadable file, text that is not UTF-8, a
-    header with unnamed or repeated columns, a row of another length and anything that is no finite number.
-    """
+    """Read a CSV file: one header line, then numbers separated by commas; empty lines are skipped."""
     try:
         with path.open(encoding="utf-8-sig") as lines:
             header = lines.readline(LONGEST_HEADER + 1)
@@ -140,7 +131,6 @@ def wrong_line(path: Path, file: str, error: ValueError) -> ArmidError:
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Yield (number from 1, line without its end), whatever ends the lines."""
     with path.open(encoding="latin-1") as lines:
         for number, line in enumerate(lines, start=1):
             yield number, line.rstrip("\n").encode("latin-1")
@@ -161,10 +151,7 @@ def time_column(table: CsvTable) -> Array:
 
 
 def output_columns(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, str]]:
-    """Return the plant, of several for one speed that of its unit, and its outputs in a file, each with its header.
-
-    Raises ArmidError where there is none, or two columns for one, and for a speed in a unit that no plant records.
-    """
+    """Return the plant, of several for one speed that of its unit, and its outputs in a file, each with its header."""
     if plant.records_one_speed:
         return speed_column(table, plant)
     columns = {o: [c for c in o.factors if c in table.columns] for o in plant.outputs}
@@ -191,10 +178,7 @@ def speed_column(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, str
 
 
 def position_of(table: CsvTable, unit: str) -> Array | None:
-    """Return the position [m or rad] that belongs to a speed in `unit`, (n_rows,), None where there is none.
-
-    Raises ArmidError when two columns tell it.
-    """
+    """Return the position [m or rad] that belongs to a speed in `unit`, (n_rows,), None where there is none."""
     found = [name for name, (speed_unit, _) in POSITIONS.items() if speed_unit == unit and name in table.columns]
     header = table.only_one_of(found, "at most one position column is expected")
     return None if header is None else table.columns[header] * POSITIONS[header][1]
@@ -204,9 +188,6 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
     """Return input -> header for every input of the plant that the file holds.
 
     named: input -> header, as the campaign says. where: how messages name the place that says it.
-
-    Raises ArmidError for an input that the plant does not have, a column that the file does not have, and a required
-    input without a column or with two.
     """
     for name, header in named.items():
         if name not in {i.name for i in plant.inputs}:
@@ -233,8 +214,6 @@ def si_factor(header: str) -> float:
 
 
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
-    """Return the sentence for a column that is not there, naming a look-alike in another unit where there is one."""
-
     def quantity_of(header: str) -> str:
         return next((q for q in QUANTITIES if header == q or header.startswith(f"{q}_")), header)
 

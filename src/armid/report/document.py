@@ -33,12 +33,8 @@ FIRST_NUMBER = re.compile(r"\s*(?:below )?([-+]?(?:inf|(?:\d+\.?\d*|\.\d+)(?:[eE
 class Column:
     """One column of a table.
 
-    Parameters
-    ----------
-    key : name in the frame, and in the header of the CSV file.
-    header : heading with the unit; "" where it needs none.
-    digits : format of its numbers, such as ".3g"; "" for text. Numbers stand to the right.
-    factor : from the number in the frame (SI) to the one shown.
+    key: name in the frame, and in the header of the CSV file. header: heading with the unit; "" where it needs none.
+    digits: format of its numbers, such as ".3g"; "" for text. factor: from the number in the frame (SI) to that shown.
     """
 
     key: str
@@ -65,7 +61,6 @@ class Cell:
 
     @property
     def is_struck(self) -> bool:
-        """Whether the text does not hold."""
         return isinstance(self.text, Struck)
 
 
@@ -73,14 +68,10 @@ class Cell:
 class Table:
     """A table.
 
-    Parameters
-    ----------
-    name : of its files, without ending; "" for a table that is not written to files.
-    title, caption : the caption says how each number was computed.
-    frame : SI values, as a pandas frame or as rows in the order of the columns; None and NaN are left empty.
-    columns : what is shown, in order.
-    most : rows that are shown, 0 for a table that is only written to its CSV file.
-    grouped : whether rows that share the first column stand under it as a heading (terminal only).
+    name: of its files, without ending; "" for a table that is not written to files. caption: how each number was
+    computed. frame: SI values, as a pandas frame or as rows in the order of the columns; None and NaN are left empty.
+    most: rows that are shown, 0 for a table that is only written to its CSV file. grouped: whether rows that share the
+    first column stand under it as a heading (terminal only).
     """
 
     kind: ClassVar[str] = "table"
@@ -99,7 +90,6 @@ class Table:
         return f"{self.caption} {hidden} more lines are in {self.name}.csv." if hidden > 0 else self.caption
 
     def cells(self) -> list[list[Cell]]:
-        """Return the rows that are shown."""
         frame: Any = self.frame
         if hasattr(frame, "columns"):
             rows = zip(*(frame[c.key].head(self.most) for c in self.columns), strict=True)
@@ -109,10 +99,7 @@ class Table:
 
 
 def varying(part: Table) -> tuple[list[Column], list[list[Cell]], str]:
-    """Return what a narrow page shows of a table: columns whose cells differ, their cells, and what the others say.
-
-    Of fewer than three rows or four columns all are kept.
-    """
+    """Return what a narrow page shows of a table: columns whose cells differ, their cells, and what the others say."""
     rows = part.cells()
     texts = [{row[i].text for row in rows} - {""} for i in range(len(part.columns))]
     kept = [i for i, told in enumerate(texts) if len(rows) < LEAST_ROWS or len(told) > 1 or len(texts) < LEAST_COLUMNS]
@@ -146,12 +133,8 @@ def cell(value: Any, column: Column) -> Cell:
 class Figure:
     """A figure.
 
-    Parameters
-    ----------
-    name : of its files, without ending.
-    title, caption : the caption says what each mark is.
-    draw : returns it as matplotlib's; None for one that is only stored.
-    svg : its stored text; "" for one that is drawn when it is needed.
+    name: of its files, without ending. caption: what each mark is. draw: returns it as matplotlib's; None for one that
+    is only stored. svg: its stored text; "" for one that is drawn when it is needed.
     """
 
     kind: ClassVar[str] = "figure"
@@ -166,12 +149,8 @@ class Figure:
 class Gallery:
     """Figures side by side on a page.
 
-    Parameters
-    ----------
-    figures : in order.
-    slider : label of one control that fades all of them between their layers "before" and "after"; "" for none.
-    name : of the PNG file that shows them together, for Markdown; "" for none.
-    wide : whether each has a row of its own.
+    slider: label of one control that fades all of them between their layers "before" and "after"; "" for none. name: of
+    the PNG file that shows them together, for Markdown; "" for none. wide: whether each has a row of its own.
     """
 
     kind: ClassVar[str] = "gallery"
@@ -183,8 +162,6 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph."""
-
     kind: ClassVar[str] = "text"
     text: str
 
@@ -208,8 +185,6 @@ class Line:
 
 @dataclass(frozen=True)
 class Listing:
-    """Lines that are shown as they are; folded: on a page only when asked for."""
-
     kind: ClassVar[str] = "listing"
     title: str
     lines: tuple[Line, ...]
@@ -221,8 +196,6 @@ Part = Table | Figure | Gallery | Text | Sentences | Listing
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A heading with what stands under it: a paragraph, then parts."""
-
     title: str
     parts: tuple[Part, ...]
     text: str = ""
@@ -232,15 +205,8 @@ class Section:
 class Document:
     """A whole document.
 
-    Parameters
-    ----------
-    title : name of the campaign or study.
-    of : what made it, in a word or two.
-    question, answer : the answer in up to three sentences.
-    warning : what must be known first, "" for nothing.
-    facts : how it was made, a sentence each.
-    sections : in order.
-    main : the parts of the sections that a terminal shows below the answer.
+    of: what made it, in a word or two. answer: up to three sentences. warning: what must be known first, "" for
+    nothing. facts: how it was made, a sentence each. main: the parts of the sections that a terminal shows.
     """
 
     title: str
@@ -259,17 +225,14 @@ class Document:
 
     @property
     def main_tables(self) -> tuple[Table, ...]:
-        """The tables that a terminal shows."""
         return tuple(p for p in self.main if isinstance(p, Table))
 
     @property
     def tables(self) -> tuple[Table, ...]:
-        """All tables in order."""
         return tuple(p for s in self.sections for p in s.parts if isinstance(p, Table))
 
     @property
     def figures(self) -> tuple[Figure, ...]:
-        """All figures in order, without those of galleries."""
         return tuple(p for s in self.sections for p in s.parts if isinstance(p, Figure))
 
 
@@ -338,13 +301,11 @@ def stored_figures(titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str
 
 
 def remark_parts(first: Sequence[str], rest: Sequence[str]) -> tuple[Sentences, ...]:
-    """Return what must be known, and what is for the record, where there is any."""
     ranked = (("What must be known", first), ("For the record", rest))
     return tuple(Sentences(tuple(sentences), title) for title, sentences in ranked if sentences)
 
 
 def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) -> tuple[Table, ...]:
-    """Return a table of the correlations of the estimates, none for a single one."""
     rows = [(name, *row.values()) for name, row in correlation.items()]
     note = "Near +1 or -1: a change of one is made up for by the other."
     columns = ["parameter", *(Column(name, name, "+.3f") for name in correlation)]
@@ -352,15 +313,11 @@ def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) ->
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as people list them."""
     return " and ".join(([", ".join(names[:-1])] if names[1:] else []) + list(names[-1:]))
 
 
 def error_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]], unit: str, note: str = "") -> Table:
-    """Return a table of errors, of several outputs one below the other.
-
-    rows: the texts of the first columns, then the stored errors or None for none. unit: of the first output.
-    """
+    """Return a table of errors, of several outputs one below the other; rows end in the stored errors or None."""
     if len({name for *_, error in rows for name in (error or {}).get("outputs", ())}) > 1:
         return output_table(title, first, rows, note)
     factor, name = shown(1.0, unit)
@@ -390,10 +347,7 @@ def output_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...
 
 
 def others_text(*errors: Mapping[str, Any] | None) -> str:
-    """Return the RMSE of the outputs beside the first, on each of some sets of records, "" where there is one output.
-
-    errors: stored errors of train and held-out records, None for no such records.
-    """
+    """Return the RMSE of the outputs beside the first, on each of some sets of records, "" of one output."""
     said: dict[str, list[str]] = {}
     for error in (e for e in errors if e is not None):
         first = next((e for e in error.get("outputs", {}).values() if e["rmse"] == error["rmse"]), None)
@@ -404,12 +358,10 @@ def others_text(*errors: Mapping[str, Any] | None) -> str:
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:
-    """Return the RMSE of stored errors in the unit that people read, without the unit."""
     return "not finite" if error["rmse"] is None else f"{shown(error['rmse'], unit)[0]:.4g}"
 
 
 def records_note(shown_records: int, there_are: int) -> str:
-    """Return how many records are not shown, "" for none."""
     return "" if shown_records >= there_are else f"The first {shown_records} of {there_are} records are shown."
 
 
@@ -444,7 +396,6 @@ def five_digits(values: Array) -> list[float | None]:
 
 
 def points(curve: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Return the numbers of a stored curve, NaN where there is none."""
     return np.array(curve["x"], dtype=float), np.array(curve["y"], dtype=float)
 
 
@@ -461,10 +412,9 @@ def small_axes(width: float, height: float, heights: tuple[float, ...] = (1,)) -
 
 
 def record_axes(n: int, height: float, heights: Sequence[float] = (1,)) -> tuple[Any, list[list[Any]]]:
-    """Return a figure for n records in one or two columns, and the axes of each, above each other.
+    """Return a figure for n records in one or two columns, with room for title and legend, and the axes of each record.
 
-    There is room for a title on top and a legend at the bottom. height: of a row of records [inch]; heights: shares of
-    the axes of a record.
+    height: of a row of records [inch]; heights: shares of the axes of a record.
     """
     columns, k = 1 if n == 1 else 2, len(heights)
     rows = -(-n // columns)

@@ -12,11 +12,7 @@ if TYPE_CHECKING:
 
 
 def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
-    """Write each named table as CSV and LaTeX and each figure as PNG and SVG.
-
-    path_of: file name -> where to write it. The bytes depend on the document and the versions of the packages only: no
-    date, no place.
-    """
+    """Write each named table as CSV and LaTeX and each figure as PNG and SVG; the bytes hold no date and no place."""
     for table in document.tables:
         path_of(f"{table.name}.csv").write_text(csv(table), encoding="utf-8")
         if table.most:
@@ -47,7 +43,6 @@ def frame_of(table: Table) -> "DataFrame":
 
 
 def latex(table: Table) -> str:
-    """Return the rows that are shown as a LaTeX float with booktabs rules."""
     from pandas import DataFrame
 
     frame = DataFrame([[c.text for c in row] for row in table.cells()], columns=[c.header for c in table.columns])

@@ -75,13 +75,10 @@ PICTURE = "data:image/png;base64,"
 
 
 def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Markup:
-    """Return an SVG as part of a page.
+    """Return an SVG as part of a page; refuse what is none.
 
-    Elements and attributes that drawings do not need are left out, and so are references to anything outside.
-    prefix: set before each id, so that several can stand on one page; label: read out in place of the picture; where:
-    names it in an error.
-
-    Raises ArmidError for what is no SVG.
+    Elements and attributes that drawings do not need are left out, and so are references to anything outside. prefix:
+    set before each id, so that several can stand on one page; label: read out in place of the picture.
     """
     try:
         root = ElementTree.fromstring(text)
@@ -100,7 +97,6 @@ def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Marku
 
 
 def local(name: str) -> str:
-    """Return the name of an element or attribute without its namespace."""
     return name.rpartition("}")[2]
 
 

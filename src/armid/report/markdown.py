@@ -40,7 +40,6 @@ def part_texts(part: Part, section: str) -> Iterator[str]:
 
 
 def table_text(table: Table) -> str:
-    """Return a table, numbers to the right."""
     header = [escaped(c.header) for c in table.columns]
     rule = ["---:" if c.digits else "---" for c in table.columns]
     rows = [[f"~~{escaped(c.text)}~~" if c.is_struck else escaped(c.text) for c in row] for row in table.cells()]

@@ -29,7 +29,7 @@ Draw = Callable[[], Any]
 
 
 class Parts(NamedTuple):
-    """What is stored of a result: what its JSON holds, what its page needs beside, and name -> what draws a figure."""
+    """What is stored of a result, what its page needs beside, and name -> what draws a figure."""
 
     result: dict[str, Any]
     details: dict[str, Any]
@@ -40,10 +40,9 @@ class Parts(NamedTuple):
 class Kind:
     """A kind of result of a command on a campaign.
 
-    file : of the result, JSON. page, markdown : names of its page and of its Markdown.
-    module, function : of what makes its document of (result, details, SVG by name, command); imported when asked for,
-    as every other command starts faster without it. The module's FIGURES names the SVG files that are on the page, the
-    first of them is the one that `plot` draws; its `parts_of` makes the Parts of a result.
+    module, function: of what makes its document of (result, details, SVG by name, command); imported when asked for, as
+    every other command starts faster without it. The module's FIGURES names the SVG files on the page, the first of
+    them the one that `plot` draws; its `parts_of` makes the Parts of a result.
     """
 
     command: str
@@ -78,7 +77,6 @@ class Shown:
     """Show a document in Python and in a notebook; a subclass says which document."""
 
     def document(self) -> "Document":
-        """Return what the result says: the answer, tables, figures."""
         raise NotImplementedError
 
     @property
@@ -116,14 +114,10 @@ class Result(Shown):
         return self.parts.result
 
     def document(self) -> "Document":
-        """Return what its page says, without stored figures."""
         return self.kind.document(self.parts.result, self.parts.details, {}, "")
 
     def plot(self, name: str = "") -> Any:
-        """Draw one figure and return it, matplotlib's. name: which, "" for the first.
-
-        Raises ArmidError for a name that it does not have.
-        """
+        """Draw one figure and return it, matplotlib's. name: which, "" for the first."""
         figures = self.parts.figures
         if name and name not in figures:
             raise ArmidError(f"there is no figure '{name}': {', '.join(figures)} are known")
@@ -133,7 +127,6 @@ class Result(Shown):
         """Write JSON, figures, page and Markdown to a folder, all or none, and return their names.
 
         made_by: the command that is running and its settings, for the page.
-        Raises ArmidError for a place that is no folder.
         """
         from armid.report.html import html
         from armid.report.markdown import markdown
@@ -155,12 +148,7 @@ class Result(Shown):
 
 
 def document_of(folder: Path, kind: Kind, name: str) -> "Document":
-    """Return the document of what a folder holds.
-
-    folder: where the files are. name: of the folder, in the command that makes the page again.
-
-    Raises ArmidError for files that are not what the command writes, or that two runs of it wrote.
-    """
+    """Return the document of what a folder holds; name: of it, in the command that makes the page again."""
     result = read_json(folder / kind.file, kind.command)
     refuse_mixed(folder, kind)
     has_details = (folder / DETAILS).is_file() and kind is not IDENTIFIABILITY
@@ -204,10 +192,6 @@ def digest_of(path: Path) -> str:
 
 
 def read_json(path: Path, command: str) -> dict[str, Any]:
-    """Return a stored JSON table.
-
-    Raises ArmidError for a file that is none.
-    """
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
@@ -220,9 +204,9 @@ def read_json(path: Path, command: str) -> dict[str, Any]:
 class NewFiles:
     """Write files beside a folder and move them in when all are there, so that nothing half-written is found.
 
-    names: the files so far. A folder that is made for them goes again when nothing comes into it. manifest: name of a
-    file that tells the digest of each, "" for none; it comes in first, so that who is killed in between leaves files
-    that it does not fit. What a process of this machine left beside them when it was killed goes.
+    A folder that is made for them goes again when nothing comes into it. manifest: name of a file that tells the digest
+    of each, "" for none; it comes in first, so that who is killed in between leaves files that it does not fit. What a
+    process of this machine left beside them when it was killed goes.
     """
 
     def __init__(self, folder: Path, manifest: str = "") -> None:
@@ -240,14 +224,9 @@ class NewFiles:
 
     @property
     def place(self) -> Path:
-        """Where the files are until all are there."""
         return Path(self._beside.name)
 
     def path(self, name: str) -> Path:
-        """Return where to write a file for now.
-
-        Raises ArmidError when a folder has its name.
-        """
         if (self.folder / name).is_dir():
             raise ArmidError(f"--out {self.folder} holds a folder {name}: a place for a file of that name is expected")
         self.names.append(name)
@@ -273,7 +252,6 @@ class NewFiles:
 
 
 def beside() -> str:
-    """Return how folders of files on their way in begin, of any process of this machine."""
     return f".armid-{sha256(platform.node().encode()).hexdigest()[:8]}-"
 
 
@@ -290,10 +268,7 @@ def sweep(folder: Path) -> None:
 
 
 def refuse_unwritable(folder: Path | None, file: str = "") -> None:
-    """Refuse a folder before the work, not after it; file: the first that would come into it.
-
-    Raises ArmidError for a file and for a disk that is full, OSError for a place where nothing can be written.
-    """
+    """Refuse a folder before the work, not after it; file: the first that would come into it."""
     if folder is not None:
         try:
             with NewFiles(folder):

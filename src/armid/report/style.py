@@ -59,12 +59,10 @@ def pyplot() -> Any:
 
 
 def look(i: int) -> dict[str, Any]:
-    """Return colour and dashes of the i-th of up to 21 lines."""
     return {"color": COLOURS[i % len(COLOURS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)]}
 
 
 def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list[Any]]:
-    """Return a figure and n axes in rows of so many columns, each of this size [inch]."""
     plt = pyplot()
     columns = max(1, min(columns, n))
     rows = -(-n // columns)
@@ -152,8 +150,7 @@ def svg_text(figure: Any) -> str:
 def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
     """Return which samples of a curve are to be drawn, rising: all, or the least and the largest of each interval.
 
-    The samples are cut into most/2 - 1 intervals of equal number, so that no peak is lost; both ends are kept.
-    values: (n_samples,). most: points, at least 4.
+    So no peak is lost; both ends are kept. most: points, at least 4.
     """
     n = len(values)
     if n <= most:
@@ -181,7 +178,6 @@ def panel_height(n_lines: int) -> float:
 
 
 def row_names(axis: Any, i: int, names: Sequence[str]) -> None:
-    """Name the rows of the i-th panel, two panels side by side: the left one carries the names."""
     axis.set_yticks(range(len(names)), names if i % 2 == 0 else [""] * len(names))
 
 
@@ -194,10 +190,7 @@ def legend_below(figure: Any, ncols: int, handles: Sequence[Any] | None = None) 
 
 
 def named_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int]) -> None:
-    """Draw lines over a common x and name each beside its end, in the order of the ends.
-
-    colours: name -> number of its colour and dashes, so that a name looks alike in all figures.
-    """
+    """Draw lines over a common x and name each beside its end; colours: name -> number of its colour and dashes."""
     draw_lines(axis, x, lines, colours)
     values = {name: np.asarray(y, float) for name, y in lines.items()}
     finite = {name: y[np.isfinite(y)] for name, y in values.items()}
@@ -228,14 +221,12 @@ def draw_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours:
 
 
 def write_name(axis: Any, name: str, place: float, colours: Mapping[str, int]) -> None:
-    """Write a name beside the axes with a sample of its line."""
     there = {"transform": axis.transAxes, "clip_on": False}
     axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], lw=1.9, **there, **look(colours[name]))
     axis.text(BESIDE + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
 
 
 def name_distance(axis: Any) -> float:
-    """Return the distance of two names as a share of the height of the axes."""
     grid = axis.get_subplotspec().get_gridspec()
     return float(APART_INCH / (axis.figure.get_size_inches()[1] / grid.nrows - FRAME_INCH))
 

@@ -27,7 +27,6 @@ def show(document: Document) -> None:
     """Print warning, answer and main parts of a document; nothing from files is taken for markup or control codes.
 
     The width is that of the terminal, or COLUMNS; into a pipe without either tables are 80 wide and sentences whole.
-    Raises BrokenPipeError when who reads the output has gone.
     """
     from rich.console import Console
 
@@ -60,10 +59,7 @@ def show_on(console: "Console", document: Document) -> None:
 
 
 def print_table(table: Table, console: "Console") -> None:
-    """Print the columns of a table that fit, the first ones first, and name the others below.
-
-    Rows of a grouped table that share the first column stand under it as a heading.
-    """
+    """Print the columns of a table that fit, the first ones first, and name the others below."""
     rows, columns = table.cells(), list(table.columns)
     if not console.is_terminal:
         # nothing can be struck through in a pipe
@@ -84,10 +80,7 @@ def print_table(table: Table, console: "Console") -> None:
 
 
 def fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int) -> list[int]:
-    """Return the widths of the columns that fit into so many letters, the first of them at least.
-
-    Intervals are folded where fewer than five columns would fit otherwise.
-    """
+    """Return the widths of the columns that fit, the first at least; intervals are folded to make room for five."""
     whole, folded = (folded_to(columns, rows, room, least) for least in (LEAST_NUMBERS, LEAST_WORDS))
     return folded if len(whole) < min(FEW, len(columns)) else whole
 

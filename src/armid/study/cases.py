@@ -42,11 +42,7 @@ FINER = 8
 
 @dataclass(frozen=True)
 class Source:
-    """Hold a campaign that is read.
-
-    campaign: folder, relative to the study's file. records: files of it. digest: hash of these files and of
-    campaign.toml, so that runs on other records are other runs.
-    """
+    """A campaign that is read: folder, relative to the study's file, files, and a hash of them and campaign.toml."""
 
     campaign: str
     records: tuple[str, ...]
@@ -55,12 +51,9 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Hold one case.
+    """Hold one case: manoeuvres to simulate (strokes), a campaign to read (source) or a problem of `armid.suite()`.
 
-    truth: parameter -> true value, SI, empty where not known; all parameters of the model where the records are
-    simulated. published: values of others to stand beside. space: bounds and fixed values.
-    strokes: manoeuvres to simulate, each with its constants (SI), duration_s and role; or source: the campaign to read;
-    or suite: the problem of `armid.suite()`, which has a fitness of its own.
+    truth: parameter -> true value, SI, empty where not known. published: values of others to stand beside.
     """
 
     name: str
@@ -74,24 +67,17 @@ class Case:
 
     @property
     def bounds(self) -> dict[str, tuple[float, float]]:
-        """Free parameter -> bounds, SI."""
         box = zip(self.space.names, self.space.low, self.space.high, self.space.free, strict=True)
         return {name: (float(low), float(high)) for name, low, high, free in box if free}
 
     @property
     def fixed(self) -> dict[str, float]:
-        """Fixed parameter -> value, SI."""
         values = zip(self.space.names, self.space.fixed, self.space.free, strict=True)
         return {name: float(value) for name, value, free in values if not free}
 
 
 def cases_of(spec: StudySpec, model: Model, registry: StudyRegistry, folder: Path, where: str) -> tuple[Case, ...]:
-    """Return the cases of a study, random ones last.
-
-    model: the plant with the study's effects. folder: of the study's file.
-
-    Raises ArmidError for a case that asks for what cannot be.
-    """
+    """Return the cases of a study, random ones last; model: the plant with the study's effects."""
     cases = []
     for i, table in enumerate(spec.cases):
         name = table.get("name")
@@ -184,10 +170,7 @@ def _campaign_case(
 
 
 def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
-    """Return where the campaign of a study is.
-
-    Raises ArmidError for a path that leads out of the folder of the study's file, also through a link.
-    """
+    """Return where the campaign of a study is; refuse one outside the folder of its file, also through a link."""
     pure = PurePosixPath(campaign.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(campaign).drive or ".." in pure.parts or not campaign.isprintable():
         raise ArmidError(f"{where}: campaign {quoted(campaign)} leads out of the folder of the study, a folder inside "
@@ -203,7 +186,6 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
 
 
 def _with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -> Campaign:
-    """Return the campaign with some of its records, None: all."""
     if files is None:
         return campaign
     there = [r.file for r in campaign.records]
@@ -217,7 +199,6 @@ def _with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -
 
 
 def digest_of(folder: Path, files: Iterable[str]) -> str:
-    """Return a hash of some files of a campaign."""
     digest = hashlib.sha256()
     for name in files:
         content = (folder / name).read_bytes()
@@ -235,7 +216,6 @@ def _simulated_case(
     model: Model,
     where: str,
 ) -> Case:
-    """Return a case whose records the engine makes at the truth."""
     if model.plant.inputs:
         raise ArmidError(f"{where}: plant '{model.plant.name}' is driven by {model.plant.inputs[0].name}, which no "
                          "manoeuvre tells: a campaign is expected")  # fmt: skip
@@ -249,7 +229,6 @@ def _simulated_case(
 
 
 def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, where: str) -> dict[str, Any]:
-    """Return one manoeuvre, its constants laid over those of the study."""
     manoeuvre = validated(ManoeuvreSpec, table, where, [key.key for key in plant.keys])
     record = RecordSheet(file="", role=manoeuvre.role, constants=manoeuvre.constants, keys=manoeuvre.keys)
     constants = record_constants(plant, spec.constants, record, where)
@@ -285,7 +264,6 @@ def _check_truth(case: Case, where: str) -> None:
 
 
 def _check_windows(case: Case, spec: StudySpec, where: str) -> None:
-    """Refuse a window that holds too little of a manoeuvre."""
     for window in spec.windows_s:
         if window == WHOLE:
             continue
@@ -300,9 +278,8 @@ def _check_windows(case: Case, spec: StudySpec, where: str) -> None:
 
 
 def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:
-    """Return n cases whose truths are a Latin hypercube over the bounds of the free parameters.
+    """Return n cases whose truths are a Latin hypercube over the bounds, a margin kept free at each side.
 
-    Each range is cut into n equal parts and each part is hit once; the margin is kept free at each side.
     Written out, as the points that a library draws from a seed change between its versions, and with them the cases.
     Source: McKay, Beckman, Conover 1979, doi:10.2307/1268522.
     """
@@ -322,10 +299,7 @@ def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:
 
 
 def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ...]:
-    """Return the records of a simulated case over their whole length, without noise.
-
-    settings: of a run. Raises ArmidError where the truth diverges or does not move.
-    """
+    """Return the records of a simulated case over their whole length, without noise; refuse one without a motion."""
     truth = np.array([settings["truth"][name] for name in model.parameters])[np.newaxis]
     interval, records = settings["interval_s"], []
     for i, stroke in enumerate(settings["strokes"], 1):
@@ -347,7 +321,6 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
 
 def _with_signal(record: Record, measured: Array) -> Record:
-    """Return the record with another signal over its whole length, in one piece."""
     pieces = (Piece(record.manoeuvre, measured, slice(0, measured.size)),)
     return replace(record, measured=measured, pieces=pieces, whole_pieces=pieces)
 

@@ -30,11 +30,7 @@ def perform_batch(runs: tuple[ClaimedRun, ...], setup: WorkerSetup) -> list[Outc
 
 
 class DaskPool:
-    """Perform runs on a Dask cluster, as `LocalPool` does on this machine; batches of a lost worker are sent again.
-
-    address: of the scheduler, as tcp://host:8786.
-    Raises ArmidError when `distributed` is not installed and when the cluster does not answer.
-    """
+    """Perform runs on a Dask cluster, as `LocalPool` does on this machine; batches of a lost worker are sent again."""
 
     def __init__(self, address: str, setup: WorkerSetup) -> None:
         self.setup, self.address = setup, address
@@ -89,7 +85,6 @@ class DaskPool:
 
 
 def _connected(address: str) -> tuple[Any, Any]:
-    """Return a client of a cluster, and the error of a lost worker."""
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:

@@ -14,7 +14,7 @@ from armid.report.html import html
 from armid.report.markdown import markdown
 from armid.report.result import NewFiles
 from armid.study.analyses.analysis import PAPER, Evidence, wide_runs
-from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, check_names, own_sections
+from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, own_sections
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
 from armid.study.analyses.ranks import class_ranks, suite_answer
@@ -42,22 +42,10 @@ def report_of(
 ) -> Document:
     """Return the document of a study as far as it was run; nothing is drawn yet.
 
-    Parameters
-    ----------
-    results
-        As `load_study` gives them.
-    key
-        File of a truth that was kept from a study of loops. It is not opened here: the report says what scores it.
-    own
-        Analyses of a user, name -> function of the runs.
-    again
-        Command that makes the report again, "" for the plain one.
-
-    Raises
-    ------
-    ArmidError
-        When no run has ended, for a key to a study that knows its truths, for a kind of study that nobody knows, and
-        for an analysis of a user that returns no table and no figure.
+    key: file of a truth that was kept from a study of loops, which is not opened here. own: analyses of a user. again:
+    command that makes the report again, "" for the plain one.
+    Raises ArmidError when no run has ended, for a key to a study that knows its truths, for a kind of study that nobody
+    knows, and for an analysis of a user that returns no table and no figure.
     """
     study, own = results.study, own or {}
     kind = known_kind(study)
@@ -65,7 +53,9 @@ def report_of(
         raise ArmidError(f"study '{study['name']}' knows its truths, a key is not expected")
     if results.runs.empty:
         raise ArmidError(f"study '{study['name']}' has no finished run: nothing can be reported")
-    check_names(own)
+    for name in own:
+        if name in {a.name for a in ANALYSES}:
+            raise ArmidError(f"analyses: '{name}' is there already, give yours another name")
     if kind == IDENTIFIES:
         evidence = Evidence(results)
         found = [Section(a.title, tuple(a.parts(evidence))) for a in (OF_SUITES if evidence.is_suite else ANALYSES)]
@@ -142,10 +132,6 @@ def write_report(document: Document, files: NewFiles) -> None:
 
 
 def known_kind(study: dict[str, Any]) -> str:
-    """Return the kind of a study.
-
-    Raises ArmidError for one that this version does not know.
-    """
     kind = str(study.get("kind", IDENTIFIES))
     if kind not in KIND_NAMES:
         raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of {', '.join(KIND_NAMES)} is expected")
@@ -173,7 +159,6 @@ def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
 
 
 def lowest_fitness(evidence: Evidence) -> str:
-    """Return who came to the lowest median fitness, of each fitness."""
     done = evidence.runs[evidence.runs["status"] == "done"]
     if done.empty:
         return "No run has a result."
@@ -187,7 +172,6 @@ def percent(value: float) -> str:
 
 
 def state_of(study: dict[str, Any]) -> str:
-    """Return how much of the study was run."""
     planned, done, failed = (int(study[key]) for key in ("n_planned", "n_done", "n_failed"))
     what = "campaigns" if study.get("kind") == CLOSES_LOOP else "runs"
     lost = f", {failed} of them failed" if failed else ""
@@ -223,7 +207,6 @@ def loop_facts(study: dict[str, Any], scored: bool) -> tuple[str, ...]:
 
 
 def origin(study: dict[str, Any]) -> str:
-    """Return where the records come from."""
     read = [c for c in study["cases"] if c.get("campaign")]
     parts = [SYNTHETIC] if len(read) < len(study["cases"]) else []
     if read:
@@ -233,13 +216,11 @@ def origin(study: dict[str, Any]) -> str:
 
 
 def versions(study: dict[str, Any]) -> str:
-    """Return the packages that made the runs."""
     named = sorted(dict(study.get("versions") or {}).items())
     return f"Versions: {', '.join(f'{name} {version}' for name, version in named)}."
 
 
 def made_section(results: StudyResults, again: str) -> Section:
-    """Return commands, the study's file and the equations of its models."""
     study = results.study
     plugins = [word for name in study.get("plugins", ()) for word in ("--plugin", str(name))]
     run = shlex.join(["armid", "study", str(study.get("file", f"{study['name']}.toml")), *plugins])

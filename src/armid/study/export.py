@@ -28,10 +28,7 @@ LARGEST_INSTANCE = 65_535
 
 
 def export_ioh(results: StudyResults, path_of: Callable[[str], Path]) -> int:
-    """Write one .json and one .dat for each algorithm and function; return how many runs they hold.
-
-    path_of: file name -> where to write it. No more than one trace is in memory.
-    """
+    """Write one .json and one .dat for each algorithm and function; return how many runs they hold."""
     found = outcomes(results.runs, results.parameters)
     found["function"] = found["case"] + ", " + found["setting"] + ", " + found["fitness"]
     ids = {name: i for i, name in enumerate(dict.fromkeys(found["function"]), 1)}
@@ -92,8 +89,6 @@ def instance_numbers(found: DataFrame) -> dict[int, int]:
 
 
 def lines(trace: RunTrace, used: int) -> Iterator[str]:
-    """Yield the improvements of a run as text, every digit kept, from evaluation 1 to the last one."""
-
     def line(evaluation: int, value: float, x: np.ndarray) -> str:
         return " ".join([str(evaluation), repr(value), *(repr(float(v)) for v in x)]) + "\n"
 
@@ -106,10 +101,7 @@ def lines(trace: RunTrace, used: int) -> Iterator[str]:
 
 
 def export_reports(results: StudyResults, path_of: Callable[[str], Path]) -> int:
-    """Write CAMPAIGN/report.json for each campaign that was closed, as `armid close-loop` does; return how many.
-
-    path_of: file name -> where to write it.
-    """
+    """Write CAMPAIGN/report.json for each campaign that was closed, as `armid close-loop` does; return how many."""
     loops = results.loops
     for case, report in zip(loops["case"], loops["report"], strict=True):
         text = json.dumps(report, indent=2, allow_nan=False) + "\n"

@@ -32,12 +32,6 @@ class LoopCase:
 
 @dataclass(frozen=True, eq=False)
 class LoopStudy:
-    """Hold a study of loops that was read and found possible.
-
-    text: the file as it was read. folder: where it lies. cases: the campaigns. candidates: names of the effects that
-    are looked for. registry: what it may name.
-    """
-
     kind: ClassVar[str] = CLOSES_LOOP
     labels: ClassVar[list[str]] = [CLOSES_LOOP]
 
@@ -54,17 +48,13 @@ class LoopStudy:
 
     @property
     def case_names(self) -> list[str]:
-        """Names of the campaigns."""
         return [case.name for case in self.cases]
 
     @classmethod
     def read(
         cls, table: Mapping[str, Any], text: str, folder: Path, where: str, registry: StudyRegistry
     ) -> "LoopStudy":
-        """Return the study of a TOML table; nothing is simulated, and the key is not opened.
-
-        Raises ArmidError for an unknown key or name, and where the campaigns are not there.
-        """
+        """Return the study of a TOML table; nothing is simulated, and the key is not opened."""
         spec = validated(LoopSpec, table, where)
         if spec.report not in LOOP_REPORTS:
             raise unknown_name("report", spec.report, LOOP_REPORTS[1:], where)
@@ -77,7 +67,6 @@ class LoopStudy:
         """Nothing is to be checked: a campaign that cannot be read fails alone."""
 
     def candidates_for(self, case: str) -> tuple[str, ...]:
-        """Return the effects that are looked for in a campaign."""
         own = (names for pattern, names in self.spec.rivals.items() if fnmatchcase(case, pattern))
         return next(own, self.candidates)
 
@@ -115,10 +104,6 @@ class LoopStudy:
 
     @staticmethod
     def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
-        """Close the loop on one campaign, on one thread.
-
-        Raises ArmidError for a campaign that cannot be read or has changed, and whatever the loop raises.
-        """
         began = time.process_time()
         registry, folder = cache.registry, cache.folder / settings["campaigns"] / settings["case"]
         if _digest(folder) != settings["digest"]:

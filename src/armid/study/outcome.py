@@ -62,11 +62,10 @@ class Performed(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Hold what a run gave, as plain values that a store can keep.
+    """What a run gave, as plain values that a store can keep.
 
-    status: "done", or "failed" with the reason in `error`. used: simulations. seconds: of the wall clock.
-    started_at: date and time, for people; nothing depends on it. model: its equations. versions: package -> version.
-    rows: table of the store -> rows of it without their run.
+    status: "done", or "failed" with the reason in `error`. used: simulations. seconds: of the wall clock. started_at:
+    for people; nothing depends on it. rows: table of the store -> rows of it without their run.
     """
 
     run: str
@@ -84,11 +83,7 @@ Array = NDArray[np.float64]
 
 
 class RunTrace(NamedTuple):
-    """The improvements of one run.
-
-    evaluations: counts from 1, (n_improvements,); values: best fitness from there on, (n_improvements,);
-    X: its candidates, SI, (n_improvements, n_parameters), in the order of names.
-    """
+    """The improvements of one run: counts from 1 and best fitness, (n,); X: candidates, SI, (n, n_parameters)."""
 
     run: str
     evaluations: NDArray[np.int64]
@@ -104,10 +99,7 @@ def packed(evaluations: NDArray[np.int64], values: Array, X: Array) -> bytes:
 
 
 def unpacked(run: str, content: bytes, names: tuple[str, ...]) -> RunTrace:
-    """Return a trace out of its bytes.
-
-    Raises ValueError for a trace that would fill the memory, or whose columns are not equally long.
-    """
+    """Return a trace out of its bytes; ValueError for one that would fill the memory or has unequal columns."""
     unpacking = zlib.decompressobj()
     raw = unpacking.decompress(content, LARGEST_TRACE)
     if unpacking.unconsumed_tail or not unpacking.eof or len(raw) % (8 * (2 + len(names))):

@@ -57,7 +57,6 @@ class WorkerSetup:
 
 
 def performed_apart(setup: WorkerSetup, run: ClaimedRun) -> Outcome:
-    """Perform one run in a worker process of its own."""
     worker = WorkerProcess(setup)
     try:
         return worker.perform([run])[0]
@@ -72,13 +71,11 @@ class BatchSize:
         self._seconds = BATCH_S
 
     def update(self, outcomes: Sequence[Outcome]) -> None:
-        """Take finished runs into account."""
         for outcome in outcomes:
             self._seconds += 0.2 * (outcome.seconds - self._seconds)
 
     @property
     def n_runs(self) -> int:
-        """Runs of a batch."""
         return max(1, min(LARGEST_BATCH, int(BATCH_S / max(self._seconds, 1e-6))))
 
 
@@ -92,11 +89,9 @@ class LocalPool:
 
     @property
     def held(self) -> int:
-        """Number of runs that were given and have not come back."""
         return len(self._waiting) + sum(worker.held for worker in self.workers)
 
     def wanted(self) -> int:
-        """Return how many further runs to give now."""
         enough = AHEAD * len(self.workers)
         return enough + self._batch.n_runs if self.held <= enough else 0
 
@@ -120,7 +115,6 @@ class LocalPool:
             worker.stop()
 
     def _hand_out(self) -> None:
-        """Give each worker what it needs to go on, the least busy first."""
         for n in range(AHEAD):
             for worker in self.workers:
                 if self._waiting and worker.held <= n:
@@ -145,7 +139,6 @@ class WorkerProcess:
 
     @property
     def held(self) -> int:
-        """Number of runs that were given and are not finished."""
         return len(self.waiting) + len(self._sent)
 
     @property
@@ -160,7 +153,6 @@ class WorkerProcess:
         self._send()
 
     def seconds_left(self) -> float:
-        """Return how long the present run may still take [s]."""
         limit = self.setup.time_limit if self._ready else START_S
         return self._since + limit - self._clock() if self._sent or not self._ready else limit
 
@@ -181,7 +173,6 @@ class WorkerProcess:
         return outcomes
 
     def perform(self, runs: list[ClaimedRun]) -> list[Outcome]:
-        """Perform runs and wait for all of them."""
         self.give(runs)
         outcomes: list[Outcome] = []
         while self.held:
@@ -313,7 +304,6 @@ def sigint_blocked() -> Iterator[None]:
 
 
 def _cause(code: int) -> str:
-    """Return how a process ended, in words."""
     if code >= 0:
         return f"with code {code}"
     try:

@@ -81,10 +81,7 @@ class StudyResults(Shown):
         return {**counts, "question": self.study.get("question", ""), "answer": self.document().said, "runs": runs}
 
     def plot(self, name: str = "") -> Any:
-        """Draw one figure of the report and return it, matplotlib's. name: which, "" for the first.
-
-        Raises ArmidError for a name that it does not have.
-        """
+        """Draw one figure of the report and return it, matplotlib's. name: which, "" for the first."""
         figures = {f.name: f.draw for f in documents().report_of(self).figures if f.draw is not None}
         if not figures or (name and name not in figures):
             raise ArmidError(f"the report has no figure '{name}': {nearest(name, figures)}")
@@ -103,10 +100,7 @@ class StudyResults(Shown):
         return pd.concat(frames, ignore_index=True) if frames else self._frame(None)
 
     def trace_of(self, run: str) -> pd.DataFrame:
-        """Return the improvements of one run.
-
-        Raises ArmidError for a run that is not there or has failed.
-        """
+        """Return the improvements of one run; ArmidError for one that is not there or has failed."""
         for trace in self._traces(f"{TRACES} WHERE p.run = ?", (run,)):
             return self._frame(trace)
         raise ArmidError(f"{self.path} holds no trace of run '{run}': the id of a finished run is expected")
@@ -124,10 +118,7 @@ class StudyResults(Shown):
             return found.assign(report=[json.loads(text) for text in found["report"]])
 
     def settings_of(self, run: str) -> dict[str, Any]:
-        """Return all that decided a run.
-
-        Raises ArmidError for a run that is not there.
-        """
+        """Return all that decided a run."""
         with _reading(self.path) as connection:
             row = connection.execute("SELECT settings FROM settings WHERE run = ?", (run,)).fetchone()
         if row is None:
@@ -137,10 +128,7 @@ class StudyResults(Shown):
         return settings
 
     def text_of(self, digest: str) -> str:
-        """Return the text whose hash a run names: the equations of its model, or the versions (JSON) it ran on.
-
-        Raises ArmidError for a hash that is not there.
-        """
+        """Return the text whose hash a run names: the equations of its model, or the versions (JSON) it ran on."""
         with _reading(self.path) as connection:
             row = connection.execute("SELECT text FROM texts WHERE hash = ?", (digest,)).fetchone()
         if row is None:
@@ -217,7 +205,6 @@ def _runs(connection: sqlite3.Connection) -> pd.DataFrame:
 
 
 def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:
-    """Return one row a run and free parameter, with the truth of its case beside."""
     found = pd.read_sql_query(PARAMETERS, connection)
     truths = {(case["name"], name): v for case in study["cases"] for name, v in case["truth"].items()}
     keys = zip(found.pop("case"), found["parameter"], strict=True)
@@ -232,7 +219,6 @@ def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.Dat
 
 
 def _versions(connection: sqlite3.Connection) -> dict[str, str]:
-    """Return package -> version; several where runs were made on several."""
     query = "SELECT DISTINCT t.text FROM plan JOIN runs r USING (run) JOIN texts t ON t.hash = r.versions"
     found: dict[str, list[str]] = {}
     for (text,) in connection.execute(query):
@@ -246,7 +232,6 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
     """Give a connection that cannot write.
 
     A store whose runner was killed has a log beside it, which cannot be read in a read-only folder: it is copied then.
-    Raises ArmidError for what is no store.
     """
     with translate_errors(path):
         connection = _connected(path)

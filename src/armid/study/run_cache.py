@@ -36,10 +36,7 @@ SHARED = (
 
 @dataclass(frozen=True, eq=False)
 class PreparedCase:
-    """Hold a case ready to run on: whole records without noise, and replays of them in a window.
-
-    equations: of the model. records: whole ones that noise is added to, empty for records that are read.
-    """
+    """A case ready to run on; records: whole ones that noise is added to, empty for records that are read."""
 
     equations: str
     space: Space
@@ -48,11 +45,7 @@ class PreparedCase:
 
 
 class RunCache:
-    """Make what runs need, and keep it for the next run.
-
-    registry: what settings may name. folder: of the study's file, where campaigns are read from.
-    What is kept changes no result: it depends on the settings alone.
-    """
+    """Make what runs need, and keep it for the next run; what is kept depends on the settings alone."""
 
     def __init__(self, registry: StudyRegistry, folder: Path) -> None:
         self.registry, self.folder = registry, folder
@@ -110,7 +103,6 @@ class RunCache:
         return read_campaign(path, self.registry.plants, self.registry.effects)
 
     def _once(self, what: str, of: Mapping[str, Any], make: Callable[[], Any]) -> Any:
-        """Return what was made of some settings before, or make it."""
         key = what + json.dumps(of, sort_keys=True)
         if key not in self._kept:
             self._kept[key] = make()

@@ -31,10 +31,7 @@ Progress = Callable[[Counts, Outcome | None], None]
 
 @dataclass(frozen=True)
 class Ending:
-    """Tell how a runner ended: where the store is, how far its study is, and what this runner did of it.
-
-    others: processes that are still at runs of the study.
-    """
+    """How a runner ended: how far its study is, what it did, and the other processes still at runs of the study."""
 
     study: Task
     folder: Path
@@ -231,7 +228,6 @@ class ProgressBar:
             self._bar.stop()
 
     def update(self, counts: Counts, outcome: Outcome | None) -> None:
-        """Move the bar: counts at the start, and a run that has finished since."""
         if outcome is None:
             self._began = time.monotonic()
         else:

@@ -43,8 +43,6 @@ MOST_HELD = 10**6
 
 
 def tested(kind: Kind, test: Callable[[Any], bool]) -> Kind:
-    """Return the kind of a value that is of a kind and passes a test."""
-
     def both(value: object) -> Any:
         if test(kind(value)):
             return kind(value)
@@ -89,7 +87,6 @@ def counts(value: object) -> tuple[int, ...]:
 
 
 def names(value: object) -> tuple[str, ...]:
-    """Return names: one name stands for a list of it."""
     return (text(value),) if isinstance(value, str) else tuple(list_of(text, 1)(value))
 
 
@@ -191,8 +188,6 @@ class SuiteSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class EntrySpec:
-    """Declare an [[identifiers]] entry; what is not given is the study's."""
-
     name: str = field(metadata=key(text, "the name of an identifier"))
     label: str | None = field(default=None, metadata=LINE)
     budget: int | None = field(default=None, metadata=key(count, "a whole number above 0"))
@@ -270,7 +265,7 @@ class LoopSpec:
 
 @dataclass(frozen=True, eq=False)
 class StudyRegistry:
-    """Hold what a study may name: name -> plant, effect, fitness or identifier.
+    """What a study may name: name -> plant, effect, fitness or identifier.
 
     plugins: `FILE.py:attribute` of the user's own. digests: (kind, name) -> hash of the file that it was read from; it
     is part of a run's settings, so that results of an older version of that file are not taken for the present one's.
@@ -297,10 +292,6 @@ class StudyRegistry:
         return self.registry.identifiers
 
     def identifier(self, name: str, where: str) -> Identifier:
-        """Return an identifier, also a chain or a multistart.
-
-        Raises ArmidError with the nearest name for an unknown one.
-        """
         try:
             return identifier_of(name, self.identifiers)
         except ArmidError as error:
@@ -313,10 +304,7 @@ class StudyRegistry:
 
 
 def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
-    """Return what may be named: catalogues, entry points, and the user's own. This runs the code of the plug-ins.
-
-    Raises ArmidError for a plug-in that cannot be used.
-    """
+    """Return what may be named: catalogues, entry points, and the user's own. This runs the code of the plug-ins."""
     named = tuple(plugins)
     registry = load_registry(named)
     digests = {}
@@ -328,10 +316,6 @@ def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
 
 
 def lookup(there: Mapping[str, Any], name: str, what: str, where: str) -> Any:
-    """Return what is registered under a name.
-
-    Raises ArmidError with the nearest name for an unknown one.
-    """
     if name not in there:
         raise unknown_name(what, name, there, where)
     return there[name]

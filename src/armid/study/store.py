@@ -77,7 +77,7 @@ VOID = "DELETE FROM claims WHERE place = ? AND pid = ? AND start = ?"
 
 
 class Counts(NamedTuple):
-    """Tell how far a study is: runs planned, done, failed, and the simulations that the missing ones may make."""
+    """Runs planned, done and failed, and the simulations that the missing ones may make."""
 
     planned: int
     done: int
@@ -86,14 +86,12 @@ class Counts(NamedTuple):
 
     @property
     def missing(self) -> int:
-        """Runs that are neither done nor failed."""
         return self.planned - self.done - self.failed
 
 
 class Store:
-    """Write to the store of a study.
+    """Write to the store of a study; only: patterns of case and identifier that this runner looks at.
 
-    folder: where study.sqlite is or will be. only: patterns of case and identifier that this runner looks at.
     Every finished run is one transaction. A run that is there already stays as it is, so that nothing is there twice.
     Raises ArmidError with one sentence for all that the disk refuses.
     """
@@ -118,10 +116,7 @@ class Store:
         closed(self._connection)
 
     def plan(self, description: Mapping[str, Any], planned: Iterable[Planned]) -> None:
-        """Set what the study consists of now; finished runs stay, also those that it no longer asks for.
-
-        Raises ArmidError when the file holds another study.
-        """
+        """Set what the study consists of now; finished runs stay, also those that it no longer asks for."""
         with translate_errors(self.path), transaction(self._connection):
             name, before = str(description["name"]), self._kept("description")
             other = description_of(self.path, before)["name"] if before else name
@@ -170,7 +165,6 @@ class Store:
 
         When there is none left, claims of processes that have ended are void, and those of other machines too: at worst
         a run is then made twice, and kept once.
-        Raises ArmidError when another runner has changed the plan.
         """
         with translate_errors(self.path), transaction(self._connection):
             if self._kept("plan") != self._plan:
@@ -207,13 +201,11 @@ class Store:
         return is_new
 
     def _text(self, text: str) -> str:
-        """Keep a text once, and return its hash."""
         digest = hashlib.sha256(text.encode()).hexdigest()[:16]
         self._connection.execute("INSERT OR IGNORE INTO texts VALUES (?, ?)", (digest, text))
         return digest
 
     def counts(self) -> Counts:
-        """Return how far the runs are that this runner looks at."""
         with translate_errors(self.path):
             planned, finished, failed, left = self._connection.execute(COUNTS, self._chosen).fetchone()
         return Counts(planned, finished - failed, failed, left)
@@ -251,8 +243,6 @@ def opened(path: Path) -> sqlite3.Connection:
     """Return a connection that writes, to a new file or to one of ours.
 
     A write-ahead log is kept: a process that is killed at any moment leaves every finished transaction and no half one.
-
-    Raises ArmidError for a file of another program or of a newer version.
     """
     with translate_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -275,7 +265,6 @@ def opened(path: Path) -> sqlite3.Connection:
 
 
 def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = False) -> None:
-    """Refuse a file that is no store of this version."""
     try:
         # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
         is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
@@ -349,10 +338,7 @@ def closed(connection: sqlite3.Connection) -> None:
 
 @contextmanager
 def corruption_guard(file: Path, what: str) -> Iterator[None]:
-    """Turn content that cannot be decoded into one sentence.
-
-    Raises ArmidError naming the file and what of it is damaged.
-    """
+    """Turn content that cannot be decoded into one sentence, naming the file and what of it is damaged."""
     try:
         yield
     except ArmidError:
@@ -362,10 +348,6 @@ def corruption_guard(file: Path, what: str) -> Iterator[None]:
 
 
 def description_of(file: Path, text: str) -> dict[str, Any]:
-    """Return the description of a study.
-
-    Raises ArmidError when it is none.
-    """
     with corruption_guard(file, "the description of the study"):
         found = json.loads(text)
     missing = [word for word in WORDS if not isinstance(found, dict) or word not in found]
@@ -375,10 +357,9 @@ def description_of(file: Path, text: str) -> dict[str, Any]:
 
 
 class ProcessIdentity(NamedTuple):
-    """Name a process.
+    """A process: its place (machine, boot, and space of numbers, as a container has its own), number, and start.
 
-    place: machine, its boot, and the space in which its numbers count (a container has its own). pid: its number.
-    start: when it started, in ticks since that boot, "" where the system does not tell: numbers are used again.
+    start: in ticks since that boot, "" where the system does not tell: numbers are used again.
     """
 
     place: str
@@ -387,7 +368,6 @@ class ProcessIdentity(NamedTuple):
 
 
 def this_process() -> ProcessIdentity:
-    """Return the identity of the running process."""
     return ProcessIdentity(this_place(), os.getpid(), start_of(os.getpid()))
 
 

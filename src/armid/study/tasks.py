@@ -142,15 +142,13 @@ def sentence(error: BaseException) -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Return package -> version, of Python too."""
     return versions_of(PACKAGES)
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """Hold one identifier of a study with all that was left to the study filled in.
+    """One identifier of a study with all that was left to the study filled in.
 
-    label: how reports call it. noise_deg_s: levels it is tried at. seeds: of its search and of the noise.
     budget: of a run at most; per_parameter: budgets in simulations a free parameter, empty: the budget alone.
     """
 
@@ -164,16 +162,12 @@ class Entry:
     per_parameter: tuple[int, ...] = ()
 
     def budgets(self, n_free: int) -> list[int]:
-        """Return the budgets of its runs on a case, rising."""
         return sorted({min(self.budget, each * n_free) for each in self.per_parameter}) or [self.budget]
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Hold a study that identifies, read and found possible.
-
-    text: the file as it was read. folder: where it lies; campaigns are looked for there. registry: what it may name.
-    """
+    """A study that identifies, read and found possible; campaigns are looked for in its folder."""
 
     kind: ClassVar[str] = IDENTIFIES
 
@@ -218,7 +212,6 @@ class Study:
         """Simulate each case's truth once: the model is compiled and the machine moves; build identifiers of the user.
 
         performed: performs a run in a process of its own, which what a user's function does cannot harm.
-        Raises ArmidError for a truth at which it does not move, and for an identifier that cannot be built.
         """
         for entry in self.entries:
             if self.registry.own("identifiers", entry.name):
@@ -278,7 +271,6 @@ class Study:
                         yield from self._runs(case, shared[case.name], entry, seed)
 
     def _runs(self, case: Case, shared: dict[str, Any], entry: Entry, seed: int) -> Iterator[Planned]:
-        """Yield the runs of one entry on one case with one seed."""
         noises = entry.noise_deg_s if case.strokes else (None,)
         fitnesses = entry.fitness if case.suite is None else (case.suite.definition.fitness,)
         choices = product(self.spec.windows_s, noises, fitnesses, entry.budgets(len(case.bounds)))
@@ -310,10 +302,7 @@ class Study:
 
     @staticmethod
     def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
-        """Identify once.
-
-        Raises ArmidError when no candidate has a fitness, and whatever an identifier raises.
-        """
+        """Identify once."""
         identifier = cache.registry.identifier(settings["identifier"], "settings").with_options(settings["options"])
         if settings.get("only_built"):
             identifier.build(settings["budget"])
@@ -429,7 +418,6 @@ def suite_description(problem: SuiteProblem) -> dict[str, Any]:
 
 
 def window_text(window: Sequence[float] | str) -> str:
-    """Return how a window is spelt: "0-0.7 s" or "whole"."""
     return window if isinstance(window, str) else f"{window[0]:g}-{window[1]:g} s"
 
 

@@ -39,7 +39,7 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
 
 @dataclass(frozen=True)
 class Tuned:
-    """Hold what was found for an identifier: options that are better than its defaults, empty where none are.
+    """What was found for an identifier: options that are better than its defaults, empty where none are.
 
     default, tuned: area over the convergence curve, mean over the training instances, from 0 to 1. n: configurations.
     """
@@ -52,7 +52,6 @@ class Tuned:
 
 
 def tunable(study: Study) -> list[Entry]:
-    """Return the identifiers of a study whose options have ranges here and were not set by the study."""
     return [entry for entry in study.entries if entry.name in RANGES and not entry.options]
 
 
@@ -68,10 +67,7 @@ def training(study: Study) -> list[Case]:
 
 
 def tune(entry: Entry, study: Study, cases: list[Case], n: int, seed: int) -> Tuned:
-    """Try n configurations of an identifier, its defaults first, then as Optuna's Bayesian sampler proposes.
-
-    Raises ArmidError where Optuna is not installed.
-    """
+    """Try n configurations of an identifier, its defaults first, then as Optuna's Bayesian sampler proposes."""
     try:
         import optuna
     except ImportError as error:
@@ -95,7 +91,7 @@ def suggested(trial: Any, name: str, low: float, high: float) -> Any:
 
 
 def score(entry: Entry, study: Study, cases: list[Case], options: Mapping[str, Any], seed: int) -> float:
-    """Return the area over the convergence curve at the largest budget, mean over cases; see `area_over_curve`."""
+    """Return the area over the convergence curve at the largest budget, mean over cases."""
     identifier = study.registry.identifier(entry.name, "tune").with_options(options)
     hits, budgets = [], []
     for case in cases:

@@ -13,11 +13,6 @@ from armid.report.document import Column, Part
 from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
 
-# One pass over the traces of a study: when each run first reached a target, and what it had found by then.
-#
-# A trace has hundreds of improvements; of each run only first hits and values on a common grid are kept, so that the
-# memory does not grow with the length of the traces.
-
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 # 51 targets, as COCO takes, five a decade: largest relative errors of the parameters from 100 % to 1e-8 %, and shares
@@ -28,11 +23,10 @@ N_GRID = 61
 
 @dataclass(frozen=True, eq=False)
 class Histories:
-    """Hold, for the runs in the order of the outcomes, what their traces say.
+    """What the traces say, one row a run in the order of the outcomes; shapes (n_runs, n_targets) and (n_runs, n_grid).
 
-    grid: simulations, (n_grid,). error_hits: first hits of TARGETS by the largest relative error of the best candidate,
-    value_hits: by the share of the way to the best known fitness, both (n_runs, n_targets), infinite for never. errors,
-    values: of the best candidate so far, (n_runs, n_grid), infinite before the first.
+    grid: simulations. error_hits: first hits of TARGETS by the largest relative error, value_hits: by the share of the
+    way to the best known fitness, infinite for never. errors, values: of the best so far, infinite before the first.
     """
 
     grid: NDArray[np.int64]
@@ -47,7 +41,7 @@ def histories(
 ) -> Histories:
     """Read the traces twice, one run at a time: for the first values, then for everything that depends on them.
 
-    runs: outcomes; truths: case -> parameter -> truth, SI; floors: case -> fitness of the truth, where it is known.
+    Only first hits and values on a common grid are kept, so that the memory does not grow with the traces.
     """
     # from 1 to the most simulations of a run, evenly spread in the logarithm
     most = max(int(runs["used"].max()) if len(runs) else 1, 1)
@@ -82,7 +76,6 @@ def histories(
 def first_hits(evaluations: NDArray[np.int64], distances: Array, targets: Array) -> Array:
     """Return the evaluation at which a trace is first at each target or below, infinite where it never is.
 
-    h(t) = min { e_i : d_i <= t }. evaluations, distances: of the improvements, (n,); targets: falling, (n_targets,).
     The distance may rise again: an improvement of the fitness need not be one of the parameters.
     Source: Hansen et al., COCO: performance assessment, arXiv:1605.03560.
     """
@@ -92,19 +85,14 @@ def first_hits(evaluations: NDArray[np.int64], distances: Array, targets: Array)
 
 
 def held(evaluations: NDArray[np.int64], quantity: Array, grid: NDArray[np.int64]) -> Array:
-    """Return a quantity of the best candidate so far on a grid of evaluations, infinite before the first.
-
-    evaluations, quantity: of the improvements, (n,); grid: evaluation counts, (n_grid,).
-    """
+    """Return a quantity of the best candidate so far on a grid of evaluations, infinite before the first."""
     place = np.searchsorted(evaluations, grid, side="right")
     return np.append(np.inf, quantity)[place]
 
 
 def remaining_share(values: Array, first: float, best: float) -> Array:
-    """Return how much of the way from a first value to the best known is left, 1 at the first and 0 at the best.
+    """Return how much of the way from a first value to the best known is left: (f - f_L)/(f_0 - f_L), 1 at the first.
 
-    s = (f - f_L)/(f_0 - f_L); a problem is solved to tau where s <= tau, More and Wild's test
-    f <= f_L + tau (f_0 - f_L). values: fitness, (n,); first: f_0; best: f_L, of anyone within the budget.
     Source: More and Wild, SIAM J. Optim. 20 (2009) 172, Eq. 2.2.
     """
     if not first > best:
@@ -113,10 +101,7 @@ def remaining_share(values: Array, first: float, best: float) -> Array:
 
 
 def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
-    """Return the largest relative error of each candidate of a trace, NaN where no truth is known.
-
-    e = max of abs(x - truth)/abs(truth) over the parameters that the run searched and whose truth is known.
-    """
+    """Return the largest relative error of each candidate over the parameters with a truth, NaN without any."""
     true = np.array([truth.get(name, np.nan) for name in trace.names])
     known = ~np.isnan(trace.X[-1]) & ~np.isnan(true)
     if not known.any():
@@ -138,11 +123,7 @@ PARAMETER, N_RUNS = Column("parameter", "parameter"), Column("n", "runs", ".0f")
 
 @dataclass(frozen=True)
 class Analysis:
-    """One section of the report of a study, and a line of `armid list analyses`.
-
-    parts: function of the evidence; it returns tables, figures and texts in order, none where it does not apply. note:
-    what it tells.
-    """
+    """One section of the report of a study, and a line of `armid list analyses`; no parts where it does not apply."""
 
     name: str
     title: str
@@ -177,7 +158,6 @@ class Evidence:
 
     @cached_property
     def variants(self) -> list[str]:
-        """Names that are compared, in the order of the study."""
         return list(dict.fromkeys(self.runs["variant"]))
 
     @cached_property
@@ -187,24 +167,20 @@ class Evidence:
 
     @cached_property
     def cases(self) -> list[str]:
-        """Cases that were run, in the order of the study."""
         there = set(self.runs["case"])
         return [str(c["name"]) for c in self.study["cases"] if c["name"] in there]
 
     @property
     def knows_truth(self) -> bool:
-        """Whether any truth is known, so that errors exist."""
         return bool(self.parameters["truth"].notna().any())
 
     @cached_property
     def groups(self) -> dict[str, dict[str, NDArray[np.intp]]]:
-        """Setting -> variant -> positions of its runs."""
         rows = self.runs.groupby(["setting", "variant"], sort=False).indices
         return {s: {v: np.asarray(rows[s, v]) for v in self.variants if (s, v) in rows} for s in self.settings}
 
     @cached_property
     def histories(self) -> Histories:
-        """What the traces say."""
         truths = {str(case["name"]): case.get("truth") or {} for case in self.study["cases"]}
         floors = {str(case["name"]): float(case["floor"]) for case in self.study["cases"] if "floor" in case}
         return histories(self.results, self.runs, truths, floors)
@@ -222,7 +198,6 @@ class Evidence:
 
     @cached_property
     def published(self) -> DataFrame:
-        """Published values case by case, empty without any."""
         return published_values(self.study)
 
     @cached_property
@@ -246,15 +221,11 @@ class Evidence:
         return own + [v for v in self.best_first if v not in own][:MOST_OTHERS]
 
     def of(self, setting: str) -> DataFrame:
-        """Return the outcomes of one setting."""
         return self.runs[self.runs["setting"] == setting]
 
 
 def wide_runs(evidence: Evidence) -> DataFrame:
-    """Return one row a run with its parameters beside, as an analysis of a user gets it.
-
-    The columns stand at `armid.contract.check.synthetic_runs`.
-    """
+    """Return one row a run with its parameters beside, see `armid.contract.check.synthetic_runs`."""
     columns = {"value": "", "truth": "_truth", "relative_error": "_error", "deviation": "_deviation",
                "at_bound": "_at_bound"}  # fmt: skip
     wide = evidence.runs.drop(columns=["started_at", "model", "versions"], errors="ignore")
@@ -266,11 +237,10 @@ def wide_runs(evidence: Evidence) -> DataFrame:
 
 
 def outcomes(runs: DataFrame, parameters: DataFrame) -> DataFrame:
-    """Return the runs with `variant`, `setting` and `largest_error`.
+    """Return the runs with `variant`, `setting` (noise, and the window of several) and `largest_error`.
 
-    variant: label of the identifier, and the fitness where a label ran on several. setting: noise, and the window where
-    the study has several. largest_error: max of abs(value - truth)/abs(truth) over the free parameters whose truth is
-    known; infinite for a failed run, NaN where no truth is known.
+    variant: label of the identifier, and the fitness where a label ran on several. largest_error: relative, over the
+    free parameters whose truth is known; infinite for a failed run, NaN where no truth is known.
     """
     on_a_case = runs.groupby(["identifier", "case"])["fitness"].transform("nunique")
     several = on_a_case.groupby(runs["identifier"]).transform("max") > 1
@@ -292,17 +262,13 @@ def budget_texts(runs: DataFrame, study: dict[str, Any]) -> list[str]:
 
 
 def noise_text(noise_deg_s: float) -> str:
-    """Return a noise level in words; NaN is the noise that the records have of their own."""
     if np.isnan(noise_deg_s):
         return "as recorded"
     return NOISE_FREE if noise_deg_s == 0.0 else f"{noise_deg_s:g} deg/s"
 
 
 def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
-    """Return the runs in the order of the study: identifier, fitness, case, noise, window, seed.
-
-    The store holds them in the order in which they ended, which two runners do not repeat.
-    """
+    """Return the runs in the order of the study; the store holds them in the order in which they ended."""
     label = {str(name): i for i, name in enumerate(study["identifiers"])}
     case = {str(c["name"]): i for i, c in enumerate(study["cases"])}
     keys = runs.assign(_label=runs["identifier"].map(label), _case=runs["case"].map(case))
@@ -311,7 +277,6 @@ def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
 
 
 def published_values(study: dict[str, Any]) -> DataFrame:
-    """Return case, parameter, truth, published [SI] and relative error of the cases that carry a published result."""
     rows = []
     for case in study["cases"]:
         truth = case.get("truth") or {}

@@ -7,7 +7,6 @@ from pandas import DataFrame, RangeIndex
 from pandas.api.types import is_bool_dtype, is_integer_dtype, is_numeric_dtype
 
 from armid.contract.check import parts_of
-from armid.errors import ArmidError
 from armid.report.document import Column, Figure, Part, Section, Table, slug, unlike
 from armid.report.style import pyplot
 from armid.study.analyses.convergence import ANYTIME, CONVERGENCE
@@ -32,21 +31,8 @@ OF_SUITES = (BY_CLASS, ANYTIME, BEST_FITNESS, SUCCESS, RUNNING_TIME, RUNS)
 OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
 
 
-def check_names(own: OwnAnalyses) -> None:
-    """Refuse an analysis of a user that is called like one of ours.
-
-    Raises ArmidError.
-    """
-    for name in own:
-        if name in {a.name for a in ANALYSES}:
-            raise ArmidError(f"analyses: '{name}' is there already, give yours another name")
-
-
 def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:
-    """Return a section for each analysis of a user that returns something.
-
-    runs: one row a run; each function gets a copy. Raises ArmidError for what is no table and no figure.
-    """
+    """Return a section for each analysis of a user that returns something; each gets a copy of the runs."""
     # before a plug-in imports it: no window is opened, and the figures look alike
     pyplot()
     sections = []
@@ -60,7 +46,6 @@ def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:
 
 
 def part(file: str, title: str, found: Any) -> Part:
-    """Return a table or a figure of a user; numbers are shown with six digits."""
     if not isinstance(found, DataFrame):
         return Figure(file, title, "", lambda: found)
     frame = found if isinstance(found.index, RangeIndex) else found.reset_index()
@@ -69,7 +54,6 @@ def part(file: str, title: str, found: Any) -> Part:
 
 
 def digits(kind: Any) -> str:
-    """Return the format of a column's numbers, "" for text and truth values."""
     if is_bool_dtype(kind) or not is_numeric_dtype(kind):
         return ""
     return ".0f" if is_integer_dtype(kind) else ".6g"

@@ -52,11 +52,7 @@ CONVERGENCE = Analysis("convergence", "Convergence", parts, "error and fitness a
 
 
 def band(held_values: Array) -> Array:
-    """Return lower quartile, median and upper quartile at each count of simulations, (3, n_grid).
-
-    held_values: of the best candidate so far, (n_runs, n_grid), infinite before the first. Each is a value that a run
-    had (the smallest with at least that share of runs at or below), since no mean with infinity exists.
-    """
+    """Return the quartiles at each count of simulations, (3, n_grid), each a value that a run had."""
     found: Array = np.quantile(held_values, QUARTILES, axis=0, method="inverted_cdf").astype(float)
     return found
 
@@ -64,8 +60,7 @@ def band(held_values: Array) -> Array:
 def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array, label: str, floor: float) -> Any:
     """Draw one panel a variant: median as a line, quartiles as a band, a colour a setting.
 
-    own: runs to show, (n_runs,); values: quantity of the best candidate so far, (n_runs, n_grid), infinite before the
-    first; label: of the quantity; floor: smaller values are drawn there.
+    own: runs to show, (n_runs,); values: quantity of the best candidate so far, (n_runs, n_grid); floor: least drawn.
     """
     grid = evidence.histories.grid
     bands: dict[str, dict[str, Array]] = {}
@@ -101,10 +96,7 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
 
 
 def best_of_all(bands: Mapping[str, Mapping[str, Array]], setting: str) -> Array:
-    """Return the smallest median of all variants up to each count of simulations, NaN where none has any yet.
-
-    A variant whose budget is spent still holds what it reached.
-    """
+    """Return the smallest median of all variants up to each count of simulations, NaN where none has any yet."""
     medians = np.array([of[setting][1] for of in bands.values() if setting in of])
     smallest: Array = np.minimum.accumulate(np.min(np.where(np.isnan(medians), np.inf, medians), axis=0))
     return np.where(np.isfinite(smallest), smallest, np.nan)
@@ -134,16 +126,14 @@ ANYTIME = Analysis("anytime", "At any time", anytime_parts, "area over the conve
 def area_over_curve(hits: Array, budget: Array) -> Array:
     """Return the area over the convergence curve of each run, (n_runs,), from 0 to 1.
 
-    A = mean over targets of max(0, 1 - ln h / ln B). hits: first hits h, (n_runs, n_targets), infinite for never;
-    budget: B above 1, (n_runs,). Source: Lopez-Ibanez et al. 2024, doi:10.1162/evco_a_00341 (the share of an attainment
-    surface that is covered).
+    A = mean over targets of max(0, 1 - ln h / ln B). hits: first hits h, (n_runs, n_targets); budget: B above 1.
+    Source: Lopez-Ibanez et al. 2024, doi:10.1162/evco_a_00341 (the share of an attainment surface that is covered).
     """
     left: Array = np.clip(1.0 - np.log(hits) / np.log(budget)[:, np.newaxis], 0.0, 1.0).mean(axis=1)
     return left
 
 
 def areas(evidence: Evidence) -> Table:
-    """Return the area of each variant, one line a setting and variant, the best first."""
     found = area_over_curve(evidence.histories.value_hits, evidence.runs["budget"].to_numpy(float))
     groups = evidence.runs.assign(area=found).groupby(["setting", "variant"], sort=False)["area"]
     frame = groups.describe()[["count", "mean", "25%", "50%", "75%"]].reset_index()

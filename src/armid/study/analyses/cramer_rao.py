@@ -81,9 +81,8 @@ class Efficiency(NamedTuple):
 def efficiency(values: ArrayLike, truth: float, bound: float) -> Efficiency:
     """Compare estimates under as many noise realisations with the truth and the Cramer-Rao bound.
 
-    ratio = s/sigma with s^2 = sum (x - mean)^2/(n - 1); its interval from the chi-square distribution of
-    (n - 1) s^2/sigma^2, exact for normal estimates. values: SI, (n,), n of at least 2; bound: SI.
-    Source: Kay, Fundamentals of Statistical Signal Processing I (1993), ch. 3.
+    ratio = s/sigma with s^2 = sum (x - mean)^2/(n - 1); its interval from the chi-square distribution of (n - 1)
+    s^2/sigma^2, exact for normal estimates. Source: Kay, Fundamentals of Statistical Signal Processing I, ch. 3.
     """
     from scipy.stats import chi2, t
 
@@ -101,11 +100,7 @@ def efficiency(values: ArrayLike, truth: float, bound: float) -> Efficiency:
 
 
 def efficiencies(estimates: DataFrame) -> DataFrame:
-    """Return one row per setting, variant, case and parameter with at least 20 noise realisations.
-
-    The bound is the median over the runs of the bound at the solution. estimates: one row a run and parameter; those
-    without a truth or a finite bound are left out.
-    """
+    """Return one row per setting, variant, case and parameter with a truth, a finite bound and enough realisations."""
     usable = estimates[np.isfinite(estimates["deviation"]) & (estimates["deviation"] > 0) & estimates["truth"].notna()]
     keys = ["setting", "variant", "case", "parameter"]
     rows = []
@@ -119,7 +114,6 @@ def efficiencies(estimates: DataFrame) -> DataFrame:
 
 
 def summary(rows: DataFrame) -> Table:
-    """Return one line per setting, variant and parameter. rows: as `efficiencies` gives them."""
     keys = ["setting", "variant", "parameter"]
     marked = rows.assign(square=rows["ratio"] ** 2, size=rows["bias"].abs(), inside=rows["ratio"].between(*EFFICIENT))
     frame = marked.groupby(keys, sort=False).agg(
@@ -131,10 +125,6 @@ def summary(rows: DataFrame) -> Table:
 
 
 def cramer_rao_figure(rows: DataFrame) -> Any:
-    """Draw one panel a parameter: standard deviation over bound with its 95 % interval, a colour a case.
-
-    rows: setting, variant, case, parameter, ratio, low, high. The band is 0.9 to 1.1.
-    """
     names, cases = (list(dict.fromkeys(rows[key])) for key in ("parameter", "case"))
     places = {group: i for i, group in enumerate(dict.fromkeys(zip(rows["variant"], rows["setting"], strict=True)))}
     figure, axes = panels(len(names), 2, 6.8, 1.6 + 0.5 * len(places))

@@ -47,20 +47,12 @@ ERRORS = Analysis("errors", "Where the errors are", parts, "largest error by ide
 
 
 def error_map(runs: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
-    """Return the median over the seeds of the largest relative error, variants by cases in the orders given.
-
-    runs: outcomes of one setting; infinite where at least half of the runs failed, NaN where none was made.
-    """
     medians = runs.groupby(["variant", "case"], sort=False)["largest_error"].median().unstack("case")
     there = [v for v in variants if v in medians.index]
     return medians.reindex(index=there, columns=[c for c in cases if c in medians.columns])
 
 
 def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
-    """Draw one panel a setting: median over the seeds of the largest relative error [%], variants by cases.
-
-    maps: setting -> errors [1], one row a variant and one column a case, infinite where the median run failed.
-    """
     import seaborn as sns
     from matplotlib.colors import LogNorm
 
@@ -92,11 +84,7 @@ def brief(percent: float) -> str:
 
 
 def end_points(estimates: DataFrame) -> DataFrame:
-    """Return variant, setting and the deviation (value - truth)/abs(truth) [%] of each parameter, one row a run.
-
-    estimates: one row a run and parameter; runs with an unknown truth are left out. The columns are the p0-eta3-n
-    valley where these are free, else the first three parameters.
-    """
+    """Return variant, setting and the deviation (value - truth)/abs(truth) [%] of each parameter, one row a run."""
     known = estimates[estimates["truth"].notna()]
     deviation = 100.0 * (known["value"] - known["truth"]) / known["truth"].abs()
     wide = known.assign(deviation=deviation).pivot(index="run", columns="parameter", values="deviation")
@@ -107,11 +95,7 @@ def end_points(estimates: DataFrame) -> DataFrame:
 
 
 def valley_figure(ends: DataFrame, chosen: list[str]) -> Any:
-    """Draw the deviations from the truth [%] of each pair of parameters, one mark a run.
-
-    ends: variant, setting and one column a parameter; chosen: the variants with a colour of their own, up to six; all
-    others are pale.
-    """
+    """Draw the deviations of each pair of parameters, one mark a run; those that are not chosen are pale."""
     import seaborn as sns
 
     pyplot()

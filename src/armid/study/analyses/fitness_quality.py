@@ -47,12 +47,7 @@ FITNESS_QUALITY = Analysis(
 
 
 def fitness_quality(runs: DataFrame) -> Table:
-    """Return, per setting, fitness and identifier: runs, errors, the similarity reached, and how the two go together.
-
-    median_error, worst_error: of the largest relative error of a run; median_misfit: median of 1 - S on the train
-    records; correlation: Spearman's rank correlation over the runs between 1 - S and the largest error, 1 when a
-    higher similarity always means better parameters (NaN for fewer than 3 runs or a constant). runs: outcomes.
-    """
+    """Return, per setting, fitness and identifier: errors, the similarity reached, and how the two go together."""
     rows = []
     for key, group in runs.groupby(["setting", "fitness", "identifier"], sort=False):
         misfit = 1.0 - group["train_s"].to_numpy(float)
@@ -65,7 +60,6 @@ def fitness_quality(runs: DataFrame) -> Table:
 
 
 def rank_correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    """Return Spearman's correlation of two samples where both are finite."""
     from scipy.stats import spearmanr
 
     both = np.isfinite(first) & np.isfinite(second)
@@ -76,10 +70,6 @@ def rank_correlation(first: NDArray[np.float64], second: NDArray[np.float64]) ->
 
 
 def fitness_quality_figure(runs: DataFrame) -> Any:
-    """Draw one panel a setting: largest error of each run [%] against 1 - S, a colour a fitness.
-
-    runs: outcomes. Failed runs are left out.
-    """
     settings = list(dict.fromkeys(runs["setting"]))
     names = list(dict.fromkeys(runs["fitness"]))
     figure, axes = panels(len(settings), 2, 6.8, 5.2)

@@ -22,11 +22,7 @@ CAMPAIGNS_COLUMNS = (
 
 
 def loop_runs(loops: DataFrame) -> DataFrame:
-    """Return one row a campaign that was closed.
-
-    case: its name; verdict; effects: what was added, joined by " + ", or "nothing"; before, after: RMSE on the records
-    held out over the rms noise; cpu_seconds, seconds; plant. loops: stored results, with each report as a dict.
-    """
+    """Return one row a campaign that was closed: verdict, effects, error on the records held out over the noise."""
     reports = loops["report"]
     found = loops[["case", "verdict"]].assign(
         plant=[report["plant"] for report in reports],
@@ -38,13 +34,11 @@ def loop_runs(loops: DataFrame) -> DataFrame:
 
 
 def over_noise(report: Mapping[str, Any], when: str) -> float:
-    """Return the error on the records held out over the noise, NaN without such records."""
     error = report["error"][when]["holdout"]
     return np.nan if error is None else float(error["rmse"] / report["noise_rms"])
 
 
 def verdicts(runs: DataFrame) -> Table:
-    """Return how often each verdict was given, and what was added with it."""
     frame = runs.groupby(["verdict", "effects"]).size().rename("n").reset_index()
     return Table("verdicts", "What was found", VERDICTS_CAPTION, frame, VERDICTS_COLUMNS, grouped=True)
 
@@ -54,7 +48,6 @@ def campaigns(runs: DataFrame) -> Table:
 
 
 def counted(runs: DataFrame) -> str:
-    """Return how often each verdict was given, in a sentence."""
     if runs.empty:
         return "No campaign was closed."
     counts = [f"{n} {str(verdict).replace('_', ' ')}" for verdict, n in runs["verdict"].value_counts().items()]

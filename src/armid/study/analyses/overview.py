@@ -42,7 +42,6 @@ RUNS_COLUMNS = (
 
 
 def main_table(evidence: Evidence) -> Table:
-    """Return the table that is printed: errors where truths are known, else values."""
     if not evidence.knows_truth:
         return values(evidence.runs, evidence.estimates)
     is_table1 = evidence.study.get("report") == "table1"
@@ -56,10 +55,7 @@ RUNS = Analysis("runs", "Runs", lambda found: (runs_table(found.runs, found.para
 
 
 def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Table:
-    """Return mean and median relative error of each parameter, and the tail of the largest, one line a variant.
-
-    runs: outcomes; estimates: one row a run and parameter; published: the paper's values, empty without any.
-    """
+    """Return mean and median relative error of each parameter, and the tail of the largest, one line a variant."""
     names = list(dict.fromkeys(estimates["parameter"]))
     rows = [paper_row(published, names)] if len(published) else []
     by = ["setting", "variant"]
@@ -87,13 +83,11 @@ def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Tab
 
 
 def tail(errors: np.ndarray) -> dict[str, float]:
-    """Return median, 95th percentile and worst of the largest error of a run; infinite where failed runs reach in."""
     middle, p95 = np.quantile(errors, [0.5, 0.95], method="inverted_cdf")
     return {"largest_median": float(middle), "largest_p95": float(p95), "largest_worst": float(errors.max())}
 
 
 def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
-    """Return the paper's line: errors recomputed from its printed values."""
     errors = published.pivot(index="case", columns="parameter", values="relative_error")
     largest = errors.max(axis=1).to_numpy()
     row: dict[str, object] = {
@@ -110,7 +104,6 @@ def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
 
 
 def values(runs: DataFrame, estimates: DataFrame) -> Table:
-    """Return one line a setting, variant and parameter. runs: outcomes; estimates: a row a run and parameter."""
     joined = estimates.merge(runs[["run", "train_rmse", "holdout_rmse"]], on="run")
     frame = joined.groupby(["setting", "variant", "parameter", "unit"], sort=False).agg(
         n=("run", "size"), median=("value", "median"), deviation=("value", lambda v: v.std(ddof=0)),
@@ -121,7 +114,6 @@ def values(runs: DataFrame, estimates: DataFrame) -> Table:
 
 
 def runs_table(runs: DataFrame, parameters: DataFrame) -> Table:
-    """Return the counts. runs: outcomes; parameters: one row a run and parameter."""
     held = set(parameters.loc[parameters["at_bound"].astype(bool), "run"])
     marked = runs.assign(done=runs["status"] == "done", held=runs["run"].isin(held))
     frame = marked.groupby(["setting", "variant"], sort=False).agg(

@@ -64,8 +64,7 @@ class RankTests:
     """The comparison of all variants on the same cases.
 
     blocks: median over the seeds, one row a case and one column a variant. ranks: mean rank of each variant, 1 is best,
-    rising. friedman, p: statistic, and probability that all are equal, NaN for fewer than 3. pairs: first, second, n,
-    p, p_holm, a12, one row a pair.
+    rising. p: probability of Friedman's test, NaN for fewer than 3. pairs: first, second, n, p, p_holm, a12.
     """
 
     blocks: DataFrame
@@ -76,15 +75,13 @@ class RankTests:
 
     @property
     def n_cases(self) -> int:
-        """How many cases enter."""
         return len(self.blocks)
 
 
 def rank_tests(runs: DataFrame) -> RankTests:
     """Compare the largest errors of the variants of one setting on the cases that all of them ran.
 
-    A case is one block: its value is the median over the seeds, since seeds of one case are repeats and no independent
-    evidence about other cases. Errors below FLOOR count as equal to it. runs: outcomes of one setting.
+    A case is one block, its value the median over the seeds, which are no independent evidence about other cases.
     Source: Demsar, J. Mach. Learn. Res. 7 (2006) 1.
     """
     raised = runs.assign(largest_error=runs["largest_error"].clip(lower=FLOOR))
@@ -107,7 +104,6 @@ def friedman(blocks: Array) -> tuple[float, float]:
 
 
 def pair_tests(blocks: DataFrame, runs: DataFrame) -> DataFrame:
-    """Return the tests of all pairs, Holm's correction over all of them."""
     from statsmodels.stats.multitest import multipletests
 
     samples = {v: g["largest_error"].to_numpy() for v, g in runs.groupby("variant", sort=False)}
@@ -137,9 +133,7 @@ def signed_rank(first: Array, second: Array) -> float:
 def a12(first: ArrayLike, second: ArrayLike) -> float:
     """Return the probability that a number of the first sample is smaller than one of the second, ties by half.
 
-    A12 = (#{(x, y) : x < y} + #{x = y}/2) / (n m): 0.5 is no difference, 1 means that the first is always smaller,
-    which for errors is better. first: (n,); second: (m,); infinite ones allowed. NaN for an empty sample.
-    Source: Vargha and Delaney, J. Educ. Behav. Stat. 25 (2000) 101.
+    Infinite ones are allowed; NaN for an empty sample. Source: Vargha and Delaney, J. Educ. Behav. Stat. 25 (2000) 101.
     """
     x, y = np.asarray(first, np.float64), np.sort(np.asarray(second, np.float64))
     if not x.size or not y.size:
@@ -159,7 +153,6 @@ def size_in_words(value: float) -> str:
 
 
 def mean_ranks(tests: RankTests, setting: str, name: str) -> Table:
-    """Return the mean rank and the median of the block values of each variant."""
     medians = tests.blocks[tests.ranks.index].median()
     frame = DataFrame({"variant": tests.ranks.index, "rank": tests.ranks.to_numpy(), "median": medians.to_numpy()})
     columns = (VARIANT, Column("rank", "mean rank", ".2f"), Column("median", "median of the cases [%]", ".3g", 100.0))
@@ -168,7 +161,6 @@ def mean_ranks(tests: RankTests, setting: str, name: str) -> Table:
 
 
 def friedman_sentence(tests: RankTests) -> str:
-    """Return what Friedman's test says."""
     if np.isnan(tests.p):
         return "Friedman's test needs at least three identifiers that differ and two cases."
     verdict = "differ" if tests.p < 0.05 else "cannot be told apart"
@@ -191,7 +183,6 @@ def pairs(tests: RankTests, setting: str, name: str) -> Table:
 
 
 def p_matrix(tests: RankTests) -> DataFrame:
-    """Return Holm's probabilities as a symmetric table, 1 on the diagonal."""
     names = list(tests.blocks.columns)
     place = {name: i for i, name in enumerate(names)}
     matrix = np.ones((len(names), len(names)))
@@ -201,10 +192,7 @@ def p_matrix(tests: RankTests) -> DataFrame:
 
 
 def critical_difference_figure(tests: RankTests, setting: str) -> Any:
-    """Draw the mean ranks on a line; a bar joins identifiers whose pairs are not significant at 5 %.
-
-    The pairs are those of Wilcoxon with Holm. Source: Demsar, J. Mach. Learn. Res. 7 (2006) 1.
-    """
+    """Draw the mean ranks on a line (Demsar 2006); a bar joins identifiers that do not differ significantly at 5 %."""
     import scikit_posthocs as sp
 
     plt = pyplot()
@@ -234,15 +222,12 @@ NEAR_TRUTH = 1e-8
 N_BOOTSTRAP = 1000
 
 
-def class_parts(evidence: Evidence) -> Sequence[Part]:
-    return (class_ranks(evidence), swarm_pairs(evidence), problems(evidence)) if evidence.is_suite else ()
-
-
-BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", class_parts, "who is best on which problems of a suite")
+BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", lambda evidence: (
+    (class_ranks(evidence), swarm_pairs(evidence), problems(evidence)) if evidence.is_suite else ()
+), "who is best on which problems of a suite")  # fmt: skip
 
 
 def final_values(evidence: Evidence, setting: str) -> DataFrame:
-    """Return the fitness that a variant ends with, one row a case that all ran, one column a variant."""
     runs = evidence.of(setting)
     floors = runs["case"].map({c["name"]: c["floor"] for c in evidence.study["cases"]}).astype(float) + NEAR_TRUTH
     raised = runs.assign(value=np.maximum(runs["value"].where(runs["status"] == "done", np.inf), floors))
@@ -251,7 +236,6 @@ def final_values(evidence: Evidence, setting: str) -> DataFrame:
 
 
 def class_ranks(evidence: Evidence) -> Table:
-    """Return mean ranks, over all cases and in each class, one line a setting and variant, the best first."""
     frame = class_frame(evidence)
     columns = (BUDGET, VARIANT, Column("n", "cases", ".0f"), Column("text", "mean rank"),
                Column("first", "first", ".0f"), *(Column(c, c, ".2f") for c in CLASSES if c in frame))  # fmt: skip
@@ -287,7 +271,6 @@ PROBLEMS_CAPTION = (
 
 
 def problems(evidence: Evidence) -> Table:
-    """Return what each problem is and what is hard about it, one line a problem."""
     firsts = {case["suite"]: case for case in reversed(evidence.study["cases"])}
     rows = [{"problem": name, "n": len(case["bounds"]), "class": case["difficulty"], **case["landscape"]}
             for name, case in reversed(firsts.items())]  # fmt: skip
@@ -308,7 +291,6 @@ SWARM_CAPTION = (
 
 
 def swarm_pairs(evidence: Evidence) -> Table:
-    """Return the ratio and the test of the first swarm against each other variant, one line a setting and variant."""
     columns = (BUDGET, Column("swarm", "swarm"), Column("variant", "against"), Column("ratio", "ratio", ".3g"),
                Column("p", "p, Holm", ".2g"))  # fmt: skip
     title = "The paper's swarm against the others"
@@ -360,6 +342,5 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
 
 
 def with_ratios(against: DataFrame) -> str:
-    """Return the variants with the ratio of what the swarm leaves to what they leave."""
     lines = zip(against["variant"], against["ratio"], strict=True)
     return ", ".join(f"{variant} (leaves {ratio:.2g} times as much)" for variant, ratio in lines) or "nobody"

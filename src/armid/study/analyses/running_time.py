@@ -58,19 +58,17 @@ RUNNING_TIME = Analysis("running_time", "Cost of the truth", parts, "simulations
 def share_hit(hits: Array, grid: NDArray[np.int64]) -> Array:
     """Return the share of (run, target) pairs that are hit within each number of simulations, (n_grid,).
 
-    F(e) = #{(r, t) : h_rt <= e} / (n_runs n_targets). hits: (n_runs, n_targets), infinite for never;
-    grid: simulations, (n_grid,). No restarts are assumed: a run that ends early stays where it ended.
+    hits: (n_runs, n_targets), infinite for never. No restarts are assumed: a run that ends early stays where it ended.
     Source: Hansen et al., arXiv:1605.03560, section 5.
     """
     return np.searchsorted(np.sort(hits, axis=None), grid, side="right") / hits.size
 
 
 def expected_running_time(hits: Array, used: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Return the expected running time to each target [simulations], (n_targets,), and the successes, (n_targets,).
+    """Return the expected running time to each target [simulations], infinite where no run hits it, and the successes.
 
-    ERT(t) = (sum over runs of the simulations until t is hit, or of all that were used) / (number of runs that hit t);
-    infinite where none does. hits: first hits, (n_runs, n_targets), infinite for never; used: simulations, (n_runs,).
-    Source: Hansen et al., arXiv:1605.03560, section 4.
+    ERT(t) = (simulations of all runs until t is hit, or all that were used) / (number of runs that hit t).
+    hits: (n_runs, n_targets), infinite for never; used: (n_runs,). Source: Hansen et al., arXiv:1605.03560, section 4.
     """
     reached = np.isfinite(hits)
     spent = np.where(reached, hits, used[:, np.newaxis]).sum(axis=0, dtype=np.float64)
@@ -82,10 +80,7 @@ def expected_running_time(hits: Array, used: Array) -> tuple[Array, NDArray[np.i
 def running_time(
     evidence: Evidence, hits: Array, shown: Mapping[str, float], name: str, title: str, target: str
 ) -> Table:
-    """Return the expected running time to some targets, one line a setting and variant.
-
-    hits: first hits of TARGETS, (n_runs, n_targets). shown: heading -> target. target: what it is, in words.
-    """
+    """Return the expected running time to some targets (shown: heading -> target), one line a setting and variant."""
     places = {text: int(np.flatnonzero(np.isclose(TARGETS, t, rtol=1e-9, atol=0.0))[0]) for text, t in shown.items()}
     rows = []
     for (setting, variant), group in evidence.runs.groupby(["setting", "variant"], sort=False):
@@ -101,7 +96,6 @@ def running_time(
 
 
 def ecdf_figure(evidence: Evidence) -> Any:
-    """Draw the shares of targets hit against simulations, one panel a setting and one line a variant."""
     kept = evidence.histories
     figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
     for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
@@ -114,11 +108,7 @@ def ecdf_figure(evidence: Evidence) -> Any:
 
 
 def running_time_figure(evidence: Evidence, hits: Array, targets: Array, label: str) -> Any:
-    """Draw one panel a setting and one line a variant; a line ends where no run hits the target.
-
-    Names are listed from the strictest target reached. hits: first hits, (n_runs, n_targets); targets: falling,
-    (n_targets,), as shown; label: of the axis of targets.
-    """
+    """Draw one panel a setting and one line a variant; a line ends where no run hits the target."""
     figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
     for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
         lines = {v: expected_running_time(hits[rows], evidence.used[rows])[0] for v, rows in variants.items()}
@@ -137,7 +127,6 @@ def strictest(line: Array) -> tuple[int, float]:
 
 
 def powers_around(lines: Iterable[Array]) -> tuple[float, float]:
-    """Return the powers of ten around all numbers that are finite."""
     finite = np.concatenate([y[np.isfinite(y)] for y in lines])
     if not finite.size:
         return 1.0, 10.0
@@ -186,8 +175,7 @@ BEST_FITNESS = Analysis(
 def data_profile(hits: Array, n_parameters: NDArray[np.integer[Any]], grid: Array) -> Array:
     """Return the share of problems solved within each number of simplex gradients, (n_grid,).
 
-    d(kappa) = #{p : h_p <= kappa (n_p + 1)} / n_problems. hits: first hits of one tolerance, (n_problems,);
-    n_parameters: free ones of each problem, (n_problems,); grid: kappa, in units of n_p + 1 simulations, (n_grid,).
+    d(kappa) = #{p : h_p <= kappa (n_p + 1)} / n_problems. hits: of one tolerance, (n_problems,); grid: kappa.
     Source: More and Wild, SIAM J. Optim. 20 (2009) 172, Eq. 2.5.
     """
     gradients = np.sort(hits / (n_parameters + 1))
@@ -195,7 +183,6 @@ def data_profile(hits: Array, n_parameters: NDArray[np.integer[Any]], grid: Arra
 
 
 def data_profile_figure(evidence: Evidence) -> Any:
-    """Draw one row of panels a setting, one column a share that may be left, and one line a variant."""
     kept, n_free, columns = evidence.histories, evidence.n_free, len(SHARES_LEFT)
     figure, axes = panels(len(evidence.groups) * columns, columns, 6.6, panel_height(len(evidence.colours)))
     what = [(setting, share) for setting in evidence.groups for share in SHARES_LEFT]

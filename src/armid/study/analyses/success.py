@@ -36,8 +36,7 @@ SUCCESS = Analysis("success", "Success rates", parts, "share of runs with all pa
 def success_rates(runs: DataFrame, tolerances: Sequence[float] = TOLERANCES) -> DataFrame:
     """Return, per setting, variant and tolerance: runs, successes, rate and its 95 % Wilson interval.
 
-    A run succeeds when the largest relative error of its result is at the tolerance or below; a failed run does not.
-    runs: outcomes; tolerances: relative errors, 1. Source: Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
+    A failed run is no success. Source: Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
     """
     rows = []
     for key, group in runs.dropna(subset=["largest_error"]).groupby(["setting", "variant"], sort=False):
@@ -49,7 +48,6 @@ def success_rates(runs: DataFrame, tolerances: Sequence[float] = TOLERANCES) -> 
 
 
 def wilson(successes: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the Wilson interval of a proportion."""
     from statsmodels.stats.proportion import proportion_confint
 
     low, high = proportion_confint(successes, n, alpha=1.0 - confidence, method="wilson")
@@ -57,7 +55,6 @@ def wilson(successes: int, n: int, confidence: float = 0.95) -> tuple[float, flo
 
 
 def success(rates: DataFrame) -> Table:
-    """Return one line a setting and variant, one column a tolerance. rates: as `success_rates` gives them."""
     keys = ["setting", "variant", "n"]
     frame = rates.drop_duplicates(keys)[keys].reset_index(drop=True)
     columns = [SETTING, VARIANT, N_RUNS]
@@ -73,10 +70,6 @@ def success(rates: DataFrame) -> Table:
 
 
 def success_figure(rates: DataFrame) -> Any:
-    """Draw one panel a setting, one row a variant, one colour a tolerance, with Wilson intervals.
-
-    rates: setting, variant, tolerance, rate, low, high.
-    """
     settings = list(dict.fromkeys(rates["setting"]))
     means = rates.groupby("variant", sort=False)["rate"].mean()
     variants = [str(v) for v in means.sort_values(ascending=False, kind="stable").index]

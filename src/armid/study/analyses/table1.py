@@ -104,10 +104,7 @@ def one_row(group: DataFrame) -> dict[str, object]:
 
 
 def percentile_among(errors: ArrayLike, published: float) -> float:
-    """Return the percentage of errors below a published one, equal ones by half; NaN for an empty sample.
-
-    10 says that one in ten of our runs was better than the published result. errors: (n,), infinite ones allowed.
-    """
+    """Return the percentage of errors below a published one, equal ones by half; NaN for an empty sample."""
     from scipy.stats import percentileofscore
 
     sample = np.asarray(errors, np.float64)
@@ -115,10 +112,9 @@ def percentile_among(errors: ArrayLike, published: float) -> float:
 
 
 def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) -> tuple[float, float]:
-    """Return the percentile bootstrap interval of the median of a sample, 2000 resamples.
+    """Return the percentile bootstrap interval of the median; values may be infinite, fewer than two give NaN.
 
-    values: (n,), infinite ones allowed; seed: of the resampling, so that the same sample gives the same interval.
-    A sample of fewer than two gives NaN. Source: Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 13.
+    Source: Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 13.
     """
     from scipy.stats import bootstrap
 
@@ -140,11 +136,6 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) 
 
 
 def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence[str]) -> Any:
-    """Draw one panel a parameter: our relative errors [%] of all rows and seeds as boxes, the paper's as diamonds.
-
-    estimates: one row a run and parameter; published: the paper's values with their errors; variants: top to bottom.
-    The box spans the quartiles, the whiskers the 5th to the 95th percentile, dots are the runs beyond.
-    """
     from matplotlib.lines import Line2D
 
     names = [n for n in dict.fromkeys(published["parameter"]) if n in set(estimates["parameter"])]
@@ -168,7 +159,6 @@ def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence
 
 
 def draw_boxes(axis: Any, own: DataFrame, variants: Sequence[str], j: int, n: int) -> None:
-    """Draw the boxes of one setting, a little apart from those of the others."""
     samples = [100.0 * own.loc[own["variant"] == v, "relative_error"].to_numpy() for v in variants]
     shown = [(i, np.maximum(s, FLOOR)) for i, s in enumerate(samples) if s.size]
     width = 0.7 / n

@@ -51,11 +51,7 @@ TABLE2 = Analysis("table2", "Table II of the paper beside ours", parts, "mean an
 
 
 def table2(estimates: DataFrame, published: DataFrame) -> Table:
-    """Return one row per setting, variant and parameter, the paper's first.
-
-    estimates: one row a run and parameter, a case being a record; published: the paper's identification of each record,
-    one row a record and parameter, SI.
-    """
+    """Return one row per setting, variant and parameter, the paper's first."""
     units = dict(zip(estimates["parameter"], estimates["unit"], strict=True))
     box = estimates.drop_duplicates("parameter").set_index("parameter")[["low", "high"]]
     paper = published[published["parameter"].isin(units)].groupby("parameter", sort=False)["published"]
@@ -93,7 +89,6 @@ def one_row(group: DataFrame) -> dict[str, object]:
 
 
 def table2_records(estimates: DataFrame) -> Table:
-    """Return mean, deviation and bound of each record, SI, for the CSV file."""
     keys = ["setting", "variant", "case", "parameter", "unit"]
     rows = [
         dict(zip(keys, k, strict=True)) | spread(g["value"])._asdict()
@@ -105,19 +100,13 @@ def table2_records(estimates: DataFrame) -> Table:
 
 
 class Spread(NamedTuple):
-    """Number, mean and population standard deviation of a sample."""
-
     n: int
     mean: float
     deviation: float
 
 
 def spread(values: ArrayLike) -> Spread:
-    """Return n, mean and population standard deviation sqrt(mean (x - mean)^2), which is what the paper's Table II
-    prints as "mean square error"; NaN for an empty sample.
-
-    values: (n,).
-    """
+    """Return number, mean and deviation; the paper's Table II prints the last as "mean square error"."""
     sample = np.asarray(values, np.float64)
     if not sample.size:
         return Spread(0, np.nan, np.nan)
@@ -125,11 +114,6 @@ def spread(values: ArrayLike) -> Spread:
 
 
 def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
-    """Draw one panel a parameter: the result of each run, a mark and colour a record, lines by identifier and setting.
-
-    estimates: one row a run and parameter; published: the paper's identifications, one row a record and parameter, SI.
-    The grey band is the truth +- the Cramer-Rao bound of one record, dotted lines are the bounds of the box.
-    """
     from matplotlib.lines import Line2D
 
     names = list(dict.fromkeys(estimates["parameter"]))
@@ -160,7 +144,6 @@ def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
 
 
 def draw_group(axis: Any, group: DataFrame, height: int, factor: float) -> None:
-    """Draw the runs of one identifier and setting, the records above each other, truth and bound behind."""
     records = list(dict.fromkeys(group["case"]))
     for k, record in enumerate(records):
         own = group[group["case"] == record]
