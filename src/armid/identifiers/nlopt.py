@@ -97,19 +97,43 @@ class NloptGradientSearch(NloptSearch):
         return found, slopes(beside, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
 
 
-def declared(base: type[NloptSearch], name: str, algorithm: str, note: str) -> type[NloptSearch]:
-    return type(name, (base,), {"name": name, "algorithm": algorithm, "note": f"{note} (NLopt)"})
+class NelderMead(NloptSearch):
+    """Simplex in the box (Nelder, Mead 1965; Box 1965)."""
+
+    name, note, algorithm = "nelder_mead", "simplex of Nelder and Mead (NLopt)", "LN_NELDERMEAD"
 
 
-# In order of Nelder, Mead 1965 with Box 1965; Powell 2009; Rowan 1990; Powell 1994; Nocedal 1980; Kraft 1994.
-NLOPT = (
-    declared(NloptSearch, "nelder_mead", "LN_NELDERMEAD", "simplex of Nelder and Mead"),
-    declared(NloptSearch, "bobyqa", "LN_BOBYQA", "quadratic models, BOBYQA"),
-    declared(NloptSearch, "sbplx", "LN_SBPLX", "Nelder-Mead on subspaces, Subplex"),
-    declared(NloptSearch, "cobyla", "LN_COBYLA", "linear models, COBYLA"),
-    declared(NloptGradientSearch, "lbfgs", "LD_LBFGS", "quasi-Newton steps, L-BFGS"),
-    declared(NloptGradientSearch, "slsqp", "LD_SLSQP", "sequential quadratic programmes, SLSQP"),
-)
+class Bobyqa(NloptSearch):
+    """Quadratic models in a trust region (Powell 2009)."""
+
+    name, note, algorithm = "bobyqa", "quadratic models, BOBYQA (NLopt)", "LN_BOBYQA"
+
+
+class Sbplx(NloptSearch):
+    """Nelder-Mead on a sequence of subspaces (Rowan 1990)."""
+
+    name, note, algorithm = "sbplx", "Nelder-Mead on subspaces, Subplex (NLopt)", "LN_SBPLX"
+
+
+class Cobyla(NloptSearch):
+    """Linear models in a trust region (Powell 1994)."""
+
+    name, note, algorithm = "cobyla", "linear models, COBYLA (NLopt)", "LN_COBYLA"
+
+
+class Lbfgs(NloptGradientSearch):
+    """Limited-memory quasi-Newton steps (Nocedal 1980)."""
+
+    name, note, algorithm = "lbfgs", "quasi-Newton steps, L-BFGS (NLopt)", "LD_LBFGS"
+
+
+class Slsqp(NloptGradientSearch):
+    """Sequential least-squares quadratic programmes (Kraft 1994)."""
+
+    name, note, algorithm = "slsqp", "sequential quadratic programmes, SLSQP (NLopt)", "LD_SLSQP"
+
+
+NLOPT = (NelderMead, Bobyqa, Sbplx, Cobyla, Lbfgs, Slsqp)
 Objective = Callable[[Array, Array], float]
 
 

@@ -60,7 +60,7 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     if isinstance(obj, Algorithm):
         raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} built already, {expected}")
     if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
-        return Identifier(name, lambda budget: obj(), "a class of the user")
+        return Identifier(name, partial(without_budget, obj), "a class of the user")
     if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
         needed = [argument for argument, p in arguments_of(obj).items() if p.default is p.empty]
         refuse_unknown(needed, SEARCH_ARGUMENTS, f"what is given to a search such as '{name}'")
@@ -69,6 +69,10 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
         return Identifier(name, partial(built, name, obj), "a function of the user")
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
+
+
+def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
+    return algorithm()
 
 
 def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:
