@@ -118,7 +118,7 @@ def test_a_read_only_folder_can_be_read_and_is_told_when_written(start, write_st
         assert same_results(load_study(small_disk / "out"), undisturbed)
         err = ended_with_one_sentence(start(write_study(7), "--out", small_disk / "out"))
         assert FILE_NAME in err
-        assert "Read-only file system" in err
+        assert "attempt to write a readonly database" in err
     finally:
         subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
 
