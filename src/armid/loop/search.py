@@ -18,7 +18,6 @@ from armid.loop.fit import (
     Fit,
     compare,
     criterion,
-    dwarfs_noise,
     fit_from,
     fit_globally,
     with_own_starts,
@@ -111,8 +110,8 @@ class Search:
     def run(self, most: int = MOST_EFFECTS) -> list[SearchLevel]:
         """Return the levels: the declared model, and all up to the last whose best earned its effects, at most so many.
 
-        An effect may show only beside others: where more than noise is left, sets of up to three are tried before the
-        search ends, and where what is left dwarfs the noise, up to three more than the last that earned its effects.
+        An effect may show only beside another one: where more than noise is left, sets of up to three are tried before
+        the search ends.
         """
         levels, earned = [SearchLevel((self.start(),))], 1
         self.library = self.library.about(levels[0].best.records.replays, levels[0].best.misfit)
@@ -124,8 +123,7 @@ class Search:
             self.library = self.library.about(level.best.records.replays, level.best.misfit)
             if level.earned:
                 earned = len(levels)
-            most_ahead = LOOK_AHEAD + (earned - 1 if dwarfs_noise(level.best) else 0)
-            if not level.earned and (len(levels) > most_ahead or not is_significant(level.best)):
+            elif len(levels) > LOOK_AHEAD or not is_significant(level.best):
                 break
         return levels[:earned]
 
