@@ -13,15 +13,7 @@ from armid.estimation.least_squares import REACH
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
 from armid.loop.diagnose import diagnosed, is_significant
 from armid.loop.equivalence import substitutes
-from armid.loop.fit import (
-    Comparison,
-    Fit,
-    compare,
-    criterion,
-    fit_from,
-    fit_globally,
-    with_own_starts,
-)
+from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, fit_globally, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, scores
 from armid.loop.whitening import WhiteRecords
 
