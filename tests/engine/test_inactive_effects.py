@@ -59,11 +59,13 @@ def test_the_motion_is_that_of_the_model_without_what_is_inactive(
 ) -> None:
     """The plant alone, and with two effects, few enough that both are evaluated."""
     with_two = arm + EFFECTS["shell_rocking"] + EFFECTS["controller_delay"]
+    # A delay of 0 switches at once, and behind a switch no step is long: only even steps are the same.
+    even = replace(schedule, plan=None)
     for name, small in (("", arm), ("shell_rocking", with_two), ("controller_delay", with_two)):
         candidate = using(wide, drawn(arm, 1, 8)[0], name)
         values = dict(zip(wide.parameters, candidate))
-        expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], schedule).output
-        found = simulate(wide, manoeuvres["lower"], candidate, schedule).output
+        expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], even).output
+        found = simulate(wide, manoeuvres["lower"], candidate, even).output
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
 
 
