@@ -40,6 +40,9 @@ from armid.report.result import IDENTIFICATION, Kind, Result
 
 Array = NDArray[np.float64]
 
+# Share of a range within which a parameter is on its bound.
+ROUNDING = 1e-12
+
 
 INTERRUPTED = "interrupted"
 # Where only noise is left, S2 below the first with S1 above the second: S2 pairs the few intervals between landmarks by
@@ -171,7 +174,10 @@ def identify(
             raise ArmidError(
                 f"none of {meter.used} candidates has a fitness: each diverged, or the fitness was no finite number"
             )
-        x = meter.best_x
+        # what rounding alone keeps off a bound is held by it
+        low, high = space.low[space.free], space.high[space.free]
+        x = np.where(meter.best_x - low < ROUNDING * (high - low), low, meter.best_x)
+        x = np.where(high - x < ROUNDING * (high - low), high, x)
     else:
         stopped, x = "no parameter is free", np.empty(0)
     candidate, seen = space.complete(x[np.newaxis])[0], judged_by(fitness, train)
