@@ -82,15 +82,11 @@ def main(arguments: list[str] | None = None) -> None:
     logging.getLogger("armid").setLevel(logging.INFO)
     try:
         end_on_request()
-        code = app.main(arguments, prog_name="armid", standalone_mode=False, obj=arguments or sys.argv[1:])
+        code = carried_out(arguments)
     except ArmidError as error:
         stop(str(error), BAD_INPUT)
     except (click.Abort, KeyboardInterrupt):
         stop("interrupted", INTERRUPTED)
-    except click.exceptions.NoArgsIsHelpError as error:
-        with while_read(sys.stdout):
-            print(error.format_message(), flush=True)
-        sys.exit(BAD_INPUT)
     except click.ClickException as error:
         stop(f"{error.format_message()} (see --help)", BAD_INPUT)
     except OSError as error:
@@ -108,6 +104,16 @@ def main(arguments: list[str] | None = None) -> None:
             raise
         stop(f"plug-in {place}, fails: {type(error).__name__}: {error}", BAD_INPUT)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def carried_out(arguments: list[str] | None) -> Any:
+    """Run a command and return its exit code; without any the help is shown."""
+    try:
+        return app.main(arguments, prog_name="armid", standalone_mode=False, obj=arguments or sys.argv[1:])
+    except click.exceptions.NoArgsIsHelpError as error:
+        with while_read(sys.stdout):
+            print(error.format_message(), flush=True)
+        return BAD_INPUT
 
 
 def stop(sentence: str, code: int) -> None:

@@ -87,10 +87,12 @@ def while_read(stream: TextIO) -> Iterator[None]:
     """Print for as long as someone reads: the work goes on after `| head -1`, and what is said then goes nowhere."""
     try:
         yield
-    except BrokenPipeError:
+    except OSError as error:
         # Python, too, writes what is left when it ends
         with open(os.devnull, "w", encoding="utf-8") as nowhere:
             os.dup2(nowhere.fileno(), stream.fileno())
+        if stream is sys.stdout and not isinstance(error, BrokenPipeError):
+            raise ArmidError(f"the standard output cannot be written: {error.strerror or error}") from error
 
 
 def say(*lines: str) -> None:
