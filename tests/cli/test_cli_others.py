@@ -149,8 +149,8 @@ def test_a_reader_that_leaves_changes_nothing_but_what_he_reads(small_folder, ro
         command = [sys.executable, "-m", "armid", *map(str, call)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root) as process:
             process.stdout.close()
-            told = process.stderr.read()
-        assert (process.returncode, told) == (0, b""), call
+            told = [line for line in process.stderr if not line.startswith(b"armid: compiling")]
+        assert (process.returncode, told) == (0, []), call
         assert out not in call or (out / "report.html").stat().st_size > 0, call
         (out / "report.html").unlink(missing_ok=True)
     for told in (["--help"], ["identify", "--help"], ["--version"], []):
