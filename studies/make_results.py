@@ -84,14 +84,14 @@ RECIPES = {
                                             "fault=200 constant=100 constants=100 two=100 three=100 control=200"),)),
     "fitness": study("fitness", "fitness"),
     "four_strokes": loop("four_strokes", "parameters"),
+    "landscape": Recipe(("python studies/suite/landscape.py --out out/landscape",), ("landscape",)),
     "measured": Recipe(("python studies/measured/run.py --data out/data --out out/measured",)),
     "one_stroke": loop("one_stroke", "parameters"),
     "paper_arm": Recipe(("armid identify studies/campaigns/paper_arm --out out/paper_arm",), ("fit",)),
     "rocking_shell": loop("rocking_shell", "residuals", "ranking"),
     "suite": Recipe(("armid study studies/suite/suite.toml --out out/suite", "armid report out/suite"), ("attained",)),
     "table1": study("table1", "table1", "valley_noise_free"),
-    "table1_short": study("table1_short"),
-    "table2": study("table2", "table2"),
+    "table1_short": study("table1_short"), "table2": study("table2", "table2"),
 }  # fmt: skip
 
 

@@ -113,8 +113,9 @@ RIGHT = {
     **{f"arm of two {c}": partial(both, friction=c) for c in (0.0, 0.05, 0.15)},
     **{f"arm by its speed {c}": partial(speed, friction=c) for c in (0.0, 0.1)},
     "arm, noise": partial(write_arm, noise=20.0), "arm, short stroke": partial(write_arm, size=0.15),
-    # over the top four times, where next to nothing decides: sampled at 8 or 10 ms the record held out is accused
-    "arm, long stroke": partial(write_arm, size=1.5, friction=0.05, interval=0.005),
+    # over the top four times, where next to nothing decides
+    **{f"arm, long stroke, {step} s": partial(write_arm, size=1.5, friction=0.05, interval=step) for step in
+       (0.005, 0.008, 0.01)},
     "arm, coarse": partial(write_arm, interval=0.02),
     **{f"axis {c}": partial(write_axis, friction=c) for c in (0.0, 0.5, 1.0, 1.5)},
     "axis, noise": partial(write_axis, noise=20.0), "axis, bare": partial(bare, friction=0.7),

@@ -40,6 +40,8 @@ N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
 # the best so many.
 N_LIKELY, N_HARD, N_BEST = 5, 512, 8
 MOST_VALUES, MOST_APART = 2**24, 6
+# What fits nearly as well is looked for at so many candidates each within these shares of the ranges.
+N_NEAR, NEAR = 64, (0.001, 0.003, 0.01)
 # Train records up to so many are few; samples that two of them must have in common to be exchanged.
 FEW, FEWEST_COMMON = 3, 100
 # Share of a signal by which a simulation may change when samples of a long record are left out.
@@ -72,7 +74,8 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
     if not found:
         n = len(campaign.holdout)
         others = [trial.thinned(shortened(r, n), n) for r in campaign.holdout if r.file not in noise]
-        found += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))]
+        found += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))
+                  if s.after * AS_GOOD < least_nearby(trial, train, r, z)]  # fmt: skip
     return (*seen, *found)
 
 
@@ -285,6 +288,19 @@ def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[Suspic
         return []
     undone = [(m, m.undo(record)) for m in trial.mends(record, z[np.newaxis])]
     return chosen(record.file, before, [(float(trial.errors([r], z)[0, 0]), m) for m, r in undone])
+
+
+def least_nearby(trial: Trial, train: Sequence[Record], record: Record, z: Array) -> float:
+    """Return the least error of a held-out record at candidates near by that fit the train records tolerably.
+
+    Where next to nothing decides how a machine moves on, as over the top, what they leave open is no mistake.
+    """
+    n = len(z)
+    near = np.concatenate([z + r * (2.0 * probes(np.zeros(n), np.ones(n), N_NEAR) - 1.0) for r in NEAR])
+    near = np.clip(near, 0.0, 1.0)
+    most = max(TOLERABLE, AS_GOOD * float(trial.errors(train, z).max()))
+    near = near[trial.errors(train, near).max(axis=1) <= most]
+    return float(np.min(trial.errors([record], near), initial=np.inf)) if len(near) else np.inf
 
 
 def chosen(record: str, before: float, tried: Iterable[tuple[float, Mend]]) -> list[Suspicion]:
