@@ -1,4 +1,4 @@
-"""A physical addition to a plant at named ports."""
+"""A physical addition to a plant at named ports, and what several effects share."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,6 +10,10 @@ from armid.model.parameter import Parameter, check_name
 Equation = Callable[..., Any]
 # How the nodes of a composed model begin: an effect of this name could not be told from them.
 RESERVED = ("rate", "initial", "guard")
+SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
+SIZE_WIDTH = Parameter(
+    "width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the size of speed is smoothed"
+)
 
 
 @dataclass(frozen=True)
@@ -102,3 +106,23 @@ class Effect:
         if word not in known:
             raise ArmidError(f"effect '{self.name}' has no form '{word}': {nearest(word, filter(None, known))}")
         return known[word]
+
+
+def zero() -> float:
+    """Return 0: nothing has happened before the start."""
+    return 0.0
+
+
+def start_speed(omega: float) -> float:
+    """Return the speed: what follows it has settled before the start."""
+    return omega
+
+
+def slope_itself(slope: float) -> float:
+    """Rate of a signal whose slope is a state."""
+    return slope
+
+
+def drive_now(drive_effort: float) -> float:
+    """Return the effort of the drive: what follows it has settled before the start."""
+    return drive_effort

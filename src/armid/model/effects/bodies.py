@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from armid.model.effect import Effect, State
-from armid.model.effects.shared import start_speed, zero
+from armid.model.effect import Effect, State, start_speed, zero
 from armid.model.parameter import Parameter
 
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from armid.model.effect import Effect, Guard, State
+from armid.model.effect import Effect, Guard, State, drive_now, slope_itself, start_speed, zero
 from armid.model.effects.sensor import lag_error, lagging_rate
-from armid.model.effects.shared import drive_now, slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 
 tachometer_lag = Effect(

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armid.model.effect import Effect, Guard, State
-from armid.model.effects.shared import SIGN_WIDTH, SIZE_WIDTH, drive_now, zero
+from armid.model.effect import SIGN_WIDTH, SIZE_WIDTH, Effect, Guard, State, drive_now, zero
 from armid.model.parameter import Parameter
 
 

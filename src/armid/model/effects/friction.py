@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armid.model.effect import Effect, State
-from armid.model.effects.shared import SIGN_WIDTH, SIZE_WIDTH
+from armid.model.effect import SIGN_WIDTH, SIZE_WIDTH, Effect, State
 from armid.model.parameter import Parameter
 
 

@@ -4,8 +4,7 @@ from inspect import signature
 
 import numpy as np
 
-from armid.model.effect import Effect, State
-from armid.model.effects.shared import slope_itself, start_speed, zero
+from armid.model.effect import Effect, State, slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 from armid.model.plant import Output, Plant
 
