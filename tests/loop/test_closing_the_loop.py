@@ -17,7 +17,8 @@ from armid.record.campaign import tolerances_of
 
 pytestmark = pytest.mark.slow
 KEYS = ["campaign", "plant", "unit", "noise_rms", "outputs", "verdict", "also", "effects", "error", "error_all_records",
-        "suspects", "parameters", "steps", "withdrawn", "advice", "next_steps", "log"]  # fmt: skip
+        "suspects", "parameters", "steps", "withdrawn", "advice", "next_steps", "known_together",
+        "log"]  # fmt: skip
 ENTRY = ["value", "unit", "low", "high", "trusted", "interval_holds", "given_low", "given_high",
          "trusted_given_constants"]  # fmt: skip
 STEP = ["effect", "port", "alternatives", "empirical", "claimed", "constants", "error", "parameters"]
@@ -128,6 +129,19 @@ def test_constants_that_are_off_are_found_and_no_effect_is_named(stand):
         assert e.low < e.given_low < e.given_high < e.high
         assert e.low < TRUTH[e.name] < e.high
         assert e.trusted_given_constants or not e.trusted
+    together = report_of(found)["known_together"]
+    assert any(said.startswith("these records do not tell a change of eta3 +1 %, I01") for said in together)
+
+
+def test_what_the_records_give_up_to_a_common_factor_is_told_of_rough_constants_too(write_axis, tmp_path):
+    """A force in proportion to a current moves a mass against friction: scaled alike, all three move it the same."""
+    times = np.arange(401) / 200.0
+    speed = 8.0 / 5.0 * (1.0 - np.exp(-5.0 * times / 2.0)) + 1e-3 * np.random.default_rng(1).standard_normal(401)
+    told = "[tolerances]\ndefault = 0.5\n[parameters.mass]\nfixed = 2.0\n"
+    campaign = read_campaign(write_axis(tmp_path, speed, told))
+    found = close_loop(Model(campaign.plant), campaign, {"viscous": EFFECTS["viscous"]})
+    assert found.effects == ("viscous",)
+    assert report_of(found)["known_together"] == ["these records give mass, gain up to a common factor"]
 
 
 def test_rounds_and_next_steps_are_told(closed):

@@ -120,6 +120,7 @@ def test_a_line_of_the_table_shows_every_output_of_every_record_held_out(folder,
 
 
 @pytest.mark.skipif(importlib.util.find_spec("sysidentpy") is not None, reason="the packages are there")
+@pytest.mark.slow
 def test_baselines_name_the_package_that_is_missing(call, tmp_path):
     drone_files(tmp_path)
     call("quarter_drone/make_campaign.py", "--data", tmp_path, "--out", tmp_path / "campaign")

@@ -66,6 +66,7 @@ def states(count: int = 200) -> list[dict[str, float]]:
     ],
     ids=lambda told: next(iter(told), "declared"),
 )  # fmt: skip
+@pytest.mark.slow
 def test_two_ways_to_say_the_same_agree(one: dict[str, float], other: dict[str, float], name: str) -> None:
     assert np.abs(moved(Effects(**one), name).gyro - moved(Effects(**other), name).gyro).max() < 1e-5
 

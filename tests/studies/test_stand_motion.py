@@ -80,6 +80,7 @@ def test_every_effect_is_tested_here() -> None:
 
 
 @pytest.mark.parametrize("name", SIZES)
+@pytest.mark.slow
 def test_an_effect_at_zero_is_the_declared_arm_exactly(name: str) -> None:
     null = moved(Effects(**{name: 0.0}))
     assert np.array_equal(null.gyro, moved().gyro)
@@ -87,16 +88,19 @@ def test_an_effect_at_zero_is_the_declared_arm_exactly(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "size"), SIZES.items())
+@pytest.mark.slow
 def test_an_effect_changes_what_the_gyro_shows(name: str, size: float) -> None:
     assert np.abs(moved(Effects(**{name: size})).gyro - moved().gyro).max() > math.radians(0.25)
 
 
 @pytest.mark.parametrize(("name", "size"), NEARLY_NULL.items())
+@pytest.mark.slow
 def test_an_effect_near_its_null_is_near_the_declared_arm(name: str, size: float) -> None:
     assert np.abs(moved(Effects(**{name: size})).gyro - moved().gyro).max() < 1e-5
 
 
 @pytest.mark.parametrize(("name", "size"), STIFF.items())
+@pytest.mark.slow
 def test_a_fast_lag_or_tray_is_near_the_declared_arm(name: str, size: float) -> None:
     """Take the stroke in closed loop from the start, and shortly, since these limits are stiff."""
     shown = moved(Effects(**{name: size}), "inside_E", 0.1).gyro
@@ -115,6 +119,7 @@ def test_refuses_an_effect_too_stiff_to_integrate(monkeypatch: pytest.MonkeyPatc
      "seal_friction", "asymmetric_friction", "worm_speed", "flux_atan", "flux_root", "line_loss", "cam_bump",
      "motor_fade", "piston_stiction", "pressure_friction"],
 )  # fmt: skip
+@pytest.mark.slow
 def test_a_loss_delays_the_switch_both_ways(name: str) -> None:
     for manoeuvre in ("lower", "raise"):
         lossy, declared = (moved(effects, manoeuvre).switch_s for effects in (Effects(**{name: SIZES[name]}), None))
@@ -213,6 +218,7 @@ def plainly_late(name: str, delay: float) -> npt.NDArray[np.float64]:
 
 @pytest.mark.parametrize("delay", [0.002, 0.010])
 @pytest.mark.parametrize(("name", "near"), [("lower", 4e-3), ("inside_E", 4e-4)])
+@pytest.mark.slow
 def test_a_delay_agrees_with_a_plain_integrator_that_remembers(name: str, near: float, delay: float) -> None:
     """Allow for the switch of the plain one, which comes up to a step late."""
     found = moved_late(name, (("controller_delay", delay),)).gyro
@@ -229,6 +235,7 @@ def test_a_delay_shifts_the_switch_and_nothing_before_it() -> None:
 
 
 @pytest.mark.parametrize("name", ["controller_delay", "controller_period"])
+@pytest.mark.slow
 def test_what_a_late_controller_does_vanishes_with_its_lateness(name: str) -> None:
     away = [
         np.abs(moved_late("raise", ((name, late),)).gyro - moved_late("raise").gyro).max()

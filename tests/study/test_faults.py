@@ -171,6 +171,7 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
     fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors)
 
 
+@pytest.mark.slow
 def test_an_identifier_that_hangs_is_stopped(write_study, tmp_path, bad_identifiers, undisturbed):
     errors = {"hangs": "stopped at the time limit of 10 s"}
     fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors, time_limit=10.0)
@@ -250,6 +251,7 @@ def test_a_run_that_was_cut_off_is_made_again(write_study, undisturbed, tmp_path
     assert same_results(run_study(write_study(SEEDS), jobs=1, out=tmp_path / "out"), undisturbed)
 
 
+@pytest.mark.slow
 def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(write_study, tmp_path, bad_identifiers):
     mine = tmp_path / "mine.py"
     shutil.copy(bad_identifiers, mine)

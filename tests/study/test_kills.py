@@ -102,6 +102,7 @@ def children_of(pid):
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="looks for processes in /proc")
+@pytest.mark.slow
 def test_workers_may_be_killed_and_end_with_their_runner(start, write_study, tmp_path, undisturbed):
     process = start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2)
     wait_for(process, tmp_path / "out", 2)
@@ -136,6 +137,7 @@ def test_an_interrupt_of_the_workers_cuts_no_run(start, write_study, tmp_path, u
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
+@pytest.mark.slow
 def test_two_runners_share_the_work(start, write_study, tmp_path, undisturbed):
     file = write_study(SEEDS)
     both = [start(file, "--out", tmp_path / "out", "--jobs", 1) for _ in range(2)]

@@ -118,7 +118,7 @@ def common_factors(names: Sequence[str], slopes: Array, found: Sequence[Product]
 
     Of each parameter the smallest set of constants and further parameters that makes up for a change of it.
     """
-    if not found or not names:
+    if len(names) + len(found) < 2:
         return ()
     every = np.column_stack([slopes, *(p.slope for p in found)])
     lengths = np.linalg.norm(every, axis=0)

@@ -184,5 +184,6 @@ def examine(
     grid = manoeuvre_grid(model, [r.record for r in train])
     bought = offers(motions, grid, space, at, information.fisher, levels, by)
     return Examination(campaign, model, space, train, at, x is not None, minimum, information,
-                       groups(information.fisher, space.free_names), common_factors(space.free_names, relative, within),
+                       groups(information.fisher, space.free_names),
+                       common_factors(space.free_names, relative, within) if within else (),
                        wider if within else information.deviation, found, bought, by)  # fmt: skip

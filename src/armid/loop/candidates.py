@@ -31,6 +31,8 @@ S = TypeVar("S")
 T = TypeVar("T")
 # What the names of empirical terms begin with (no effect of a library may), and how reports show them.
 UNNAMED, SHOWN_AS = "unnamed_", "unnamed:"
+# How much wider a range becomes that a strength has reached the end of.
+FURTHER = 4.0
 # What the names of constants that are known roughly begin with, which are looked for as effects are.
 ROUGHLY, CONSTANT = "error_of_", "constant:"
 # More than the library holds: a model that grew for ever would take for ever to compile.
@@ -234,6 +236,24 @@ class Library:
             elif mine is not None and mine.free_shape and name in self.fixed_shapes(mine):
                 space = space.with_bounds(name, parameter.low, parameter.high)
         return space
+
+    def reaching_further(self, active: Active, names: Iterable[str]) -> "Library":
+        """Return the library with wider ranges of some strengths of effects, itself where no range may be widened.
+
+        May be: what is in units of an effort whose size is that of the drive in the records, once, and not where the
+        user gave the range. A machine that runs at the speed at which friction takes all of its drive has strengths
+        about that size.
+        """
+        if not self.declared.plant.scales_from_records:
+            return self
+        relative = {f"{k.compiled}.{p.name}" for k in active for p in self.candidates[k.declared].parameters
+                    if "effort" in p.unit and p.null is not None and p.fixed is None}  # fmt: skip
+        wanted = relative.intersection(names) - {*self.bounds, *self.fixed, *self.overrides}
+        if not wanted:
+            return self
+        declared = self.compiled_model(active).parameters
+        wider = {n: (FURTHER * declared[n].low, FURTHER * declared[n].high) for n in wanted}
+        return replace(self, bounds={**self.bounds, **wider}, _problems={})
 
     def fixed_shapes(self, key: EffectKey) -> tuple[str, ...]:
         """Return the parameters of a candidate that are fixed by its declaration alone."""

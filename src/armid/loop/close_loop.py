@@ -29,6 +29,7 @@ from armid.loop.constants import (
     constant_models,
     constants_beside,
     group_beside,
+    known_together,
     measurements,
 )
 from armid.loop.diagnose import diagnose, diagnosed, holdout_residuals, is_significant, train_residuals
@@ -170,11 +171,12 @@ def close_loop(
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
     }  # fmt: skip
     suspects += broken_suspects(campaign.records)
+    together = known_together(found.chosen, library)
     steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
     said = (*implausible, *next_steps_of(found, suspects))
     return ClosedLoop(there, noise, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
-                      () if withdrawn else found.rivals, advice, said, tuple(suspects), every, library, search,
-                      found.missing, term)  # fmt: skip
+                      () if withdrawn else found.rivals, advice, said, together, tuple(suspects), every, library,
+                      search, found.missing, term)  # fmt: skip
 
 
 def implausible_records(

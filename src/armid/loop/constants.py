@@ -11,13 +11,14 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.estimation.constants import NAMED, Product, columns_of, moved_replay
+from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_factors, moved_replay
 from armid.estimation.least_squares import LeastSquaresProblem, descend
-from armid.loop.candidates import Library
+from armid.loop.candidates import ROUGHLY, Library
 from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import MOST as TOO_MANY
 from armid.loop.equivalence import WITHIN, EffectGroup, Likeness
-from armid.loop.fit import Fit, beyond
+from armid.loop.fit import Fit, beyond, decomposed
+from armid.loop.score_test import free_values
 from armid.loop.search import Search, unless_diverged
 from armid.loop.whitening import WhiteRecords
 
@@ -182,3 +183,39 @@ def group_beside(constants: ConstantModel, search: Search) -> EffectGroup:
     near = dict.fromkeys(f.active[0].public for f in fits)
     alike = tuple(Likeness(name, 0.0, 1.0) for name in near) if len(near) < TOO_MANY else ()
     return EffectGroup(constants.name, alike, ())
+
+
+def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
+    """Return in words which parameters of the declared model and constants the records give only together.
+
+    What the free strengths of effects make up for counts as unseen.
+    """
+    own, strengths = {}, [np.zeros(len(fit.residual))]
+    for name, value in fit.values.items():
+        owner = library.owner(name)
+        if owner is None:
+            own[name] = slope(fit, fit.records, name, value)
+        elif owner.name.startswith(ROUGHLY):
+            own[owner.name.removeprefix(ROUGHLY)] = slope(fit, fit.records, name, 1.0 + value)
+        else:
+            strengths.append(slope(fit, fit.records, name, value))
+    for key in library.candidates:
+        if key.name.startswith(ROUGHLY) and key not in fit.active:
+            records = library.problem((*fit.active, key), fit.values)
+            pairs = zip(records.replays, fit.records.replays, strict=True)
+            there = replace(records, replays=tuple(replace(r, pieces=at.pieces) for r, at in pairs))
+            own[key.name.removeprefix(ROUGHLY)] = slope(fit, there, f"{key.compiled}.error", 1.0)
+    if not own:
+        return ()
+    basis, _ = decomposed(np.column_stack(strengths))
+    found = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
+    return common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), found)
+
+
+def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:
+    """Return the change of the whitened signal by a parameter, its size taken as 1, about a fit, (n_samples,)."""
+    candidate = np.asarray(records.space.complete(free_values(records, fit.values)[np.newaxis])[0])
+    both = np.tile(candidate, (2, 1))
+    both[:, records.space.index(name)] += np.array([STEP, -STEP]) * size
+    upper, lower = replace(records, data=fit.records.data).whole_signals(both)
+    return np.asarray((upper - lower) / (2.0 * STEP))

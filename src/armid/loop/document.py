@@ -115,6 +115,8 @@ def loop_document(
     by_record = (error_table("Errors of each record", ["record", "role", "model"], each, unit, note),) if each else ()
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
     shifts = (*details.get("suspects", ()), *details.get("shifts", ()))
+    together = tuple(f"{said[0].upper()}{said[1:]}." for said in report.get("known_together", ()))
+    beside = [Sentences((*shifts, *together))] if shifts or together else []
     missing = tuple(details.get("missing", ()))
     words = details.get("advice") or [", ".join(f"{k} = {v}" for k, v in a["manoeuvre"].items())
                                       for a in report["advice"]]  # fmt: skip
@@ -124,7 +126,7 @@ def loop_document(
         Section("Error before and after", (errors,)),
         *([residual_section(details, unit, by_record)] if details else []),
         Section("Steps", steps or (Text("No effect was added."),)),
-        Section("Parameters", (parameters, *([Sentences(shifts)] if shifts else []), *figures.get("parameters", ()))),
+        Section("Parameters", (parameters, *beside, *figures.get("parameters", ()))),
     ]
     if details:
         sections.append(candidates_section(details["candidates"], figures.get("ranking", ())))

@@ -145,7 +145,8 @@ class ClosedLoop(Result):
     model, and the model in force, with the effects that earned their place. withdrawn: what the held-out records
     denied, None where nothing. refused: a group too big to be a finding, None where there is none. rivals: other models
     that fit nearly as well and differ in more effects than one. next_steps: what to do beside the record that is
-    advised, in words. suspects: records that differ, and samples that are no data; error_all_records: "before" and
+    advised, in words. known_together: which parameters and constants the train records give only together, in words.
+    suspects: records that differ, and samples that are no data; error_all_records: "before" and
     "after" -> errors on train and holdout with nothing left out. library, search: everything that was tried. missing:
     the signal that the named effects leave unexplained, None where they leave nothing; term: the empirical term for it,
     None where none earned its place.
@@ -164,6 +165,7 @@ class ClosedLoop(Result):
     rivals: tuple[RivalModel, ...]
     advice: tuple[Advice, ...]
     next_steps: tuple[str, ...]
+    known_together: tuple[str, ...]
     suspects: tuple[Suspect, ...]
     error_all_records: Mapping[str, Sequence[JointErrors | None]]
     library: Library
@@ -325,6 +327,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
             for a in found.advice
         ],
         "next_steps": list(found.next_steps),
+        "known_together": list(found.known_together),
         "log": [
             {
                 "n_effects": r.n_effects, "n_tried": r.n_tried, "refused": r.refused,

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import compress
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import REACH
+from armid.estimation.least_squares import REACH, held_by_bound
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
 from armid.loop.diagnose import diagnosed, is_significant
 from armid.loop.equivalence import substitutes
@@ -129,6 +130,8 @@ class Search:
             self.note_round(size, f"what is left is noise (chance {p:.2g}; below {QUIET:g} the search goes on)")
             return None
         self.extend(last.best)
+        while self.reach_further(size):
+            self.extend(last.best)
         if last.best.is_noise and not (self.of_size(size) and promising(last.best, self.of_size(size)[0])):
             self.note_round(size, "the size of what is left is that of the noise, and no candidate lowers it clearly")
             return None
@@ -186,6 +189,18 @@ class Search:
         self.fit_each({
             frozenset((*parent.active, s.key)): partial(refitted, parent, s, self.library, limit) for s in found
         })  # fmt: skip
+
+    def reach_further(self, size: int) -> bool:
+        """Forget the models of a size, where the range of a strength that holds one of the best may be wider."""
+        for fit in self.of_size(size)[:N_FREED]:
+            held = compress(fit.values, held_by_bound(fit.records.space, fit.x))
+            library = self.library.reaching_further(fit.active, held)
+            if library is not self.library:
+                self.library = library
+                self.fits = {active: f for active, f in self.fits.items() if len(active) < size}
+                self.scores.clear()
+                return True
+        return False
 
     def exchange_substitutes(self, best: Fit) -> None:
         """Fit the models in which a candidate that moves the records alike stands in the place of an effect."""
