@@ -158,6 +158,7 @@ def test_an_identification_and_its_parts_are_small(found, tmp_path):
     (lambda a: armid.identify(a, fitness=3), "3"),
     (lambda a: armid.identify(a, identifier=3), "is 3, expected"),
     (lambda a: armid.identify(a, effects=["viscos"]), "did you mean 'viscous'"),
+    (lambda a: armid.identify(a, identifer="pso"), "there is no argument 'identifer': did you mean 'identifier'"),
     (lambda a: armid.identify(a, efects=["viscous"]), "there is no argument 'efects': did you mean 'effects'"),
     (lambda a: armid.identify(a, window=(0.5, 0.1)), "0.5"),
     (lambda a: armid.identify(a, bounds={"inertai": (0.0, 1.0)}), "did you mean 'inertia'"),

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
+from inspect import signature
 from math import inf, isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -220,7 +221,7 @@ def identify(
     if not isinstance(options or {}, Mapping):
         raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
     window = {"window": PAPER_WINDOW} if paper and not given.get("window") else {}
-    there = opened(campaign, model=model, **expected(given) | window)
+    there = opened(campaign, model=model, **expected(given, identify) | window)
     fitness = fitness or (PAPER_FITNESS if paper else FITNESS)
     distance = (fitness_of_name(fitness, there.registry.fitness) if isinstance(fitness, str) else
                 as_fitness(name_of(fitness, getattr(fitness, "__name__", "own")), fitness))  # fmt: skip
@@ -236,12 +237,13 @@ def identify(
     return replace(found, suspicions=suspicions)
 
 
-def expected(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the named arguments of `opened`; refuse another with ArmidError."""
+def expected(given: Mapping[str, Any], asked: Callable[..., Any]) -> dict[str, Any]:
+    """Return the named arguments of `opened`, further ones of what was asked; refuse another with ArmidError."""
     known = ("effects", "plugins", "window", "bounds", "fix", "plant")
+    own = [p.name for p in signature(asked).parameters.values() if p.kind is not p.VAR_KEYWORD]
     for name in given:
         if name not in known:
-            raise ArmidError(f"there is no argument '{name}': {nearest(name, known)}")
+            raise ArmidError(f"there is no argument '{name}': {nearest(name, dict.fromkeys((*known, *own)))}")
     return dict(given)
 
 
@@ -281,7 +283,7 @@ def examine(
     """
     from armid.estimation.examine import examine as run
 
-    there = opened(campaign, model=model, **expected(given))
+    there = opened(campaign, model=model, **expected(given, examine))
     box = space or there.space()
     at = free_values(box, x, where) if isinstance(x, Mapping) else x
     return run(there.campaign, there.model, box, at, noise, by, accuracy)
@@ -327,7 +329,7 @@ def close_loop(
     from armid.loop import close_loop as run
 
     declared = {"model": model} if campaign is not None else {}
-    there = opened(model if campaign is None else campaign, bounds=bounds, **declared, **expected(given))
+    there = opened(model if campaign is None else campaign, bounds=bounds, **declared, **expected(given, close_loop))
     known = there.effects
     wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "--candidates")
     left_out = effects_of(without, known, "--without") if without else {}

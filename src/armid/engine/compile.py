@@ -55,7 +55,8 @@ def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
         return
     name = " + ".join([model.plant.name, *(e.name for e in model.effects[:MOST_NAMED])])
     more = f" and {len(model.effects) - MOST_NAMED} effects more" if len(model.effects) > MOST_NAMED else ""
-    timer = Timer(SLOW_S, LOG.info, (f"compiling {name}{more}; it is kept for the next time",))
+    kept = "; it is kept for the next time" if kept_in() else ""
+    timer = Timer(SLOW_S, LOG.info, (f"compiling {name}{more}{kept}",))
     timer.daemon = True
     timer.start()
     collecting = gc.isenabled()
