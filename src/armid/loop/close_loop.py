@@ -171,7 +171,9 @@ def close_loop(
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
     }  # fmt: skip
     suspects += broken_suspects(campaign.records)
-    together = known_together(found.chosen, library)
+    # Not of a curve: its kinks spoil the slopes, and what scales it is no physics.
+    named = next(f for f in reversed(found.path) if not any(k.is_empirical for k in f.active))
+    together = known_together(named, library)
     steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
     said = (*implausible, *next_steps_of(found, suspects))
     return ClosedLoop(there, noise, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
