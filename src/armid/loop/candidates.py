@@ -253,7 +253,9 @@ class Library:
             return self
         declared = self.compiled_model(active).parameters
         wider = {n: (FURTHER * declared[n].low, FURTHER * declared[n].high) for n in wanted}
-        return replace(self, bounds={**self.bounds, **wider}, _problems={})
+        moved = {self.owner(n) for n in wanted}
+        posed = {keys: p for keys, p in self._problems.items() if not declared_keys(keys) & moved}
+        return replace(self, bounds={**self.bounds, **wider}, _problems=posed)
 
     def fixed_shapes(self, key: EffectKey) -> tuple[str, ...]:
         """Return the parameters of a candidate that are fixed by its declaration alone."""

@@ -191,13 +191,15 @@ class Search:
         })  # fmt: skip
 
     def reach_further(self, size: int) -> bool:
-        """Forget the models of a size, where the range of a strength that holds one of the best may be wider."""
+        """Forget the models of a size with effects that hold one of the best at a range that may be wider."""
         for fit in self.of_size(size)[:N_FREED]:
             held = compress(fit.values, held_by_bound(fit.records.space, fit.x))
             library = self.library.reaching_further(fit.active, held)
             if library is not self.library:
+                moved = {library.owner(name) for name in library.bounds.keys() - self.library.bounds.keys()}
+                self.fits = {active: f for active, f in self.fits.items()
+                             if len(active) < size or not declared_keys(active) & moved}  # fmt: skip
                 self.library = library
-                self.fits = {active: f for active, f in self.fits.items() if len(active) < size}
                 self.scores.clear()
                 return True
         return False
