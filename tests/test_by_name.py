@@ -148,6 +148,8 @@ def test_an_identification_and_its_parts_are_small(found, tmp_path):
     assert list(found.table["parameter"]) == ["inertia", "viscous.slope"]
     for part in (found.campaign, found.campaign.train[0], found.model, found.model.plant):
         assert 20 < len(repr(part)) < 2_000
+    assert list(found.campaign.table["record"]) == [record.file for record in found.campaign.records]
+    assert "<table" in found.campaign._repr_html_()
     for name in ("identify", "simulate", "close_loop", "examine"):
         assert len(str(inspect.signature(getattr(armid, name)))) < 800
 

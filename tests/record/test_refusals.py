@@ -229,7 +229,7 @@ def test_other_than_a_campaign(write, tmp_path):
     folder = write(GOOD, lower=csv())
     assert_says(refusal(tmp_path / "nothing"), ["nothing' does not exist", "campaign.toml"])
     assert_says(refusal(tmp_path), ["holds no campaign.toml"])
-    assert_says(refusal(folder / "lower.csv"), ["lower.csv", "no valid TOML", "line 1"])
+    assert_says(refusal(folder / "lower.csv"), ["lower.csv' is a record", "campaign.toml is expected"])
     assert_says(refusal("a\0b"), ["does not exist"])
 
 

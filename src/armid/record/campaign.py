@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,11 @@ from armid.record.record import Record
 from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Override, RecordSheet, load_toml, unknown_name, validated
 from armid.record.table import write_table
+from armid.report.result import Shown
 from armid.units import DEGREE
+
+if TYPE_CHECKING:
+    from armid.report.document import Document
 
 # Records of each role that a campaign's repr names.
 MOST_NAMED = 8
@@ -32,7 +36,7 @@ ROUGH = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Campaign:
+class Campaign(Shown):
     """Hold the records of one machine and what is declared of it.
 
     folder: where campaign.toml lies. plant: the sibling for the records' unit, with the outputs that some record
@@ -59,6 +63,18 @@ class Campaign:
         told = "; ".join(f"{len(files)} {role}: {', '.join(files[:MOST_NAMED])}{', ...' * (len(files) > MOST_NAMED)}"
                          for role, files in named.items())  # fmt: skip
         return f"<Campaign {self.name} of {self.plant.name} [{self.unit}]; {told}>"
+
+    def document(self) -> "Document":
+        """Return what a notebook shows of it: one line for each output of each record."""
+        from armid.report.document import Document, Section, table
+
+        rows = [(r.file, r.role, own.output or self.plant.output, own.unit, len(own.measured),
+                 f"{(len(own.measured) - 1) * r.manoeuvre.interval:.4g}", f"{own.noise.rms:.3g}")
+                for r in self.records for own in (r, *r.others)]  # fmt: skip
+        headers = ("record", "role", "output", "unit", "samples", "duration [s]", "noise, rms [unit]")
+        main = table("Records", headers, rows)
+        return Document(self.name, "Campaign", "What was recorded?", (repr(self),), (Section("Records", (main,)),),
+                        main=(main,))  # fmt: skip
 
     @property
     def train(self) -> tuple[Record, ...]:

@@ -264,6 +264,8 @@ def campaign_path(path: str | Path) -> Path:
     if not os.path.exists(path):
         raise ArmidError(f"campaign {quoted(str(path))} does not exist, a folder with a {NAME} is expected")
     if os.path.isfile(path):
+        if Path(path).suffix.lower() == SUFFIX:
+            raise ArmidError(f"campaign {quoted(str(path))} is a record, the folder with its {NAME} is expected")
         return Path(path)
     if not os.path.isfile(os.path.join(path, NAME)):
         raise ArmidError(f"campaign {quoted(str(path))} holds no {NAME}, a folder with one is expected")
