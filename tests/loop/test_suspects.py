@@ -58,6 +58,28 @@ def test_a_fault_of_one_record_is_told_and_no_effect_is_named(campaign, file, ki
         assert e.low < TRUTH[e.name] < e.high
 
 
+def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
+    """Each record comes from a stand with a pressure of its own."""
+    rise, files = 0.03 * TRUTH["p0"], [r.file for r in campaign.train]
+    there = {}
+    for place, file in enumerate(files):
+        options = list(COMMON)
+        options[options.index("--p0") + 1] = repr(TRUTH["p0"] + rise * (place / (len(files) - 1) - 0.5))
+        there[file] = next(r for r in read_campaign(stand(*options)).records if r.file == file)
+    records = tuple(there.get(r.file, r) for r in campaign.records)
+    found = close_loop(Model(ARM), replace(campaign, records=records), CANDIDATES)
+    (suspect,) = report_of(found)["suspects"]
+    assert (suspect["record"], suspect["kind"], suspect["parameter"]) == (files[-1], "trend", "p0")
+    assert (suspect["unit"], suspect["action"]) == ("Pa", "freed")
+    assert suspect["low"] < rise < suspect["high"]
+    assert suspect["high"] - suspect["low"] < 0.1 * rise
+    assert (found.verdict, found.effects) == ("record_disagrees", ())
+    assert conclusion(found).startswith("p0 is 0.09")
+    assert found.after.train_error.rmse < 1.05 * found.noise_rms
+    for e in found.after.estimates[:4]:
+        assert e.low < TRUTH[e.name] < e.high
+
+
 def test_broken_samples_weigh_nothing(campaign, sound):
     def spoiled(record):
         measured = record.measured.copy()

@@ -8,7 +8,7 @@ candidates       the effects that may be missing, compiled together; the grid on
 score_test       how far each candidate would bring the residual down, to first order
 fit              a model at its least-squares estimate; whether a larger one earns its parameters
 suspects         whether one record disagrees with the others, and how
-constants        whether constants within their tolerances would do what an effect is to do
+constants        whether constants within their tolerances do what an effect is to do, or a trend from record to record
 search           refits, exchanges, models with one effect more
 equivalence      effects that the records cannot tell apart
 diagnose         whether what remains is more than noise, and where

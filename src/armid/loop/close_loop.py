@@ -25,12 +25,14 @@ from armid.loop.candidates import (
 )
 from armid.loop.constants import (
     ConstantModel,
+    Trend,
     answer_of_constants,
     constant_models,
     constants_beside,
     group_beside,
     known_together,
     measurements,
+    trends_of,
 )
 from armid.loop.diagnose import diagnose, diagnosed, holdout_residuals, is_significant, train_residuals
 from armid.loop.empirical import Term, empirical_term
@@ -198,7 +200,8 @@ def settled(
     """Suspect the records, then decide; return what was decided, who is suspected, and the train records as taken.
 
     A fault of one record that leaves noise is undone, unless one effect or constants do clearly better on all records;
-    where several faults of it do as well, the record is left out.
+    where several faults of it do as well, the record is left out. A trend from record to record that leaves noise is
+    undone where it does clearly better than any of these.
     Where nothing does and all but one record agree, that one is left out. Nothing is looked for in implausible records.
     """
     library = library_for(train)
@@ -207,14 +210,17 @@ def settled(
     if implausible:
         return Decision(search, library, declared, declared, declared, ()), [], train
     mended = mended_records(declared, library) if is_significant(declared) else []
-    if mended:
-        best, plant = mended[0], declared.model.plant
+    trends = trends_of(declared, library) if is_significant(declared) else []
+    if mended or trends:
+        plant, measured = declared.model.plant, library.data.records
         constants = constant_models(declared, declared.products(library.tolerances), library)
         single = search.run(1)[-1].best
         is_noise = bool(single.active) and not is_significant(single)
-        others = [*(m.chi2 for m in constants), *([single.chi2] if is_noise else [])]
-        if best.chi2 < min(others, default=np.inf) + WITHIN:
-            measured = library.data.records
+        least = min([*(m.chi2 for m in constants), *([single.chi2] if is_noise else [])], default=np.inf)
+        if trends and trends[0].chi2 + WITHIN < min([least, *(m.chi2 for m in mended)]):
+            return decided_without_trend(library_for, trends, library, train, curve)
+        if mended and mended[0].chi2 < least + WITHIN:
+            best = mended[0]
             faulty = measured[best.index]
             alike = [m for m in mended if m.chi2 < best.chi2 + WITHIN and measured[m.index].file == faulty.file]
             rest = tuple(r for r in train if r.file != faulty.file)
@@ -225,13 +231,33 @@ def settled(
             train = tuple(best.fault.trimmed(r, best.value, plant, faulty) if r.file == faulty.file else r
                           for r in train)  # fmt: skip
             return decide(Search(library_for(train)), curve), [best.suspect(faulty, plant, FREED)], train
-    found = decide(search, curve)
+    return suspected_again(library_for, decide(search, curve), train, curve)
+
+
+def suspected_again(
+    library_for: Callable[[Sequence[Record]], Library], found: "Decision", train: tuple[Record, ...], curve: bool
+) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
+    """Suspect the records where what was found leaves more than noise, as `settled` does."""
     if found.constants is None and is_significant(found.largest):
-        apart = disagreeing_record([declared, found.largest])
+        apart = disagreeing_record([found.declared, found.largest])
         if apart is not None:
             train = tuple(r for r in train if r.file != apart.record)
             return decide(Search(library_for(train)), curve), [apart], train
+        trends = trends_of(found.largest, found.library) if found.largest.active else []
+        if trends:
+            return decided_without_trend(library_for, trends, found.library, train, curve)
     return found, [], train
+
+
+def decided_without_trend(
+    library_for: Callable[[Sequence[Record]], Library], trends: Sequence[Trend], library: Library,
+    train: tuple[Record, ...], curve: bool,
+) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:  # fmt: skip
+    """Return what is decided on records without the best of some trends, as `settled` does."""
+    best, *others = trends
+    alike = [t for t in others if t.chi2 < best.chi2 + WITHIN]
+    train = best.undone(train)
+    return decide(Search(library_for(train)), curve), [best.suspect(alike, library)], train
 
 
 def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) -> JointErrors | None:
@@ -243,8 +269,10 @@ def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) 
 
 def next_steps_of(found: "Decision", suspects: Sequence[Suspect]) -> tuple[str, ...]:
     """Return what to do next, in words: records to repeat, then constants to measure."""
-    files = dict.fromkeys(s.record for s in suspects)
-    return (*(f"Record {file} once more, or look at how it was made." for file in files), *measurements(found.equal))
+    said = [f"Record {s.record} once more, or look at how it was made." if s.kind != "trend" else
+            f"Record the first manoeuvre once more after {s.record}: that shows whether {s.parameter} has changed."
+            for s in suspects]  # fmt: skip
+    return (*dict.fromkeys(said), *measurements(found.equal))
 
 
 @dataclass(frozen=True, eq=False)

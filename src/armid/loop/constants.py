@@ -1,5 +1,6 @@
 """Could constants within their tolerances do what an effect is to explain? One product of them alone, or all together.
 
+Or is it a parameter or a constant that changes from each record to the next, a trend, as of a machine that warms up?
 Before a name is believed, the declared model is fitted with its constants free, each drawn to its declared value by its
 tolerance (a ridge). Constants that do as well as an effect stand beside it; those that do better take its place.
 """
@@ -11,16 +12,20 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.errors import ArmidError
 from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_factors, moved_replay
+from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import LeastSquaresProblem, descend
 from armid.loop.candidates import ROUGHLY, Library
 from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import MOST as TOO_MANY
 from armid.loop.equivalence import WITHIN, EffectGroup, Likeness
-from armid.loop.fit import Fit, beyond, decomposed
+from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.score_test import free_values
 from armid.loop.search import Search, unless_diverged
+from armid.loop.suspects import FREED, Suspect, simulated_file, with_measured
 from armid.loop.whitening import WhiteRecords
+from armid.record import Record
 
 Array = NDArray[np.float64]
 # So many single products are refitted, of those that take away this share of what is no noise.
@@ -34,6 +39,9 @@ TOLD = 0.5
 # A constant has to be known to this part of what it would be off, to tell; of so many that is said.
 SURE, MOST_TOLD = 3.0, 3
 TOGETHER = f"{NAMED}all"
+# A trend is asked of so many files, over at most this share of a parameter's range, or of the value of a constant, in
+# so many steps of its fit.
+FEWEST_FOR_TREND, FARTHEST_TREND, N_STEPS = 4, 0.5, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,3 +227,112 @@ def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:
     both[:, records.space.index(name)] += np.array([STEP, -STEP]) * size
     upper, lower = replace(records, data=fit.records.data).whole_signals(both)
     return np.asarray((upper - lower) / (2.0 * STEP))
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """Hold a model with a parameter, or a product of constants, that changes in proportion to the order of the files.
+
+    fit: to the records without the trend, as in the middle of the campaign. moves: see `trends_of`. value: by how much
+    it is larger in the last file than in the first, a share of the range or of the constant. chi2: as of `Mended`.
+    """
+
+    fit: Fit
+    moves: int | Product
+    value: float
+    deviation: float
+    chi2: float
+
+    def name(self, library: Library) -> str:
+        if isinstance(self.moves, Product):
+            return self.moves.public
+        name = self.fit.records.space.free_names[self.moves]
+        owner = library.owner(name)
+        return name if owner is None else f"{owner.public}.{name.partition('.')[2]}"
+
+    def suspect(self, others: Sequence["Trend"], library: Library) -> Suspect:
+        """Return what is told of it; others: whose trend does as well."""
+        records, unit, size = self.fit.records, "1", 1.0
+        if not isinstance(self.moves, Product):
+            free = records.space.free_names[self.moves]
+            unit, size = records.model.parameters[free].unit, float(records.span[self.moves])
+        last, half = records.data.records[-1], NORMAL_95 * self.deviation
+        names = ", ".join(t.name(library) for t in (self, *others))
+        return Suspect(last.file, last.role, "trend", FREED, size * self.value, unit, size * (self.value - half),
+                       size * (self.value + half), parameter=names)  # fmt: skip
+
+    def undone(self, train: Sequence[Record]) -> tuple[Record, ...]:
+        """Return the train records as they would be without it."""
+        measured = iter([[p.measured for p in r.pieces] for r in self.fit.records.replays])
+        found = []
+        for record in train:
+            each = []
+            for one in record.each:
+                pieces = [replace(p, measured=np.concatenate([x, p.measured[len(x) :]]))
+                          for p, x in zip(one.pieces, next(measured), strict=True)]  # fmt: skip
+                each.append(replace(one, pieces=tuple(pieces)))
+            found.append(replace(each[0], others=tuple(each[1:])))
+        return tuple(found)
+
+
+def trends_of(fit: Fit, library: Library) -> list[Trend]:
+    """Return a model with a trend of one of its parameters, or of constants, those that leave noise, the best first.
+
+    What moves is the place of a free parameter, or a product of constants.
+    """
+    if len({r.file for r in fit.records.data.records}) < FEWEST_FOR_TREND:
+        return []
+    base, worth = order_of(fit.records), HALF * (fit.chi2 - len(fit.residual))
+    tried: list[tuple[float, int | Product]] = []
+    for moves in (*range(fit.n_free), *fit.products(library.tolerances)):
+        column = beyond(fit.basis, slope_of(fit, moves) * base)
+        square = float(column @ column) + FARTHEST_TREND**-2.0
+        tried.append((float(column @ fit.residual) ** 2 / square, moves))
+    sized = [moves for drop, moves in sorted(tried, key=lambda t: -t[0]) if drop > worth][:MOST]
+    found = library.each(lambda moves: unless_diverged(lambda: with_trend(fit, moves)), sized)
+    return sorted((t for t in found if t is not None and not is_significant(t.fit)), key=lambda t: t.chi2)
+
+
+def order_of(records: WhiteRecords) -> Array:
+    """Return the place of the file of each sample in the order of the campaign, from -1/2 to 1/2, (n_samples,)."""
+    files = list(dict.fromkeys(r.file for r in records.data.records))
+    places = np.array([files.index(r.file) for r in records.data.records]) / (len(files) - 1.0) - 0.5
+    return np.repeat(places, np.diff(records.data.edges))
+
+
+def slope_of(fit: Fit, moves: int | Product) -> Array:
+    return moves.slope if isinstance(moves, Product) else np.asarray(fit.jacobian[:, moves])
+
+
+def with_trend(start: Fit, moves: int | Product) -> Trend:
+    """Fit a model and a trend together, by Gauss-Newton steps.
+
+    Raises ArmidError where the simulation diverges, and for a trend beyond reason.
+    """
+    base, fit, value, square = start.records, start, 0.0, 1.0
+    for _ in range(N_STEPS):
+        column = beyond(fit.basis, slope_of(start if isinstance(moves, Product) else fit, moves) * order_of(base))
+        square = float(column @ column) + FARTHEST_TREND**-2.0
+        step = (float(column @ fit.residual) - value / FARTHEST_TREND**2) / square
+        value += step
+        if abs(value) > FARTHEST_TREND:
+            raise ArmidError("a trend beyond reason is none")
+        fit = with_own_starts(fit_from(without_trend(base, fit.z, moves, value), start.active, [fit.z]))
+        if abs(step) * np.sqrt(square) < 0.1:
+            break
+    return Trend(fit, moves, value, square**-0.5, fit.chi2 + (value / FARTHEST_TREND) ** 2)
+
+
+def without_trend(base: WhiteRecords, z: Array, moves: int | Product, value: float) -> WhiteRecords:
+    """Return a problem whose records were measured as in the middle of the campaign, by what the model says of it."""
+    files, found = list(dict.fromkeys(r.file for r in base.data.records)), base
+    for place, file in enumerate(files):
+        index = next(i for i, r in enumerate(base.data.records) if r.file == file)
+        share, there, at = value * (place / (len(files) - 1.0) - 0.5), base, z
+        if isinstance(moves, Product):
+            there = replace(base, replays=tuple(moved_replay(r, {moves.names[0]: share}) for r in base.replays))
+        else:
+            at = np.where(np.arange(len(z)) == moves, z + share, z)
+        pairs = zip(simulated_file(base, index, z), simulated_file(there, index, at), strict=True)
+        found = with_measured(found, index, [x - y for x, y in pairs])
+    return found

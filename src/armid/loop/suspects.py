@@ -54,9 +54,11 @@ class Suspect:
     """Say how one record differs.
 
     kind: "late", "clock" (fast by a share), "offset", "drift", "gain", "start", "label" (another load or key than
-    told), "push", or of samples "gap", "clipped", "stuck", "spikes". value, low, high: size with its 95 % interval
+    told), "push", "trend" (of all records: by how much the parameter is larger in this one, the last, than in the
+    first), or of samples "gap", "clipped", "stuck", "spikes". value, low, high: size with its 95 % interval
     [unit]; from_s, to_s: where it is [s]; None where there is no such thing. action: "freed" (undone), "left_out" or
-    "reported". output: whose sensor it is, "" where the plant has but one, and of the whole file.
+    "reported". output: whose sensor it is, "" where the plant has but one, and of the whole file. parameter: what has
+    the trend, then others whose trend does as well; "" for a fault of one record.
     """
 
     record: str
@@ -70,6 +72,7 @@ class Suspect:
     from_s: float | None = None
     to_s: float | None = None
     output: str = ""
+    parameter: str = ""
 
 
 @dataclass(frozen=True)
@@ -465,7 +468,8 @@ def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
 
 def suspect_sentence(suspect: Suspect, units: Mapping[str, tuple[str, float]]) -> str:
     """Return a suspect in words; units: SI unit -> how it is shown and by what factor."""
-    s, unit, factor = suspect, *units.get(suspect.unit, (suspect.unit, 1.0))
+    shown, factor = units.get(suspect.unit, (suspect.unit, 1.0))
+    s, unit = suspect, "" if shown == "1" else f" {shown}"
     if s.kind in ("gap", "clipped", "stuck", "spikes"):
         words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
         where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"
@@ -474,6 +478,12 @@ def suspect_sentence(suspect: Suspect, units: Mapping[str, tuple[str, float]]) -
         return f"{s.record}: pushed from {s.from_s:.3g} to {s.to_s:.3g} s; it is left out."
     if s.kind == "label" or s.value is None or s.low is None or s.high is None:
         return f"{s.record} looks like a record of another load{'; it is left out' if s.action == LEFT_OUT else ''}."
+    if s.kind == "trend":
+        grew, low, high = ("larger" if s.value > 0.0 else "smaller"), *sorted((abs(s.low), abs(s.high)))
+        size = f"{factor * abs(s.value):.3g}{unit} ({factor * low:.3g} to {factor * high:.3g})"
+        names = " or ".join(s.parameter.split(", "))
+        return (f"{names} is {size} {grew} in {s.record}, the last record, than in the first, and changes from each to "
+                "the next, as of a machine that warms up, wears or runs in; so it is taken.")  # fmt: skip
     done = {FREED: "; so it is taken", LEFT_OUT: ", or another fault of it is; it is left out"}.get(s.action, "")
     if s.kind == "late":
         word = "late" if s.value > 0.0 else "early"
@@ -482,7 +492,7 @@ def suspect_sentence(suspect: Suspect, units: Mapping[str, tuple[str, float]]) -
     words = {"start": "starts elsewhere than told, by", "offset": "its sensor is off by", "gain": "its gain is off by",
              "drift": "its sensor drifts by", "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
     where = f"{s.record}, {s.output}" if s.output else s.record
-    return f"{where}: {words} {factor * s.value:.3g} {unit} ({factor * s.low:.3g} to {factor * s.high:.3g}){done}."
+    return f"{where}: {words} {factor * s.value:.3g}{unit} ({factor * s.low:.3g} to {factor * s.high:.3g}){done}."
 
 
 def fitted_size(base: WhiteRecords, index: int, z: Array, fault: Fault) -> tuple[float, float]:
