@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from armid.engine import probes, simulate
 from armid.errors import ArmidError
@@ -142,7 +142,7 @@ def advice_of(rivals: Sequence[Rival], feasible: Feasible, powers: Powers) -> Ad
 
 
 def normal_draws(n_dimensions: int, n_draws: int) -> Array:
-    return np.asarray(norm.ppf(probes(np.zeros(n_dimensions), np.ones(n_dimensions), n_draws)))
+    return np.asarray(ndtri(probes(np.zeros(n_dimensions), np.ones(n_dimensions), n_draws)))
 
 
 def outside(Z: Array) -> Array:
@@ -277,7 +277,7 @@ def simulate_refits(
         values, signals = zip(*(fitted_again(r, feasible, white, seen) for r in rivals), strict=True)
         apart = np.array([np.linalg.norm(s - signals[right]) for s in signals])
         margin = np.array(values) - values[right] - threshold
-        won = norm.cdf(margin / np.maximum(2.0 * apart, 1e-9))
+        won = ndtr(margin / np.maximum(2.0 * apart, 1e-9))
         won[right] = 1.0
         chances.append(won)
         distances.append(apart)

@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_distribution
-from scipy.stats import f as f_distribution
+from scipy.special import chdtrc, fdtrc
 
 from armid.engine import along, simulate
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
@@ -256,9 +255,7 @@ def diagnose(seen: Residuals) -> Diagnosis:
 
 def chance(ratio: float, free: float, known: float) -> float:
     """Return the chance that noise shows a ratio of mean squares; known: samples that tell it, inf of a known one."""
-    return float(
-        f_distribution.sf(ratio, free, known) if np.isfinite(known) else chi2_distribution.sf(ratio * free, free)
-    )
+    return float(fdtrc(free, known, ratio) if np.isfinite(known) else chdtrc(free, ratio * free))
 
 
 def size_tests(seen: Residuals) -> Iterator[Finding]:
@@ -282,7 +279,7 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
         parts = {"size": whole, "record": records if len(records) > 1 else {}}.get(kind)
         for where, samples in (seen.stages if parts is None else parts).items():
             ratio = float(np.sum(square[samples])) / max(float(sound[samples].sum()), 1.0) / share
-            yield Finding(kind, where, ratio, float(f_distribution.sf(ratio, counted[samples].sum() * share, known)))
+            yield Finding(kind, where, ratio, float(fdtrc(counted[samples].sum() * share, known, ratio)))
 
 
 def repeat_tests(seen: Residuals) -> Iterator[Finding]:
@@ -298,7 +295,7 @@ def repeat_tests(seen: Residuals) -> Iterator[Finding]:
         lack, pure = len(parts) * float(mean @ mean), float(np.sum((table - mean) ** 2))
         free, scatter = len(mean), (len(parts) - 1) * len(mean)
         ratio = (lack / free) / (pure / scatter)
-        yield Finding("repeats", name, ratio, float(f_distribution.sf(ratio, free, scatter)))
+        yield Finding("repeats", name, ratio, float(fdtrc(free, scatter, ratio)))
 
 
 def time_tests(seen: Residuals) -> Iterator[Finding]:
@@ -319,7 +316,7 @@ def time_tests(seen: Residuals) -> Iterator[Finding]:
         covariance = np.array([deviations[lag:] @ deviations[: n - lag] for lag in range(lags + 1)])
         total += n * (n + 2.0) * float(np.sum((covariance[1:] / covariance[0]) ** 2 / (n - np.arange(1.0, lags + 1.0))))
     ratio = total / (lags * len(parts))
-    yield Finding("autocorrelation", f"{lags} lags", ratio, float(chi2_distribution.sf(total, lags * len(parts))))
+    yield Finding("autocorrelation", f"{lags} lags", ratio, float(chdtrc(lags * len(parts), total)))
 
 
 def dependence_tests(seen: Residuals) -> Iterator[Finding]:

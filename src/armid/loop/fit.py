@@ -9,8 +9,7 @@ from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_distribution
-from scipy.stats import f as f_distribution
+from scipy.special import chdtri, fdtrc
 
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
@@ -93,7 +92,7 @@ class Fit:
     def is_noise(self) -> bool:
         """Whether the size of the residual is that of the noise: chi2 per sample not above 1 by chance of 1 %."""
         level, n = self.records.data.levels[0], len(self.residual) - self.n_free
-        return level.known and bool(f_distribution.sf(self.chi2 / n, n, level.n_slow) > ONLY_NOISE)
+        return level.known and bool(fdtrc(n, level.n_slow, self.chi2 / n) > ONLY_NOISE)
 
     @cached_property
     def jacobian(self) -> Array:
@@ -143,7 +142,7 @@ class Fit:
         covariance = np.linalg.inv(weighed.T @ weighed + BOX * np.eye(self.n_free))
         moved = self.answer @ self.start_slopes
         covariance = (covariance + moved @ moved.T)[np.ix_(places, places)]
-        return not places or bool(away @ np.linalg.solve(covariance, away) > chi2_distribution.isf(OPEN, len(places)))
+        return not places or bool(away @ np.linalg.solve(covariance, away) > chdtri(len(places), OPEN))
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""
@@ -291,7 +290,7 @@ def compare(smaller: Fit, larger: Fit, n_candidates: int = 1, n_shapes: int = 1,
     gain = float(criterion(smaller, n_eff) - criterion(larger, n_eff))
     # The noise of slow signals is known from a rest of so many independent samples, hence F and not chi-square.
     known = larger.records.data.n_noise(otherwise=n_eff)
-    p = min(1.0, n_candidates * n_shapes * float(f_distribution.sf(max(ratio, 0.0) / n_extra, n_extra, known)))
+    p = min(1.0, n_candidates * n_shapes * float(fdtrc(n_extra, known, max(ratio, 0.0) / n_extra)))
     return Comparison(gain, p, (np.nan, np.nan) if p >= FAMILYWISE or gain <= 0.0 else left_out(smaller, larger))
 
 

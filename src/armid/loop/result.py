@@ -18,7 +18,7 @@ from armid.loop.empirical import Term
 from armid.loop.equivalence import EffectGroup, RivalModel
 from armid.loop.fit import Fit
 from armid.loop.missing_signal import Missing
-from armid.loop.score_test import Score, projected, rest_of
+from armid.loop.score_test import Score, rest_of, score
 from armid.loop.search import Search
 from armid.loop.suspects import Suspect
 from armid.model import Model
@@ -393,7 +393,7 @@ def of_output(replay: Replay, candidate: Array) -> dict[str, Any]:
 
 
 def candidates_of(found: ClosedLoop) -> dict[str, Any]:
-    """Return the candidates at the declared model, best first, with the projected sensitivities of the scores.
+    """Return the candidates at the declared model, best first, the changes of the leading ones as curves.
 
     drop: predicted fall of chi2 as a share of it; reached: that of the full fit with the effect alone, null where there
     was none. Curves are whitened, in standard deviations of the noise, against the number of the sample.
@@ -404,16 +404,15 @@ def candidates_of(found: ClosedLoop) -> dict[str, Any]:
         name = fit.active[0].public
         reached[name] = max(reached.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
     listed: list[dict[str, Any]] = []
-    for score in found.search.scores_at(start):
-        name = score.key.public
+    for own in found.search.scores_at(start):
+        name = own.key.public
         if any(entry["effect"] == name for entry in listed):
             continue
-        behind = projected(start, score.key, found.library)
-        drawn = len(listed) < MOST_DRAWN
+        again = score(start, own.key, found.library) if len(listed) < MOST_DRAWN else None
         listed.append({
-            "effect": name, "drop": finite(score.drop / start.chi2), "p": finite(score.p),
-            "reached": finite(reached.get(name)), "share": finite(behind.share), "alignment": finite(behind.alignment),
-            "curve": curve_entry(np.arange(len(behind.change), dtype=float), behind.change) if drawn else None,
+            "effect": name, "drop": finite(own.drop / start.chi2), "p": finite(own.p),
+            "reached": finite(reached.get(name)), "share": finite(own.share), "alignment": finite(own.alignment),
+            "curve": None if again is None else curve_entry(np.arange(len(again[1]), dtype=float), again[1]),
         })  # fmt: skip
     rest = rest_of(start)
     edges = found.before.train.data.edges

@@ -1,19 +1,21 @@
 """Score candidate effects at a fit: how far each would bring the residual down, were the records linear in it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc
 
 from armid.loop.candidates import Activation, EffectKey, Library, activation_grid, idle
-from armid.loop.fit import Fit, beyond
+from armid.loop.fit import UNTOLD, Fit, beyond
 from armid.loop.whitening import WhiteRecords
 
 Array = NDArray[np.float64]
 # A refit may start from so many points of the grid of each candidate.
 N_TRIED = 8
+# Of so many leading candidates it is asked whether they are the same to the records.
+MOST_TWINS = 16
 # A fall of chi2 that is not noticed among so many candidates.
 UNSEEN = 12.0
 
@@ -26,6 +28,10 @@ class Score:
     to the bound. p: chance of such a drop from noise alone, for one candidate, its grid of shapes counted. starts: free
     parameters of the extended model from which to refit (shares of the range), best first. n_shapes: grid of shapes.
     biases: by how much the effect could bias each free parameter unseen, relative to its value, (n_free,).
+    share: length of its sensitivity after projection off the parameters' as a share of that before. alignment: cosine
+    between what is left of it and what is left of the residual; its square is the share of the residual that an
+    unbounded amplitude would remove. twin: a candidate with a larger drop that would do the same, so that the records
+    cannot tell them apart; None for none.
     """
 
     key: EffectKey
@@ -35,15 +41,27 @@ class Score:
     starts: tuple[Array, ...]
     n_shapes: int
     biases: Array
+    share: float
+    alignment: float
+    twin: EffectKey | None = None
 
 
 def scores(current: Fit, library: Library) -> list[Score]:
-    found = library.each(lambda key: score(current, key, library), library.joinable(current.active))
-    return sorted((s for s in found if s is not None), key=lambda s: -s.drop)
+    """Return what each candidate would do, the largest drop of chi2 first."""
+    each = library.each(lambda key: score(current, key, library), library.joinable(current.active))
+    found = sorted((pair for pair in each if pair is not None), key=lambda pair: -pair[0].drop)
+    distinct: list[tuple[Score, Array]] = []
+    for i, (own, change) in enumerate(found[:MOST_TWINS]):
+        twins = (s.key for s, other in distinct if s.n_shapes == own.n_shapes and is_same(change, other))
+        found[i] = replace(own, twin=next(twins, None)), change
+        distinct += [found[i]] if found[i][0].twin is None else []
+    return [own for own, _ in found]
 
 
-def score(current: Fit, key: EffectKey, library: Library) -> Score | None:
+def score(current: Fit, key: EffectKey, library: Library) -> tuple[Score, Array] | None:
     """Score one candidate at a fit; None where nothing can be said, as every strength diverges or changes nothing.
+
+    Return what it would change of the whitened signal, too, beyond what the parameters could do, (n_samples,).
 
     The secant from null to each strength, divided by it, stands for the sensitivity there; projected off the
     sensitivities to the free parameters, so that what these can absorb does not count. All strengths and shapes run as
@@ -52,7 +70,8 @@ def score(current: Fit, key: EffectKey, library: Library) -> Score | None:
     records = library.problem((*current.active, key), current.values)
     grid, n_shapes = activation_grid(records, key)
     moved = responses(current, records, grid)
-    drops, amplitudes = predicted(current, moved)
+    rest = rest_of(current)
+    drops, amplitudes = predicted(current, moved, rest)
     if not np.isfinite(drops).any():
         return None
     answers = (current.answer @ moved.T).T
@@ -65,9 +84,20 @@ def score(current: Fit, key: EffectKey, library: Library) -> Score | None:
     # n_eff ln(chi2 / (chi2 - drop)), see `select.criterion`
     left = max(current.chi2 - drop, 1e-9 * current.chi2)
     ratio = float(current.independent * np.log(current.chi2 / left))
-    p = min(1.0, n_shapes * float(chi2_distribution.sf(ratio, 1)))
+    p = min(1.0, n_shapes * float(chdtrc(1, max(ratio, 0.0))))
     biases = unseen_biases(current, moved, answers)
-    return Score(key, drop, float(amplitudes[best]), p, tuple(starts), n_shapes, biases)
+    free = beyond(current.basis, moved[best])
+    length, whole = float(np.linalg.norm(free)), float(np.linalg.norm(moved[best]))
+    product = length * float(np.linalg.norm(rest))
+    alignment = float(free @ rest) / product if product > 0.0 else 0.0
+    found = Score(key, drop, float(amplitudes[best]), p, tuple(starts), n_shapes, biases,
+                  length / whole if whole > 0.0 else 0.0, alignment)  # fmt: skip
+    return found, amplitudes[best] * free
+
+
+def is_same(one: Array, other: Array) -> bool:
+    """Tell whether two whitened signals are so near to each other that no comparison of models tells them apart."""
+    return float(np.sum((one - other) ** 2)) < UNTOLD
 
 
 def responses(
@@ -108,12 +138,12 @@ def square_beyond(basis: Array, moved: Array) -> Array:
     return np.asarray(np.einsum("ij,ij->i", moved, moved) - np.einsum("ij,ij->i", within, within))
 
 
-def predicted(current: Fit, moved: Array) -> tuple[Array, Array]:
+def predicted(current: Fit, moved: Array, rest: Array) -> tuple[Array, Array]:
     """Return predicted drop of chi2 and amplitude of each activation, -inf where it diverged.
 
-    moved: change of the whitened signal per full strength, (n_activations, n_samples).
+    moved: change of the whitened signal per full strength, (n_activations, n_samples). rest: see `rest_of`.
     """
-    square, slope = square_beyond(current.basis, moved), moved @ rest_of(current)
+    square, slope = square_beyond(current.basis, moved), moved @ rest
     # What the parameters absorb whole leaves rounding, which must not be divided by.
     seen = np.isfinite(square) & (square > 1e-8 * np.einsum("ij,ij->i", moved, moved))
     amplitude = np.clip(np.divide(slope, square, out=np.zeros_like(slope), where=seen), 0.0, 1.0)
@@ -148,31 +178,3 @@ def moved_start(records: WhiteRecords, current: Fit, activation: Activation, ans
     z = [shares[n] if n in shares else (added[n] - space.low[i]) / (space.high[i] - space.low[i])
          for n, i in ((n, space.index(n)) for n in space.free_names)]  # fmt: skip
     return np.asarray(np.clip(np.array(z), 1e-3, 1.0 - 1e-3))
-
-
-@dataclass(frozen=True, eq=False)
-class Projected:
-    """Hold the best activation of one candidate at a fit, all whitened.
-
-    share: length of its sensitivity after projection off the parameters' as a share of that before. alignment: cosine
-    between what is left of it and what is left of the residual; its square is the share of the residual that an
-    unbounded amplitude would remove. change: the part of the residual that it predicts, (n_samples,).
-    """
-
-    key: EffectKey
-    share: float
-    alignment: float
-    change: Array
-
-
-def projected(current: Fit, key: EffectKey, library: Library) -> Projected:
-    """Return what stands behind the score of a candidate: the activation with the largest predicted drop of chi2."""
-    records = library.problem((*current.active, key), current.values)
-    moved = responses(current, records, activation_grid(records, key)[0])
-    drops, amplitudes = predicted(current, moved)
-    best = int(np.argsort(-drops, kind="stable")[0])
-    free, rest = beyond(current.basis, moved[best]), rest_of(current)
-    length, whole = float(np.linalg.norm(free)), float(np.linalg.norm(moved[best]))
-    product = length * float(np.linalg.norm(rest))
-    alignment = float(free @ rest) / product if product > 0.0 else 0.0
-    return Projected(key, length / whole if whole > 0.0 else 0.0, alignment, amplitudes[best] * free)

@@ -1,6 +1,6 @@
 """Look for the effects that the records ask for: one more at a time, a few models of each size kept."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import compress
@@ -15,7 +15,7 @@ from armid.loop.candidates import Active, EffectKey, Library, declared_keys
 from armid.loop.diagnose import diagnosed, is_significant
 from armid.loop.equivalence import substitutes
 from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, fit_globally, with_own_starts
-from armid.loop.score_test import N_TRIED, Score, at_null, free_values, scores
+from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
 from armid.loop.whitening import WhiteRecords
 
 Array = NDArray[np.float64]
@@ -135,10 +135,7 @@ class Search:
         if last.best.is_noise and not (self.of_size(size) and promising(last.best, self.of_size(size)[0])):
             self.note_round(size, "the size of what is left is that of the noise, and no candidate lowers it clearly")
             return None
-        distinct: dict[frozenset[EffectKey], Fit] = {}
-        for fit in last.fits:  # a model with a shape set free is no other
-            distinct.setdefault(frozenset(declared_keys(fit.active)), fit)
-        for parent in list(distinct.values())[1:BEAM]:
+        for parent in parents(last.fits)[1:]:
             self.extend(parent)
         if not self.of_size(size) or not promising(self.of_size(size - 1)[0], self.of_size(size)[0]):
             self.note_round(size, f"no candidate lowers n ln(chi2) by more than {PROMISING:g}")
@@ -174,8 +171,12 @@ class Search:
         return self.scores[active]
 
     def extend(self, parent: Fit) -> None:
-        """Fit a model with each of the leading candidates added, beyond the first few where it is in reach."""
-        worth = [s for s in self.scores_at(parent) if s.drop > WORTH * max(1.0, parent.chi2 / len(parent.residual))]
+        """Fit a model with each of the leading candidates added, beyond the first few where it is in reach.
+
+        Of those that do the same one stands for all; `exchange_twins` puts the others in its place.
+        """
+        least = WORTH * max(1.0, parent.chi2 / len(parent.residual))
+        worth = [s for s in self.scores_at(parent) if s.drop > least and s.twin is None]
         near = [s for s in worth if s.drop * WITHIN >= worth[0].drop]
         leading = worth[: max(FEWEST, min(MOST, len(near)))]
         self.add_each(parent, leading[:SURE])
@@ -193,9 +194,12 @@ class Search:
     def reach_further(self, size: int) -> bool:
         """Forget the models of a size with effects that hold one of the best at a range that may be wider."""
         for fit in self.of_size(size)[:N_FREED]:
-            held = compress(fit.values, held_by_bound(fit.records.space, fit.x))
+            held = list(compress(fit.values, held_by_bound(fit.records.space, fit.x)))
             library = self.library.reaching_further(fit.active, held)
             if library is not self.library:
+                for key in self.twins_of({self.library.owner(name) for name in held}):
+                    names = [f"{key.compiled}.{p.name}" for p in library.candidates[key].parameters]
+                    library = library.reaching_further((key,), names)
                 moved = {library.owner(name) for name in library.bounds.keys() - self.library.bounds.keys()}
                 self.fits = {active: f for active, f in self.fits.items()
                              if len(active) < size or not declared_keys(active) & moved}  # fmt: skip
@@ -211,6 +215,17 @@ class Search:
             active = (*(k for k in best.active if k != rival.place), rival.key)
             tried.setdefault(frozenset(active), partial(fit_near, active, rival.values, self.library))
         self.fit_each(tried)
+
+    def twins_of(self, keys: Set[EffectKey | None]) -> set[EffectKey]:
+        """Return the candidates that were left out of the search as they do the same as one of some."""
+        return {s.key for found in self.scores.values() for s in found if s.twin is not None and s.twin in keys}
+
+    def exchange_twins(self, fit: Fit) -> None:
+        """Fit the models in which what does the same as an effect stands in its place, where none of them is known."""
+        known, mine = {frozenset(declared_keys(active)) for active in self.fits}, declared_keys(fit.active)
+        others = (mine - {key} | {twin} for key in mine for twin in self.twins_of({key}) - mine)
+        if any(frozenset(other) not in known for other in others):
+            self.exchange_substitutes(fit)
 
     def free_shapes(self, fits: Iterable[Fit]) -> None:
         """Set the fixed shapes of each effect of some models free, one effect at a time (see `with_free_shapes`)."""
@@ -289,6 +304,21 @@ class Search:
         least = min((f.chi2 for f in known), default=0.0)
         n_eff = max((f.independent for f in known if f.chi2 <= COMPARABLE * least), default=1.0)
         return sorted(known, key=lambda f: criterion(f, n_eff))
+
+
+def parents(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the first models that are not the same to the records, so many as are extended.
+
+    A model with a shape set free is no other, nor is one with an effect that does the same in the place of another.
+    """
+    found: list[Fit] = []
+    for fit in fits:
+        keys = declared_keys(fit.active)
+        if not any(keys == declared_keys(f.active) or is_same(f.residual, fit.residual) for f in found):
+            found.append(fit)
+        if len(found) == BEAM:
+            break
+    return found
 
 
 def shown(active: Iterable[EffectKey]) -> str:
