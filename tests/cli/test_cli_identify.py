@@ -185,6 +185,22 @@ def test_a_warning_is_one_line(run, small_folder, tmp_path, write_axis):
     assert "bounds or fixed values that were given look wrong" in second
 
 
+def test_a_warning_of_several_records_is_told_once(run, tmp_path, write_axis, axis_speed):
+    times = np.arange(401) / 200.0
+    others = {f"{name}.csv": axis_speed(times) for name in "abcde"}
+    entries = "".join(f'[[records]]\nfile = "{name}"\nrole = "train"\n' for name in others)
+    folder = write_axis(tmp_path / "axis", None, entries, others)
+    for name in others:
+        rows = (folder / name).read_text().split()
+        (folder / name).write_text("\n".join(rows[:100] + rows[103 + ord(name[0]) % 3 :]) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        told = run("identify", folder, "--budget", "80").err.splitlines()
+    assert len(told) == 2, told
+    assert told[0].startswith("armid: warning: axis/a.csv: irregular sampling: ")
+    assert told[1] == "armid: warning: as of axis/a.csv, so of axis/b.csv, axis/c.csv, axis/d.csv, and 1 more"
+
+
 def test_a_bad_place_is_refused_before_the_search(refused, paper_arm_folder, tmp_path, monkeypatch):
     def never(*_, **__):
         raise AssertionError("the search was started")

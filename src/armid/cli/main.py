@@ -2,8 +2,10 @@
 
 import gc
 import logging
+import re
 import sys
 import warnings
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -14,6 +16,8 @@ from armid.cli.start import INTERRUPTED, end_on_request
 from armid.errors import ArmidError, on_a_line
 
 BAD_INPUT = 2
+# Places that are named of those that a warning is told of once.
+MOST_MORE = 3
 EPILOG = """\b
 Examples:
   armid new campaign my_axis                   a folder to put your own records into
@@ -70,13 +74,26 @@ def app() -> None:
     """
 
 
-def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-    tell(f"armid: warning: {message}")
+def show_warning(seen: dict[str, list[str]], message: Warning | str, *_: Any, **__: Any) -> None:
+    """Tell a warning; of those that differ in the record and in numbers alone the first, and the others at the end."""
+    file, is_of_file, what = str(message).partition(".csv: ")
+    alike = seen.setdefault(re.sub(r"\d[\d.e+-]*", "", what) if is_of_file else str(message), [])
+    if not alike:
+        tell(f"armid: warning: {message}")
+    alike.append(f"{file}.csv")
+
+
+def tell_more(seen: dict[str, list[str]]) -> None:
+    for first, *others in seen.values():
+        if others:
+            more = f", and {len(others) - MOST_MORE} more" if len(others) > MOST_MORE else ""
+            tell(f"armid: warning: as of {first}, so of {', '.join(others[:MOST_MORE])}{more}")
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run a command; bad input gives one sentence and exit code 2."""
-    warnings.showwarning = show_warning
+    seen: dict[str, list[str]] = {}
+    warnings.showwarning = partial(show_warning, seen)
     # imports and figures make many objects that stay: looking through them every 700 is a tenth of a short command
     gc.set_threshold(20_000)
     logging.getLogger("armid").setLevel(logging.INFO)
@@ -103,6 +120,8 @@ def main(arguments: list[str] | None = None) -> None:
         if place is None:
             raise
         stop(f"plug-in {place}, fails: {type(error).__name__}: {error}", BAD_INPUT)
+    finally:
+        tell_more(seen)
     sys.exit(code if isinstance(code, int) else 0)
 
 
