@@ -32,16 +32,18 @@ Array = NDArray[np.float64]
 MOST, HALF = 6, 0.5
 # In tolerances: how far a fit may go, and what is no answer any more.
 FARTHEST, PLAUSIBLE = 4.0, 3.0
-# Relative fall of chi2 in one step at which their fit stops: a constant costs a simulation of its own.
-SETTLED = 1e-6
+# Relative fall of chi2 in one step at which their fit stops, and what chi2 a sample must be in reach: of noise it is 1.
+SETTLED, IN_REACH = 1e-6, 2.0
+# Constants that differ by less than this many tolerances are not simulated anew: a constant costs one of its own.
+NEAR = 0.01
 # Of all constants together those are told that are off by more than this share of their tolerance.
 TOLD = 0.5
 # A constant has to be known to this part of what it would be off, to tell; of so many that is said.
 SURE, MOST_TOLD = 3.0, 3
 TOGETHER = f"{NAMED}all"
 # A trend is asked of so many files, over at most this share of a parameter's range, or of the value of a constant, in
-# so many steps of its fit.
-FEWEST_FOR_TREND, FARTHEST_TREND, N_STEPS = 4, 0.5, 8
+# so many steps of its fit; it has to take away this share of what is more than noise, to first order.
+FEWEST_FOR_TREND, FARTHEST_TREND, N_STEPS, NEARLY = 4, 0.5, 8, 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,15 +104,27 @@ class FreedConstants(LeastSquaresProblem):
         return FARTHEST * (2.0 * Z[:, -len(self.chosen) :] - 1.0)
 
     def signals(self, Z: Array) -> Array:
-        """Return weighted signals of candidates, then what the ridge weighs; constants are one to a simulation."""
-        found = np.empty((len(Z), len(self.measured)))
-        found[:, -len(self.chosen) :] = self.off(Z)
-        each, groups = np.unique(self.off(Z), axis=0, return_inverse=True)
-        for i, off in enumerate(each):
-            rows = np.flatnonzero(groups.ravel() == i)
-            signals = self.moved(off).signals(Z[rows, : -len(self.chosen)])
-            found[rows, : -len(self.chosen)] = signals
+        """Return weighted signals of candidates, then what the ridge weighs.
+
+        Constants are one to a simulation: those that hardly differ from what is simulated move it in proportion.
+        """
+        found, own, off = np.empty((len(Z), len(self.measured))), Z[:, : -len(self.chosen)], self.off(Z)
+        found[:, -len(self.chosen) :] = off
+        left = np.arange(len(Z))
+        while left.size:
+            beyond_first = off[left] - off[left[0]]
+            is_near = np.max(np.abs(beyond_first), axis=1) < NEAR
+            rows = left[is_near]
+            each, places = np.unique(own[rows], axis=0, return_inverse=True)
+            signals = self.moved(off[left[0]]).signals(each)[places.ravel()]
+            found[rows, : -len(self.chosen)] = signals + beyond_first[is_near] @ self.columns.T
+            left = left[~is_near]
         return found
+
+    @cached_property
+    def columns(self) -> Array:
+        """Change of the weighted signal per tolerance of each product where the fit began, (n_samples, n_products)."""
+        return columns_of(self.chosen, len(self.records.measured))
 
     def moved(self, off: Array) -> WhiteRecords:
         shares = self.shares_at(off)
@@ -127,7 +141,8 @@ def freed_constants(base: Fit, chosen: Sequence[Product]) -> ConstantModel:
     Raises ArmidError where the simulation diverges there.
     """
     posed = FreedConstants((), base.records.space, records=base.records, chosen=chosen)
-    z = descend(posed, [np.concatenate([base.z, np.full(len(chosen), 0.5)])], SETTLED)
+    start = np.concatenate([base.z, np.full(len(chosen), 0.5)])
+    z = descend(posed, [start], SETTLED, limit=IN_REACH * len(posed.measured))
     off = posed.off(z[np.newaxis])[0]
     records, at = posed.moved(off), z[: -len(chosen)]
     fit = Fit(base.active, records, at, records.residuals(at)[0], constants=posed.shares_at(off))
@@ -282,7 +297,7 @@ def trends_of(fit: Fit, library: Library) -> list[Trend]:
     """
     if len({r.file for r in fit.records.data.records}) < FEWEST_FOR_TREND:
         return []
-    base, worth = order_of(fit.records), HALF * (fit.chi2 - len(fit.residual))
+    base, worth = order_of(fit.records), NEARLY * (fit.chi2 - len(fit.residual))
     tried: list[tuple[float, int | Product]] = []
     for moves in (*range(fit.n_free), *fit.products(library.tolerances)):
         column = beyond(fit.basis, slope_of(fit, moves) * base)
@@ -310,13 +325,13 @@ def with_trend(start: Fit, moves: int | Product) -> Trend:
     Raises ArmidError where the simulation diverges, and for a trend beyond reason.
     """
     base, fit, value, square = start.records, start, 0.0, 1.0
-    for _ in range(N_STEPS):
+    for step_number in range(N_STEPS):
         column = beyond(fit.basis, slope_of(start if isinstance(moves, Product) else fit, moves) * order_of(base))
         square = float(column @ column) + FARTHEST_TREND**-2.0
         step = (float(column @ fit.residual) - value / FARTHEST_TREND**2) / square
         value += step
-        if abs(value) > FARTHEST_TREND:
-            raise ArmidError("a trend beyond reason is none")
+        if abs(value) > FARTHEST_TREND or (step_number > 1 and fit.chi2 > IN_REACH * len(fit.residual)):
+            raise ArmidError("a trend beyond reason, or far from noise, is none")
         fit = with_own_starts(fit_from(without_trend(base, fit.z, moves, value), start.active, [fit.z]))
         if abs(step) * np.sqrt(square) < 0.1:
             break
