@@ -15,7 +15,7 @@ import pytest
 from numba.core import codegen
 
 from armid.engine import cache_folder, compile_model, simulate
-from armid.engine.cache import keep, unusable
+from armid.engine.cache import keep, unusable, write_whole
 from armid.engine.compile import load_module, module_name
 from armid.engine.generate import kernel_parts
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
@@ -127,7 +127,9 @@ def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.M
     load_module(parts)
     file = tmp_path / f"{name}.py.bin"
     whole = file.read_bytes()
-    for content in damaged(whole):
+    other = tmp_path / "armid_code_other.bin"
+    write_whole(other, b"simulate = None")
+    for content in (*damaged(whole), other.read_bytes()):
         monkeypatch.delitem(sys.modules, name, raising=False)
         file.write_bytes(content)
         load_module(parts)

@@ -43,7 +43,7 @@ def keep(compiled: Any, of: str) -> Any:
 class KeptCode:
     """Keep the machine code of one function, as numba asks for it: one file a signature and processor.
 
-    Before each file stands the digest of the rest. What is damaged is removed and compiled again.
+    Before each file stands the digest of its name and the rest. What is damaged is removed and compiled again.
     """
 
     def __init__(self, function: Callable[..., Any], of: str) -> None:
@@ -103,18 +103,23 @@ def read_whole(path: Path) -> bytes | None:
         content = path.read_bytes()
     except OSError:
         return None
-    if hashlib.sha256(content[DIGEST:]).digest() == content[:DIGEST]:
+    if seal(path, content[DIGEST:]) == content[:DIGEST]:
         return content[DIGEST:]
     with suppress(OSError):
         path.unlink()
     return None
 
 
+def seal(path: Path, content: bytes) -> bytes:
+    """Return the digest of a file's name and content: a whole file under the name of another is damage too."""
+    return hashlib.sha256(path.name.encode() + b"/" + content).digest()
+
+
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file with its digest before it, so that another process sees all of it or nothing; warn if it cannot."""
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix="armid_", suffix=".part", delete=False) as part:
-            part.write(hashlib.sha256(content).digest() + content)
+            part.write(seal(path, content) + content)
         os.replace(part.name, path)
     except OSError as error:
         tell(f"compiled code cannot be kept in {path.parent} ({error.strerror})")
