@@ -32,10 +32,9 @@ Array = NDArray[np.float64]
 MOST, HALF = 6, 0.5
 # In tolerances: how far a fit may go, and what is no answer any more.
 FARTHEST, PLAUSIBLE = 4.0, 3.0
-# Relative fall of chi2 in one step at which their fit stops, and what chi2 a sample must be in reach: of noise it is 1.
+# Relative fall of chi2 in one step at which their fit stops, a constant costs a simulation of its own; and what chi2 a
+# sample must be in reach: of noise it is 1.
 SETTLED, IN_REACH = 1e-6, 2.0
-# Constants that differ by less than this many tolerances are not simulated anew: a constant costs one of its own.
-NEAR = 0.01
 # Of all constants together those are told that are off by more than this share of their tolerance.
 TOLD = 0.5
 # A constant has to be known to this part of what it would be off, to tell; of so many that is said.
@@ -104,27 +103,19 @@ class FreedConstants(LeastSquaresProblem):
         return FARTHEST * (2.0 * Z[:, -len(self.chosen) :] - 1.0)
 
     def signals(self, Z: Array) -> Array:
-        """Return weighted signals of candidates, then what the ridge weighs.
+        """Return weighted signals of candidates, then what the ridge weighs; constants are one to a simulation.
 
-        Constants are one to a simulation: those that hardly differ from what is simulated move it in proportion.
+        Slopes of constants from where the fit began would save most of these, and stop it short of the minimum: the
+        columns nearly cancel.
         """
-        found, own, off = np.empty((len(Z), len(self.measured))), Z[:, : -len(self.chosen)], self.off(Z)
-        found[:, -len(self.chosen) :] = off
-        left = np.arange(len(Z))
-        while left.size:
-            beyond_first = off[left] - off[left[0]]
-            is_near = np.max(np.abs(beyond_first), axis=1) < NEAR
-            rows = left[is_near]
-            each, places = np.unique(own[rows], axis=0, return_inverse=True)
-            signals = self.moved(off[left[0]]).signals(each)[places.ravel()]
-            found[rows, : -len(self.chosen)] = signals + beyond_first[is_near] @ self.columns.T
-            left = left[~is_near]
+        found = np.empty((len(Z), len(self.measured)))
+        found[:, -len(self.chosen) :] = self.off(Z)
+        each, groups = np.unique(self.off(Z), axis=0, return_inverse=True)
+        for i, off in enumerate(each):
+            rows = np.flatnonzero(groups.ravel() == i)
+            signals = self.moved(off).signals(Z[rows, : -len(self.chosen)])
+            found[rows, : -len(self.chosen)] = signals
         return found
-
-    @cached_property
-    def columns(self) -> Array:
-        """Change of the weighted signal per tolerance of each product where the fit began, (n_samples, n_products)."""
-        return columns_of(self.chosen, len(self.records.measured))
 
     def moved(self, off: Array) -> WhiteRecords:
         shares = self.shares_at(off)
