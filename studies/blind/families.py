@@ -73,7 +73,8 @@ def judged(campaign: str, entry: Mapping[str, Any], report: Mapping[str, Any]) -
         "said": "; ".join([" or ".join([n, *sorted(g - {n}), *beside[n]]) for n, g in claims.items()]
                           + [f"({n})" for n in report["effects"] if n not in claims]),
         "suspects": "; ".join(f"{s['record']} {s['kind']}" for s in report["suspects"]),
-        "seen": any((s["record"], s["kind"]) == (fault.get("record"), fault.get("kind")) for s in report["suspects"]),
+        "seen": any((s["record"], s["kind"]) == (fault.get("record"), fault.get("kind"))
+                    and fault.get("parameter", "") in s.get("parameter", "").split(", ") for s in report["suspects"]),
         "accused": bool(accused), "all_named": held == truths, "wrong": ", ".join(wrong),
         "wrong_alone": any(len(claims[n]) == 1 and not beside[n] for n in wrong),
         "withdrawn": report["withdrawn"] is not None, "before_over_floor": before / floor,
@@ -135,6 +136,13 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
         most("all: additions withdrawn", rows, lambda r: r["withdrawn"], 0.02),
         most("all: held-out error of the model in force worse than of the declared", rows, lambda r: r["worse"], 0.0),
     ]  # fmt: skip
+    trends = [r for r in family.get("trend", []) if r["moves"] > MOVES]
+    if trends:
+        found += [
+            share("a trend over records: told, of the right parameter", trends, lambda r: r["seen"]),
+            most("a trend over records: a physical name is claimed", trends, lambda r: bool(r["wrong"]), 0.01),
+            share("a trend over records: parameters inside their interval", values(trends, "holds"), is_true),
+        ]
     seconds = [r["cpu_seconds"] for r in rows if r["cpu_seconds"] is not None]
     for word, limit, of in (("median", 6.0, median), ("worst", 60.0, max)):
         value = of(seconds) if seconds else None
@@ -215,7 +223,7 @@ def faults_found(row: Mapping[Any, Any]) -> list[str]:
     outside = [n for n in PARAMETERS if row[f"given_{n}" if not row["constants"] else f"holds_{n}"] is False]
     off = [n for n in PARAMETERS if row[f"trusted_{n}"] and abs(row[f"off_{n}"]) > OFF]
     said = {
-        "not seen": family == "fault" and row["moves"] > MOVES and not row["seen"],
+        "not seen": family in ("fault", "trend") and row["moves"] > MOVES and not row["seen"],
         f"claimed {row['wrong']}": bool(row["wrong"]),
         "not all named": not row["all_named"],
         f"outside: {', '.join(outside)}": bool(outside),

@@ -49,7 +49,9 @@ THREE = (
     ("quadratic_drag", "supply_sag", "controller_delay"), ("shell_rocking", "brush_drop", "gas_heat_loss"),
     ("stribeck", "flux_saturation", "gyro_lag"),
 )  # fmt: skip
-FAMILIES = ("control", "fault", "constant", "constants", "two", "three")
+FAMILIES = ("control", "fault", "constant", "constants", "two", "three", "trend")
+# What changes from record to record in a trend, by how much from the first to the last.
+TRENDS, TREND = ("p0", "k", "eta3", "n"), (0.02, 0.08)
 
 
 def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, bytes], Entry]:
@@ -66,7 +68,13 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, byte
         strokes, duration = six_strokes(rng), round(float(rng.uniform(*suite.duration_s)), 2)
         place = int(rng.integers(len(strokes)))
         moved = [differing(m, fault, rng) if i == place else m for i, (m, _) in enumerate(strokes)]
-        found = [_run(Motion(arm, m, truth.effects()), duration) for m in moved]
+        trend = {} if family != "trend" else {
+            "kind": "trend", "parameter": TRENDS[index % len(TRENDS)],
+            "size": float(rng.uniform(*TREND) * rng.choice([-1.0, 1.0]))}  # fmt: skip
+        trained = [m for m, role in strokes if role == "train"]
+        arms = [at_its_place(arm, trend, trained.index(m) / (len(trained) - 1)) if m in trained else arm
+                for m, _ in strokes]  # fmt: skip
+        found = [_run(Motion(a, m, truth.effects()), duration) for a, m in zip(arms, moved, strict=True)]
         told = _run(Motion(arm, strokes[place][0], truth.effects()), duration)
         if told is not None and all(found):
             break
@@ -90,6 +98,11 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, byte
         record = replace(each.record, time_s=table[:, 0], speed_deg_s=table[:, 1])
         text = record_text(record, gyro.decimals)
         files[each.record.file] = text if dirt != "jitter" else jittered(table)
+    if trend:
+        sound = [_run(Motion(arm, m, truth.effects()), duration) for m in moved]
+        changes = [a.gyro - b.gyro for a, b in zip(drawn.trajectories, sound, strict=True) if b is not None]
+        moves = max(float(np.sqrt(np.mean(np.degrees(c) ** 2))) for c in changes) / gyro.noise_deg_s
+        fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves}
     floor = {role: _pooled([m.noise for m in measured if m.record.role == role]) for role in ("train", "holdout")}
     entry = {
         "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
@@ -98,6 +111,14 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, byte
         "constants": off, "dirt": dirt,
     }  # fmt: skip
     return {file: text.encode() for file, text in files.items()}, entry
+
+
+def at_its_place(arm: Arm, trend: dict[str, Any], place: float) -> Arm:
+    """Return the arm as it is in a record, by the place of that in the order of all, 0 to 1; as told in the middle."""
+    if not trend:
+        return arm
+    name = trend["parameter"]
+    return replace(arm, **{name: getattr(arm, name) * (1.0 + trend["size"] * (place - 0.5))})
 
 
 def off_constants(arm: Arm, family: str, rng: np.random.Generator) -> tuple[Arm, dict[str, float]]:

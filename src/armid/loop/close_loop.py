@@ -230,7 +230,10 @@ def settled(
                 return decide(Search(library_for(rest)), curve), suspects, rest
             train = tuple(best.fault.trimmed(r, best.value, plant, faulty) if r.file == faulty.file else r
                           for r in train)  # fmt: skip
-            return decide(Search(library_for(train)), curve), [best.suspect(faulty, plant, FREED)], train
+            there = library_for(train)
+            if best.fault.kind != "label":
+                there = with_unknown(there, best.column(there.problem(())))
+            return decide(Search(there), curve), [best.suspect(faulty, plant, FREED)], train
     return suspected_again(library_for, decide(search, curve), train, curve)
 
 
@@ -257,7 +260,13 @@ def decided_without_trend(
     best, *others = trends
     alike = [t for t in others if t.chi2 < best.chi2 + WITHIN]
     train = best.undone(train)
-    return decide(Search(library_for(train)), curve), [best.suspect(alike, library)], train
+    there = with_unknown(library_for(train), best.column)
+    return decide(Search(there), curve), [best.suspect(alike, library)], train
+
+
+def with_unknown(library: Library, column: NDArray[np.float64]) -> Library:
+    """Return the library with a fault among the unknowns of its intervals; column: what its largest size does."""
+    return replace(library, data=replace(library.data, freed=column[:, np.newaxis]), _problems={})
 
 
 def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) -> JointErrors | None:

@@ -267,6 +267,11 @@ class Trend:
         return Suspect(last.file, last.role, "trend", FREED, size * self.value, unit, size * (self.value - half),
                        size * (self.value + half), parameter=names)  # fmt: skip
 
+    @property
+    def column(self) -> Array:
+        """What the largest plausible trend does to the whitened signal, (n_samples,)."""
+        return FARTHEST_TREND * slope_of(self.fit, self.moves) * order_of(self.fit.records)
+
     def undone(self, train: Sequence[Record]) -> tuple[Record, ...]:
         """Return the train records as they would be without it."""
         measured = iter([[p.measured for p in r.pieces] for r in self.fit.records.replays])

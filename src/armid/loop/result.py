@@ -273,8 +273,9 @@ def interval_view(
 
 
 def information_at_fit(fit: Fit, tolerances: Mapping[str, float]) -> Information:
-    columns = columns_of(fit.products(tolerances), len(fit.residual))
-    return information_of(fit.records, fit.z, fit.records.data.trust(fit.residual), columns)
+    data, columns = fit.records.data, columns_of(fit.products(tolerances), len(fit.residual))
+    columns = columns if data.freed is None else np.hstack([columns, data.freed])
+    return information_of(fit.records, fit.z, data.trust(fit.residual), columns)
 
 
 def interval_of(fit: Fit, information: Information) -> dict[str, tuple[float, float]]:

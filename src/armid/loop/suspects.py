@@ -176,6 +176,11 @@ class Mended:
     deviation: float
     chi2: float
 
+    def column(self, base: WhiteRecords) -> Array:
+        """Return what its largest plausible size does to records without it, whitened, (n_samples,)."""
+        change = column_of(base, self.index, self.fit.z, self.fault, 0.0)
+        return self.fault.largest(base.data.records[self.index]) * change
+
     def suspect(self, record: Record, plant: Plant, action: str) -> Suspect:
         fault = self.fault
         if fault.kind == "label":
@@ -446,8 +451,9 @@ def without_record(base: WhiteRecords, index: int) -> WhiteRecords:
         return tuple(each for i, each in enumerate(several) if i not in out)
 
     sound = None if data.sound is None else np.delete(data.sound, samples)
+    freed = None if data.freed is None else np.delete(data.freed, samples, axis=0)
     fewer = replace(data, records=rest(data.records), levels=rest(data.levels), kept=np.delete(data.kept, samples),
-                    sound=sound)  # fmt: skip
+                    sound=sound, freed=freed)  # fmt: skip
     return replace(base, replays=rest(base.replays), data=fewer)
 
 

@@ -151,7 +151,9 @@ class WhitenedData:
     """Hold records with their noise, the outputs of one file as a record each.
 
     levels: noise of each record. kept: which of all samples enter fits, (n_samples,). sound: 0 where a sample is no
-    data, else 1, (n_samples,); None where all are data. estimates: where those of fits are kept, None: nowhere.
+    data, else 1, (n_samples,); None where all are data. estimates: where those of fits are kept, None: nowhere. freed:
+    what the largest size of each fault that was undone in the records does to the whitened signal, (n_samples,
+    n_faults): its size is as unknown as a parameter; None for none.
     """
 
     records: tuple[Record, ...]
@@ -159,6 +161,7 @@ class WhitenedData:
     kept: NDArray[np.bool_]
     sound: Array | None = None
     estimates: Estimates | None = None
+    freed: Array | None = None
 
     @cached_property
     def lengths(self) -> tuple[tuple[int, ...], ...]:
