@@ -94,7 +94,7 @@ def cpu_seconds(command: Sequence[str], environment: dict[str, str]) -> float:
 def measure(commands: Sequence[Command], folder: Path, before: Path | None = None) -> Iterator[dict[str, str]]:
     """Yield the reference, then one row a command.
 
-    It is the shortest of three warm runs, of one where it takes more than 20 s, and of one cold run. Above 300 s it is
+    It is the shortest of three warm runs, of one where it takes more than 20 s, and of one cold run. Above 150 s it is
     the run that fills the cache: compiling is a small part of it.
     """
     environment = child_environment()
@@ -104,18 +104,19 @@ def measure(commands: Sequence[Command], folder: Path, before: Path | None = Non
         trees["before_cpu_s"] = before / "studies", environment | {"PYTHONPATH": path}
     reference = min(cpu_seconds(REFERENCE, environment) for _ in range(3))
     yield {"what": "reference computation", "cpu_s": number(reference)}
-    made = {"effect": folder / "wear.py", "stranger": folder / "stranger", "six": folder / "six"}
+    made = {"effect": folder / "wear.py", "stranger": folder / "stranger"}
     made["effect"].write_text(EFFECT, encoding="utf-8")
     if any("{stranger}" in c.arguments for c in commands):
         write_strangers_machine(made["stranger"])
-    if any("{six}" in c.arguments for c in commands):
-        write_six_effects(made["six"])
+    for tree, (studies, own) in trees.items() if any("{six}" in c.arguments for c in commands) else ():
+        write_six_effects(folder / f"six_{tree}", studies, own)
     for k, command in enumerate(commands):
         best = {}
         for tree, (studies, own) in trees.items():
             times: list[float] = []
             while len(times) < needed(command, times):
-                place = made | {"studies": studies, "out": folder / f"out{k}_{tree}_{len(times)}"}
+                own_place = {"studies": studies, "six": folder / f"six_{tree}"}
+                place = made | own_place | {"out": folder / f"out{k}_{tree}_{len(times)}"}
                 cache = folder / (f"cold{k}_{tree}" if command.cold else f"cache_{tree}")
                 given = [part.format(**place) for part in command.arguments]
                 times.append(cpu_seconds([*ARMID, *given], own | {"ARMID_CACHE": str(cache)}))
@@ -126,8 +127,8 @@ def measure(commands: Sequence[Command], folder: Path, before: Path | None = Non
 
 
 def needed(command: Command, times: Sequence[float]) -> int:
-    """Return how many runs of a command there are to be; the first warm one fills the cache and counts above 300 s."""
-    if command.cold or (times and max(times) >= 300.0):
+    """Return how many runs of a command there are to be; the first warm one fills the cache and counts above 150 s."""
+    if command.cold or (times and max(times) >= 150.0):
         return 1
     return 2 if times and max(times) >= 20.0 else 4
 
@@ -192,15 +193,15 @@ def write_strangers_machine(folder: Path, seed: int = 3) -> None:
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
 
 
-def write_six_effects(folder: Path) -> None:
-    """Write a campaign of the arm with six undeclared effects, by the independent simulator. SYNTHETIC.
+def write_six_effects(folder: Path, studies: Path, environment: dict[str, str]) -> None:
+    """Write a campaign of the arm with six undeclared effects, by a checkout's independent simulator. SYNTHETIC.
 
     Raises RuntimeError when it fails.
     """
     effects = ("coulomb=40", "drag=15", "tilt_deg=3", "brush_drop=1.5", "supply_sag=0.01", "rocking_hz=10")
     manoeuvres = ("--manoeuvres", "lower,raise,short,empty")
-    cpu_seconds([sys.executable, str(STUDIES / "test_stand.py"), str(folder), *manoeuvres, "--effect", *effects],
-                dict(os.environ))  # fmt: skip
+    cpu_seconds([sys.executable, str(studies / "test_stand.py"), str(folder), *manoeuvres, "--effect", *effects],
+                environment)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from armid.contract.check import check_campaign
 from armid.engine.simulate import Prepared
 from armid.errors import ArmidError
 from armid.estimation.screen import Trial, screen, shortened
-from armid.model import EFFECTS
+from armid.model import EFFECTS, Model
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
 from armid.record.table import read_table
@@ -304,6 +304,16 @@ def halves(folder: Path, windows: tuple[str, str]) -> Path:
     copied(file, "second.csv", "train", more=windows[1])(folder)
     toml((f'file = "{file}"', f'file = "{file}"\n{windows[0]}'))(folder)
     return folder
+
+
+def test_times_in_ms_are_noticed_whatever_the_model_makes_of_them(write_axis, tmp_path):
+    folder = write_axis(tmp_path / "axis")
+    rows = (folder / "move.csv").read_text().splitlines()
+    split = [row.partition(",") for row in rows[1:]]
+    (folder / "move.csv").write_text("\n".join([rows[0], *(f"{1e3 * float(t)!r},{rest}" for t, _, rest in split), ""]))
+    read = read_campaign(folder)
+    (found,) = (s for s in screen(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "time")
+    assert found.sentence.startswith("axis/move.csv: its samples are 5 s apart, which looks like times in ms: seconds")
 
 
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):

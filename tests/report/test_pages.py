@@ -17,7 +17,7 @@ from armid.cli.main import main
 from armid.cli.report import LOOP, document_of, kind_in, refuse_damaged
 from armid.errors import ArmidError
 from armid.loop.document import loop_document
-from armid.report.document import Document, Line, Listing, Section, Sentences, changed, table
+from armid.report.document import Document, Line, Listing, Section, Sentences, changed, table, varying
 from armid.report.files import csv, latex
 from armid.report.html import html, inline
 from armid.report.markdown import markdown
@@ -331,3 +331,11 @@ def test_a_single_spike_is_never_lost():
 @pytest.mark.parametrize("value", [0.0, 3.0])
 def test_a_constant_keeps_few_points(value):
     assert len(thinned(np.full(10_000, value), 100)) <= 100
+
+
+def test_a_column_that_is_empty_in_some_lines_is_not_told_as_the_same_in_all():
+    rows = [("mass", "kg", "2.5", "a", ""), ("level", "N", "", "a", ""), ("slope", "N s/m", "", "a", "")]
+    columns, cells, note = varying(table("Parameters", ["name", "unit", "before", "said", "empty"], rows))
+    assert [c.key for c in columns] == ["name", "unit", "before"]
+    assert [[c.text for c in row] for row in cells] == [list(row[:3]) for row in rows]
+    assert note == "In every line said is a."

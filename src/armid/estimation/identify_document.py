@@ -212,7 +212,8 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     doubts += details.get("warnings", ())
     if not free:
         return "Nothing was free: the model was judged as it is.", second
-    trusted = "No parameter is held by a bound, and the search has come to the minimum."
+    sure = not any(p.get("interval_doubt") for p in free.values())
+    trusted = f"No parameter is held by a bound{', and the search has come to the minimum' if sure else ''}."
     return first, second, " ".join(doubts) or trusted
 
 

@@ -50,6 +50,8 @@ SAME = 0.01
 LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 # Integration steps between samples, relative fall of squares at which a rough fit has arrived.
 SUBSTEPS, TOLERANCE = 4, 1e-3
+# Samples of a motion that a motor drives are not further apart [s].
+LONGEST_INTERVAL = 1.0
 # Successive samples, of so many values, that two recordings do not have in common by chance.
 ALIKE, DIFFERENT = 40, 10
 # Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is no rest.
@@ -61,7 +63,9 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
     """
-    seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
+    seen = [
+        s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one), *of_times(one))
+    ]
     seen += list(given_twice(campaign.records))
     noise = {s.record for s in seen if s.kind == "noise"}
     train = [shortened(r, len(campaign.train)) for r in campaign.train if r.file not in noise]
@@ -429,6 +433,14 @@ def of_position(record: Record) -> Iterator[Suspicion]:
             said = f"{record.file}: {header} moves {size:.3g} times as far as the speed says"
             wrong = f"{said}: the sign or unit of one of them, or time_s, looks wrong."
             yield Suspicion("position", record.file, wrong, factor=size)
+
+
+def of_times(record: Record) -> Iterator[Suspicion]:
+    """Yield times that are those of no motor-driven machine, whatever the declared model makes of them."""
+    interval = record.manoeuvre.interval
+    if interval > LONGEST_INTERVAL:
+        yield Suspicion("time", record.file, f"{record.file}: its samples are {interval:.3g} s apart, which looks like "
+                        "times in ms: seconds are expected in time_s.", factor=1e-3)  # fmt: skip
 
 
 def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:

@@ -209,11 +209,16 @@ class Search:
         return False
 
     def exchange_substitutes(self, best: Fit) -> None:
-        """Fit the models in which a candidate that moves the records alike stands in the place of an effect."""
+        """Fit the models in which a candidate that moves the records alike stands in the place of an effect.
+
+        Where the effect has its shapes free they are so in its place too, else it would lose by the width of a sign.
+        """
         tried: dict[frozenset[EffectKey], Trial] = {}
         for rival in substitutes(best, self.library):
-            active = (*(k for k in best.active if k != rival.place), rival.key)
-            tried.setdefault(frozenset(active), partial(fit_near, active, rival.values, self.library))
+            is_free = rival.place.free_shape and bool(self.library.fixed_shapes(rival.key))
+            for key in (rival.key, replace(rival.key, free_shape=True))[: 1 + is_free]:
+                active = (*(k for k in best.active if k != rival.place), key)
+                tried.setdefault(frozenset(active), partial(fit_near, active, rival.values, self.library))
         self.fit_each(tried)
 
     def twins_of(self, keys: Set[EffectKey | None]) -> set[EffectKey]:

@@ -101,10 +101,10 @@ class Table:
 def varying(part: Table) -> tuple[list[Column], list[list[Cell]], str]:
     """Return what a narrow page shows of a table: columns whose cells differ, their cells, and what the others say."""
     rows = part.cells()
-    texts = [{row[i].text for row in rows} - {""} for i in range(len(part.columns))]
+    texts = [{row[i].text for row in rows} for i in range(len(part.columns))]
     kept = [i for i, told in enumerate(texts) if len(rows) < LEAST_ROWS or len(told) > 1 or len(texts) < LEAST_COLUMNS]
     same = [f"{column.header} is {next(iter(told))}" for i, (column, told) in enumerate(zip(part.columns, texts,
-            strict=True)) if i not in kept and told]  # fmt: skip
+            strict=True)) if i not in kept and told != {""}]  # fmt: skip
     note = f"In every line {', '.join(same)}." if same else ""
     return [part.columns[i] for i in kept], [[row[i] for i in kept] for row in rows], note
 
