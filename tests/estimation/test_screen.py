@@ -313,7 +313,7 @@ def test_times_in_ms_are_noticed_whatever_the_model_makes_of_them(write_axis, tm
     (folder / "move.csv").write_text("\n".join([rows[0], *(f"{1e3 * float(t)!r},{rest}" for t, _, rest in split), ""]))
     read = read_campaign(folder)
     (found,) = (s for s in screen(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "time")
-    assert found.sentence.startswith("axis/move.csv: its samples are 5 s apart, which looks like times in ms: seconds")
+    assert found.sentence.startswith("move.csv: its samples are 5 s apart, which looks like times in ms: seconds")
 
 
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
