@@ -51,6 +51,7 @@ CSV = {
     "two speeds": (csv(HEADER + ",velocity_m_s", [r + ",1" for r in ROWS]), ["line 1", "velocity_m_s", "exactly one"]),
     "duplicate header": (csv("time_s,angular_velocity_deg_s,time_s", [r + ",1" for r in ROWS]),
                          ["lower.csv, line 1", "'time_s'", "twice"]),
+    "no header": (csv("0.0,0.0"), ["lower.csv, line 1", "numbers are there, and no header", "a line of names"]),
     "unnamed column": (csv(HEADER + ",", [r + ",1" for r in ROWS]), ["line 1", "column 3", "name"]),
     "NaN": (csv(line_7="0.002,nan"), ["lower.csv, line 7", "angular_velocity_deg_s is nan", "finite"]),
     "inf": (csv(line_9="inf,1.0"), ["lower.csv, line 9", "time_s is inf", "finite"]),

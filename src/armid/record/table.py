@@ -101,6 +101,9 @@ def column_names(header: str, file: str) -> list[str]:
     if len(names) == 1 and any(separator in names[0] for separator in ";\t "):
         raise ArmidError(f"{file}, line 1: one column {quoted(names[0])} is there, columns separated by commas are "
                          "expected")  # fmt: skip
+    if all(NUMBER.fullmatch(name) for name in names):
+        raise ArmidError(f"{file}, line 1: numbers are there, and no header: a line of names such as "
+                         "'time_s,angular_velocity_deg_s' is expected above them")  # fmt: skip
     for i, name in enumerate(names):
         if not name or not name.isprintable():
             raise ArmidError(f"{file}, line 1: column {i + 1} is called {quoted(name)}, a readable name is expected")
