@@ -63,14 +63,13 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
     """
-    seen = [
-        s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one), *of_times(one))
-    ]
+    seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
     seen += list(given_twice(campaign.records))
     noise = {s.record for s in seen if s.kind == "noise"}
     train = [shortened(r, len(campaign.train)) for r in campaign.train if r.file not in noise]
+    times = [s for r in campaign.records for s in of_times(r)]
     if not train:
-        return tuple(seen)
+        return (*seen, *times)
     trial = Trial(model, space).scaled(train)
     train = [trial.thinned(r, len(train)) for r in train]
     found, z = mistakes(trial, train)
@@ -80,7 +79,8 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
         others = [trial.thinned(shortened(r, n), n) for r in campaign.holdout if r.file not in noise]
         found += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))
                   if s.after * AS_GOOD < least_nearby(trial, train, r, z)]  # fmt: skip
-    return (*seen, *found)
+    told = {s.record for s in found if s.kind == "time"}
+    return (*seen, *(s for s in times if not told & {"", s.record}), *found)
 
 
 class Trial:
