@@ -397,6 +397,9 @@ def simulate(
     asked = {name: given.pop(name) for name in tuple(given) if name in ("effects", "plugins", "window", "plant")}
     there = opened(model, **asked)
     whole = replace(there.model, plant=there.campaign.declared)
-    candidate = candidate_of(whole, there.campaign, {**given, **(parameters or {})})
+    values = {**given, **(parameters or {})}
+    candidate = candidate_of(whole, there.campaign, values)
+    for name, value in values.items():
+        warn_if_far(whole.parameters[name], [value], f"--set {name}={value:g}")
     tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
     return SimulatedCampaign(there.campaign, whole, candidate, tables)

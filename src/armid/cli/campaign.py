@@ -61,7 +61,8 @@ def simulate_command(
     found = simulate(campaign, parameters=numbers(settings, "--set"), accuracy=accuracy_of(accuracy),
                      effects=known["effects"], plugins=known["plugins"])  # fmt: skip
     files = found.save(out)
-    say(*(f"{name} = {value:.9g} {found.model.parameters[name].unit}" for name, value in found.parameters.items()))
+    units = {name: p.unit for name, p in found.model.parameters.items()}
+    say(*(f"{name} = {value:.9g} {units[name]}".removesuffix(" 1") for name, value in found.parameters.items()))
     for record in found.campaign.records:
         if record.irregularity is not None:
             say(f"{record.file}: on its even grid of {record.manoeuvre.interval:.6g} s, as its times are irregular")

@@ -201,7 +201,7 @@ def replay_at(candidate: Array, record: Record, model: Model) -> Replay:
 
 
 def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:
-    wrong = [ContractPoint(f"plausible ({s.kind})", False, s.sentence) for s in found]
+    wrong = [ContractPoint(f"plausible ({s.kind})", s.kind == "unjudged", s.sentence) for s in found]
     right = "no sign, unit, clock or manoeuvre of a record looks wrong, as far as the declared model can tell"
     return wrong or [ContractPoint("plausible", True, right)]
 

@@ -196,7 +196,8 @@ def identify_document(
 
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
-    first = f"{lead(free)}: {'; '.join(f'{name} = {held_text(p)}' for name, p in free.items())}."
+    begins = lead(free, result["error"]["holdout"] is not None)
+    first = f"{begins}: {'; '.join(f'{name} = {held_text(p)}' for name, p in free.items())}."
     train, holdout = result["error"]["train"], result["error"]["holdout"]
     out = "no record was held out, so that nothing judges the model"
     if holdout is not None:
@@ -217,10 +218,10 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     return first, second, " ".join(doubts) or trusted
 
 
-def lead(free: Mapping[str, Mapping[str, Any]]) -> str:
+def lead(free: Mapping[str, Mapping[str, Any]], judged: bool) -> str:
     doubts = {p.get("interval_doubt", "") for p in free.values()}
     if not any(doubts):
-        return "Found, with 95 % intervals"
+        return f"Found, with 95 % intervals{'' if judged else ' that hold only if the model lacks nothing'}"
     if len(doubts) == 1:
         return f"Found, but no interval holds, since {doubts.pop()}"
     return "Found, with 95 % intervals where they hold"

@@ -1,6 +1,6 @@
 """Mistakes that records may contain, each with what undoes it: sign, unit, clock, zero, manoeuvre."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.model import Manoeuvre, Plant
+from armid.model import Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record
 from armid.record.start import Track, state_shown
 
@@ -44,8 +44,9 @@ TIMES = {
 class Suspicion:
     """One mistake that the records seem to contain.
 
-    kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "input", "bounds", "position",
-    "noise", "rest", "twice" or "unlike". record: file, "" for every train record; other: the second of two files.
+    kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "angle" (of a key), "input",
+    "bounds", "position", "noise", "rest", "twice", "unlike" or "unjudged" (no mistake was found, and the model misses
+    most of a record). record: file, "" for every train record; other: the second of two files.
     factor: what the signal or the times are to be multiplied by, for "late" the seconds, for "zero" what is to be added
     [rad], else NaN. before, after: rms error over rms of the signal, as declared and with the mistake undone.
     """
@@ -124,16 +125,42 @@ def mends_of_zeros(plant: Plant, record: Record) -> Iterator[Mend]:
 
 
 def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
-    constants = {c.name: c.value for c in plant.constants} | dict(record.constants)
+    defaults = {c.name: c.value for c in plant.constants}
+    constants = {**defaults, **record.constants}
+
+    def mend(words: str, change: Callable[..., dict[str, float]], kind: str = "key") -> Mend:
+        return Mend(kind, np.nan, words, of_pieces(with_keys_changed, defaults=defaults, change=change))
+
     for key in plant.keys:
         if key.boolean:
-            other = 1.0 - constants[key.constant]
-            words = f"{key.key} looks wrong: with {'true' if other else 'false'}"
-            yield Mend("key", np.nan, words, of_pieces(with_constants, constants={key.constant: other}))
+            other = "true" if constants[key.constant] == 0.0 else "false"
+            yield mend(f"{key.key} looks wrong: with {other}", partial(flipped, name=key.constant))
         elif key.unlike:
-            swapped = {key.constant: constants[key.unlike], key.unlike: constants[key.constant]}
             words = f"start and end ({key.unlike} and {key.constant}) look exchanged: the other way round"
-            yield Mend("key", np.nan, words, of_pieces(with_constants, constants=swapped))
+            yield mend(words, partial(swapped, a=key.constant, b=key.unlike))
+    degrees = [k for k in plant.keys if k.key.endswith("_deg") and may_be_radians(k, constants[k.constant] / k.factor)]
+    for several in sorted({tuple(degrees), *((k,) for k in degrees)} - {()}, key=len):
+        words = (
+            f"{' and '.join(k.key for k in several)} {'look' if several[1:] else 'looks'} given in radians: in degrees"
+        )
+        yield mend(words, partial(multiplied, names=[k.constant for k in several], factor=DEGREES), "angle")
+
+
+def may_be_radians(key: ManoeuvreKey, value: float) -> bool:
+    low, high = (-np.inf if key.low is None else key.low), (np.inf if key.high is None else key.high)
+    return 0.0 < abs(value) <= 2.0 * np.pi and low <= DEGREES * value <= high
+
+
+def flipped(constants: Mapping[str, float], name: str) -> dict[str, float]:
+    return {name: 1.0 - constants[name]}
+
+
+def swapped(constants: Mapping[str, float], a: str, b: str) -> dict[str, float]:
+    return {a: constants[b], b: constants[a]}
+
+
+def multiplied(constants: Mapping[str, float], names: Iterable[str], factor: float) -> dict[str, float]:
+    return {name: factor * constants[name] for name in names}
 
 
 def of_pieces(undo: Callable[..., Piece], **told: Any) -> Callable[[Record], Record]:
@@ -208,6 +235,13 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
 def with_constants(piece: Piece, constants: Mapping[str, float]) -> Piece:
     manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
     return replace(piece, manoeuvre=manoeuvre)
+
+
+def with_keys_changed(
+    piece: Piece, defaults: Mapping[str, float], change: Callable[[Mapping[str, float]], dict[str, float]]
+) -> Piece:
+    """Return a piece with what some keys of its own manoeuvre set changed."""
+    return with_constants(piece, change({**defaults, **piece.manoeuvre.constants}))
 
 
 def with_input(piece: Piece, name: str, factor: float) -> Piece:

@@ -73,12 +73,15 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
     trial = Trial(model, space).scaled(train)
     train = [trial.thinned(r, len(train)) for r in train]
     found, z = mistakes(trial, train)
-    errors = trial.errors(train, z)
+    errors = trial.errors(train, z)[0]
     if not found:
         n = len(campaign.holdout)
         others = [trial.thinned(shortened(r, n), n) for r in campaign.holdout if r.file not in noise]
         found += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))
                   if s.after * AS_GOOD < least_nearby(trial, train, r, z)]  # fmt: skip
+        worst = int(np.argmax(errors))
+        if not found and LEFT < errors[worst] < np.inf:
+            found = [beyond(train[worst].file, float(errors[worst]))]
     told = {s.record for s in found if s.kind == "time"}
     return (*seen, *(s for s in times if not told & {"", s.record}), *found)
 
@@ -323,6 +326,12 @@ def unlike(file: str, error: float) -> Suspicion:
     said = (f"{file}: the declared model explains nothing of it, whatever its parameters (error {error:.3g} of the "
             "signal), and no other sign, unit, clock or manoeuvre that was tried does.")  # fmt: skip
     return Suspicion("unlike", file, said, before=error)
+
+
+def beyond(file: str, error: float) -> Suspicion:
+    said = (f"{file}: the declared model misses it by {error:.3g} of its signal wherever it fits the train records "
+            "best, and no mistake that was tried explains that: whether a record is wrong cannot be told.")  # fmt: skip
+    return Suspicion("unjudged", file, said, before=error)
 
 
 def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[Suspicion]:

@@ -78,7 +78,7 @@ MOST_COMPARED = 4
 # Held-out records deny an addition with which their error is so many times that before, and that of the noise.
 DENIED, OVER_NOISE = 1.02, 1.1
 # Mistakes of the screen of records that leave nothing to search for.
-GROSS = ("sign", "unit", "time", "exchanged", "input", "position")
+GROSS = ("sign", "unit", "time", "angle", "exchanged", "input", "position")
 
 
 # Threads of the linear algebra inside our own threads would only wait for each other.

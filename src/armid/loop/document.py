@@ -176,7 +176,8 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     before, after = report["error"]["before"], report["error"]["after"]
     which, on = ("holdout", "the records held out") if after["holdout"] else ("train", "the train records")
     was, now = rmse_text(before[which], report["unit"]), rmse_text(after[which], report["unit"])
-    noise, unit = shown(report["noise_rms"], report["unit"])
+    of_those = report.get("noise_rms_holdout") if which == "holdout" else None
+    noise, unit = shown(of_those or report["noise_rms"], report["unit"])
     alone = "" if which == "holdout" else "; no record was held out"
     if not report["effects"]:
         others = others_text(after[which])
@@ -188,8 +189,10 @@ def error_sentence(report: Mapping[str, Any]) -> str:
 def step_table(report: Mapping[str, Any]) -> Table:
     unit, rows, last = report["unit"], [], report["error"]["before"]
     for step in report["steps"]:
-        own = [f"{name.partition('.')[2]} {value_text(p)}" for name, p in step["parameters"].items()
-               if name.startswith(f"{step['effect']}.") and p["low"] is not None]  # fmt: skip
+        held = {name.partition(".")[2]: p if p.get("interval_holds", True) else {**p, "low": None}
+                for name, p in step["parameters"].items()
+                if name.startswith(f"{step['effect']}.") and p["low"] is not None}  # fmt: skip
+        own = [f"{name} {value_text(p)}" for name, p in held.items()]
         errors = ["none" if step["error"][which] is None else
                   f"{rmse_text(last[which], unit)} -> {rmse_text(step['error'][which], unit)}"
                   for which in ("holdout", "train")]  # fmt: skip
@@ -198,8 +201,8 @@ def step_table(report: Mapping[str, Any]) -> Table:
         rows.append((step["effect"] + claimed, *errors, alternatives, "; ".join(own), step["port"]))
         last = step["error"]
     name = shown(0.0, unit)[1]
-    return table("Steps", ["effect", f"holdout RMSE, {name}", f"train RMSE, {name}", "cannot be told from",
-                           "parameters (95 % interval)", "port"], rows)  # fmt: skip
+    note = f"RMSE before and after, {name}; 95 % intervals. Or: what the records cannot tell from the effect."
+    return table("Steps", ["effect", "RMSE, holdout", "RMSE, train", "or", "parameters", "port"], rows, note)
 
 
 def log_table(log: list[Mapping[str, Any]]) -> Table:
@@ -224,8 +227,8 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
 
 
 def held_text(p: Mapping[str, Any]) -> str:
-    """Return a stored parameter, struck where its interval does not hold."""
-    return value_text(p) if p.get("interval_holds", True) else Struck(value_text(p))
+    """Return a stored parameter, struck where it has an interval that does not hold."""
+    return value_text(p) if p["low"] is None or p.get("interval_holds", True) else Struck(value_text(p))
 
 
 def residual_section(details: Mapping[str, Any], unit: str, errors: tuple[Part, ...]) -> Section:

@@ -20,6 +20,7 @@ LOOKS = (("before", OKABE_ITO["vermilion"], -0.12), ("after", OKABE_ITO["blue"],
 AFTER = OKABE_ITO["blue"]
 KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}
 MOST_RECORDS, MOST_CANDIDATES, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
+PARAMETERS_A_ROW = 4
 # Of a title in medium letters.
 LETTERS_PER_INCH = 9.0
 
@@ -114,6 +115,8 @@ def diagnosis_figure(found: ClosedLoop) -> Any:
 
 def draw_findings(axis: Any, kind: str, before: Diagnosis, after: Diagnosis) -> None:
     names = [f.where for f in before.of_kind(kind)]
+    if kind == "frequency":  # "5 to 12 Hz", "above 250 Hz"
+        names.sort(key=lambda where: float(where.removeprefix("above ").split()[0]))
     for diagnosis, (label, colour, shift) in zip((before, after), LOOKS, strict=True):
         ratios = {f.where: f.ratio for f in diagnosis.of_kind(kind)}
         known = [i for i, n in enumerate(names) if n in ratios]
@@ -142,28 +145,32 @@ def ranking_figure(campaign: str, listed: Sequence[Mapping[str, Any]]) -> Any:
 
 
 def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Draw each identified parameter of the declared model before and after. parameters: of `report.json`."""
+    """Draw each identified parameter before and after, those of effects after alone. parameters: of `report.json`."""
     before, after = parameters["before"], parameters["after"]
-    both = [
-        (name, p, after[name]) for name, p in before.items() if p["low"] is not None or after[name]["low"] is not None
-    ]
-    n = max(len(both), 1)
-    width = 2.6 * n + 1.2
-    figure, axes = pyplot().subplots(1, n, figsize=(width, 3.4), squeeze=False, layout="constrained")
-    for axis, (name, *pair) in zip(axes.flat, both, strict=False):
-        factor, unit = shown(1.0, pair[0]["unit"])
+    each = [(name, before.get(name), p) for name, p in after.items()
+            if p["low"] is not None or (name in before and before[name]["low"] is not None)]  # fmt: skip
+    columns = min(max(len(each), 1), PARAMETERS_A_ROW)
+    rows = -(-max(len(each), 1) // columns)
+    size = (2.6 * columns + 1.2, 3.0 * rows + 0.4)
+    figure, axes = pyplot().subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
+    for axis in axes.flat[len(each) :]:
+        axis.set_axis_off()
+    for axis, (name, *pair) in zip(axes.flat, each, strict=False):
+        factor, unit = shown(1.0, pair[1]["unit"])
         for place, (p, (_, colour, _)) in enumerate(zip(pair, LOOKS, strict=True)):
+            if p is None:
+                continue
             half = 0.0 if p["low"] is None or p["high"] is None else 0.5 * factor * (p["high"] - p["low"])
             axis.errorbar([place], [factor * p["value"]], yerr=[[half], [half]], fmt="o", color=colour, capsize=5,
                           mfc=colour if p["trusted"] else "white")  # fmt: skip
         axis.set_xticks([0, 1], ["before", "after"])
         axis.set(xlim=(-0.6, 1.6), ylabel=f"{name} [{unit}]")
         axis.ticklabel_format(axis="y", useOffset=False)
-    if not both:
+    if not each:
         axes[0, 0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
         axes[0, 0].set_axis_off()
     title = f"{campaign}: parameters, 95 % intervals (open: not to be trusted)"
-    figure.suptitle(fill(title, int(LETTERS_PER_INCH * width)), fontsize="medium")
+    figure.suptitle(fill(title, int(LETTERS_PER_INCH * size[0])), fontsize="medium")
     return figure
 
 

@@ -302,6 +302,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
         "plant": found.campaign.plant.name,
         "unit": found.campaign.unit,
         "noise_rms": found.noise_rms,
+        "noise_rms_holdout": finite(found.before.holdout.noise_rms) if found.before.holdout is not None else None,
         "outputs": found.outputs,
         "verdict": found.verdict,
         "also": list(found.also),
