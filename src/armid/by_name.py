@@ -399,7 +399,7 @@ def simulate(
     whole = replace(there.model, plant=there.campaign.declared)
     values = {**given, **(parameters or {})}
     candidate = candidate_of(whole, there.campaign, values)
+    tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
     for name, value in values.items():
         warn_if_far(whole.parameters[name], [value], f"--set {name}={value:g}")
-    tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
     return SimulatedCampaign(there.campaign, whole, candidate, tables)
