@@ -308,8 +308,11 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
 
     Those without states of their own come first, so that the most used bundles stay the fastest.
     """
+    ordered = sorted(effects.items(), key=lambda pair: (len(pair[1].states), pair[1].name))
+    if 0 < len(ordered) <= BUNDLE and joined(declared, *(effect for _, effect in ordered)) is not None:
+        return (tuple(key for key, _ in ordered),)
     bundles: list[tuple[Model, list[EffectKey]]] = []
-    for key, effect in sorted(effects.items(), key=lambda pair: (len(pair[1].states), pair[1].name)):
+    for key, effect in ordered:
         for i, (model, keys) in enumerate(bundles):
             extended = joined(model, effect) if len(keys) < BUNDLE else None
             if extended is not None:
@@ -320,10 +323,10 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
     return tuple(tuple(keys) for _, keys in bundles)
 
 
-def joined(model: Model, effect: Effect) -> Model | None:
-    """Return a model with an effect, None where they cannot be composed."""
+def joined(model: Model, *effects: Effect) -> Model | None:
+    """Return a model with effects, None where they cannot be composed."""
     try:
-        return model + effect
+        return replace(model, effects=(*model.effects, *effects))
     except ArmidError:
         return None
 
