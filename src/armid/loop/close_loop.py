@@ -186,7 +186,7 @@ def close_loop(
 def implausible_records(
     model: Model, campaign: Campaign, bounds: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
 ) -> list[str]:
-    """Return the mistakes in the train records (sign, unit, clock, angles, exchanged files) that explain a gross misfit."""
+    """Return the mistakes in the train records (sign, unit, clock, angles, exchanged files) behind a gross misfit."""
     train, own = replace(campaign, records=campaign.train), model.parameters
     space = space_of(model, campaign.parameters, {n: b for n, b in bounds.items() if n in own},
                      {n: v for n, v in fixed.items() if n in own})  # fmt: skip
