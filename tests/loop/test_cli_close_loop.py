@@ -88,7 +88,7 @@ def test_the_result_is_the_same_on_any_number_of_threads(whole, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_path, monkeypatch):
+def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_path, monkeypatch, capsys):
     campaign, report, n_whole = whole
     made = []
 
@@ -102,6 +102,7 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_pat
     stop_at = n_whole - 5
     assert run(campaign, "--out", tmp_path, *IN_ONE_THREAD) == 130
     kept = tmp_path / "progress.jsonl"
+    assert f"kept in {kept}: the same command goes on" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [kept]
     lines = kept.read_text().splitlines()
     assert len(lines) == stop_at

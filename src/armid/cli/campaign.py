@@ -257,12 +257,18 @@ def close_loop_command(
 
     named = [name for name in candidates.split(",") if name.strip()] or None
     refuse_unwritable(out, LOOP.file)
-    with status_line() as show_status:
-        found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status, without=without,
-                           curve=not no_curve, progress=out / PROGRESS,
-                           **given(effects, plugins, window, bounds, fix))  # fmt: skip
-    show_and_save(found, out)
-    (out / PROGRESS).unlink(missing_ok=True)
+    kept = out / PROGRESS
+    try:
+        with status_line() as show_status:
+            found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
+                               without=without, curve=not no_curve, progress=kept,
+                               **given(effects, plugins, window, bounds, fix))  # fmt: skip
+        show_and_save(found, out)
+    except BaseException:
+        if kept.exists():
+            tell(f"armid: what was fitted is kept in {kept}: the same command goes on from there")
+        raise
+    kept.unlink(missing_ok=True)
 
 
 @contextmanager
