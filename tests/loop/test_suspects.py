@@ -58,6 +58,19 @@ def test_a_fault_of_one_record_is_told_and_no_effect_is_named(campaign, file, ki
         assert e.low < TRUTH[e.name] < e.high
 
 
+@pytest.mark.parametrize(("file", "kind", "value"), [("short.csv", "late", 0.004), ("raise.csv", "offset", 0.02)])
+def test_a_fault_of_one_record_is_told_beside_an_effect(stand, file, kind, value):
+    """What the effect leaves would else be taken for more effects."""
+    campaign = read_campaign(stand(*COMMON, "--effect", "supply_sag=0.05"))
+    found = close_loop(Model(ARM), with_fault(campaign, file, Fault(kind), value), CANDIDATES)
+    (suspect,) = report_of(found)["suspects"]
+    assert (suspect["record"], suspect["kind"], suspect["action"]) == (file, kind, "freed")
+    assert suspect["low"] < value < suspect["high"]
+    assert (found.verdict, found.effects) == ("record_disagrees", ("supply_sag",))
+    for e in found.after.estimates[:4]:
+        assert e.low < TRUTH[e.name] < e.high
+
+
 def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
     """Each record comes from a stand with a pressure of its own."""
     rise, files = 0.03 * TRUTH["p0"], [r.file for r in campaign.train]

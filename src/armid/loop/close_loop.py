@@ -60,6 +60,7 @@ from armid.loop.search import Search, SearchLevel
 from armid.loop.suspects import (
     FREED,
     LEFT_OUT,
+    Mended,
     Suspect,
     broken_suspects,
     disagreeing_record,
@@ -147,7 +148,8 @@ def close_loop(
                                              threads, told, within))  # fmt: skip
 
     implausible = implausible_records(model, campaign, bounds or {}, fixed or {})
-    found, suspects, train = settled(library_for, campaign.train, curve, bool(implausible))
+    found, suspects, train = settled(library_for, campaign.train, bool(implausible))
+    found = with_curve(found) if curve and not implausible else found
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
     search, library = found.search, found.library
@@ -195,13 +197,13 @@ def implausible_records(
 
 
 def settled(
-    library_for: Callable[[Sequence[Record]], Library], train: tuple[Record, ...], curve: bool, implausible: bool
+    library_for: Callable[[Sequence[Record]], Library], train: tuple[Record, ...], implausible: bool
 ) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
     """Suspect the records, then decide; return what was decided, who is suspected, and the train records as taken.
 
     A fault of one record that leaves noise is undone, unless one effect or constants do clearly better on all records;
-    where several faults of it do as well, the record is left out. A trend from record to record that leaves noise is
-    undone where it does clearly better than any of these.
+    where several faults of it do as well, the record is left out. So it is beside effects that were found already.
+    A trend from record to record that leaves noise is undone where it does clearly better than any of these.
     Where nothing does and all but one record agree, that one is left out. Nothing is looked for in implausible records.
     """
     library = library_for(train)
@@ -212,56 +214,77 @@ def settled(
     mended = mended_records(declared, library) if is_significant(declared) else []
     trends = trends_of(declared, library) if is_significant(declared) else []
     if mended or trends:
-        plant, measured = declared.model.plant, library.data.records
-        constants = constant_models(declared, declared.products(library.tolerances), library)
-        single = search.run(1)[-1].best
-        is_noise = bool(single.active) and not is_significant(single)
-        least = min([*(m.chi2 for m in constants), *([single.chi2] if is_noise else [])], default=np.inf)
+        # Of constants and effects only those count that come down to this.
+        limit = max([*(m.chi2 for m in mended[:1]), *(t.chi2 for t in trends[:1])]) + WITHIN
+        constants = constant_models(declared, declared.products(library.tolerances), library, limit)
+        single = search.further(SearchLevel((declared,)), limit)
+        least = min([*(m.chi2 for m in constants), *([single.chi2] if single is not None else [])], default=np.inf)
         if trends and trends[0].chi2 + WITHIN < min([least, *(m.chi2 for m in mended)]):
-            return decided_without_trend(library_for, trends, library, train, curve)
+            return decided_without_trend(library_for, trends, library, train)
         if mended and mended[0].chi2 < least + WITHIN:
-            best = mended[0]
-            faulty = measured[best.index]
-            alike = [m for m in mended if m.chi2 < best.chi2 + WITHIN and measured[m.index].file == faulty.file]
-            rest = tuple(r for r in train if r.file != faulty.file)
-            # Which of two faults it is makes parameters differ by more than their intervals.
-            if len(alike) > 1 and len(rest) > 1:
-                suspects = [m.suspect(measured[m.index], plant, LEFT_OUT) for m in alike]
-                return decide(Search(library_for(rest)), curve), suspects, rest
-            train = tuple(best.fault.trimmed(r, best.value, plant, faulty) if r.file == faulty.file else r
-                          for r in train)  # fmt: skip
-            there = library_for(train)
-            if best.fault.kind != "label":
-                there = with_unknown(there, best.column(there.problem(())))
-            return decide(Search(there), curve), [best.suspect(faulty, plant, FREED)], train
-    return suspected_again(library_for, decide(search, curve), train, curve)
+            return decided_without_fault(library_for, mended, library, train)
+    faults: list[Mended] = []
+
+    def is_faulty(level: SearchLevel) -> bool:
+        """Tell whether a fault of one record explains what is left, and no effect more does clearly better."""
+        found = mended_records(level.best, search.library) if is_significant(level.best) else []
+        rival = search.further(level, found[0].chi2 + WITHIN) if found else None
+        if found and (rival is None or found[0].chi2 < rival.chi2 + WITHIN):
+            faults.extend(found)
+        return bool(faults)
+
+    search.enough = is_faulty
+    decided = decide(search)
+    if faults and decided.constants is None:
+        return decided_without_fault(library_for, faults, library, train)
+    return suspected_again(library_for, decided, train)
 
 
 def suspected_again(
-    library_for: Callable[[Sequence[Record]], Library], found: "Decision", train: tuple[Record, ...], curve: bool
+    library_for: Callable[[Sequence[Record]], Library], found: "Decision", train: tuple[Record, ...]
 ) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
     """Suspect the records where what was found leaves more than noise, as `settled` does."""
     if found.constants is None and is_significant(found.largest):
         apart = disagreeing_record([found.declared, found.largest])
         if apart is not None:
             train = tuple(r for r in train if r.file != apart.record)
-            return decide(Search(library_for(train)), curve), [apart], train
+            return decide(Search(library_for(train))), [apart], train
         trends = trends_of(found.largest, found.library) if found.largest.active else []
         if trends:
-            return decided_without_trend(library_for, trends, found.library, train, curve)
+            return decided_without_trend(library_for, trends, found.library, train)
     return found, [], train
+
+
+def decided_without_fault(
+    library_for: Callable[[Sequence[Record]], Library], mended: Sequence[Mended], library: Library,
+    train: tuple[Record, ...],
+) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:  # fmt: skip
+    """Return what is decided on records without the best of some faults, as `settled` does."""
+    best, plant, measured = mended[0], library.declared.plant, library.data.records
+    faulty = measured[best.index]
+    alike = [m for m in mended if m.chi2 < best.chi2 + WITHIN and measured[m.index].file == faulty.file]
+    rest = tuple(r for r in train if r.file != faulty.file)
+    # Which of two faults it is makes parameters differ by more than their intervals.
+    if len(alike) > 1 and len(rest) > 1:
+        suspects = [m.suspect(measured[m.index], plant, LEFT_OUT) for m in alike]
+        return decide(Search(library_for(rest))), suspects, rest
+    train = tuple(best.fault.trimmed(r, best.value, plant, faulty) if r.file == faulty.file else r for r in train)
+    there = library_for(train)
+    if best.fault.kind != "label":
+        there = with_unknown(there, best.column(there.problem(best.fit.active, best.fit.values)))
+    return decide(Search(there)), [best.suspect(faulty, plant, FREED)], train
 
 
 def decided_without_trend(
     library_for: Callable[[Sequence[Record]], Library], trends: Sequence[Trend], library: Library,
-    train: tuple[Record, ...], curve: bool,
+    train: tuple[Record, ...],
 ) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:  # fmt: skip
     """Return what is decided on records without the best of some trends, as `settled` does."""
     best, *others = trends
     alike = [t for t in others if t.chi2 < best.chi2 + WITHIN]
     train = best.undone(train)
     there = with_unknown(library_for(train), best.column)
-    return decide(Search(there), curve), [best.suspect(alike, library)], train
+    return decide(Search(there)), [best.suspect(alike, library)], train
 
 
 def with_unknown(library: Library, column: NDArray[np.float64]) -> Library:
@@ -318,8 +341,8 @@ class Decision:
         return [self.declared, *steps, *([self.chosen] if active or self.constants is not None else [])]
 
 
-def decide(search: Search, curve: bool) -> Decision:
-    """Suspect the constants, then look for effects, then for a curve; all on the train records."""
+def decide(search: Search) -> Decision:
+    """Suspect the constants, then look for effects; all on the train records."""
     library, declared = search.library, search.start()
     within = declared.products(library.tolerances)
     lacks = is_significant(declared)
@@ -335,21 +358,27 @@ def decide(search: Search, curve: bool) -> Decision:
         return Decision(search, replace(library, tolerances=wider), declared, constants.fit, last,
                         [group_beside(constants, search)], constants=constants, equal=[constants])  # fmt: skip
     named, groups, refused = largest_named(predicting_best(levels), search)
-    # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
-    answered = refused is not None and not is_significant(last)
-    missing, term = (None, None) if answered or not curve else empirical_term(named, search)
-    if term is not None:
-        names = dict.fromkeys(EffectKey(f"{UNNAMED}{d.port}").public for d in term.others)
-        curves = EffectGroup(term.fit.active[-1].public, tuple(Likeness(n, 0.0, 1.0) for n in names), ())
-        contest = contest_of(groups, None, search, last)
-        return Decision(term.search, term.search.library, declared, term.fit, last, [*groups, curves], missing=missing,
-                        term=term, contest=contest)  # fmt: skip
     rivals = rival_models(named, search.of_size(len(named.active)))
     members = [f for g in groups for n in g.all_names[1:] if (f := search.model_with(n, named)) is not None]
     contest = contest_of(groups, refused, search, last) or contest_of_models(named, rivals)
     return Decision(search, library, declared, named, last, groups, claimed_names(named, search), refused, rivals,
-                    [*members, *(r.fit for r in rivals)], contest, missing, None, None,
-                    beside if len(named.active) == 1 else ())  # fmt: skip
+                    [*members, *(r.fit for r in rivals)], contest,
+                    equal=beside if len(named.active) == 1 else ())  # fmt: skip
+
+
+def with_curve(found: Decision) -> Decision:
+    """Look for an empirical curve beside the effects, where these leave more than noise."""
+    # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
+    if found.constants is not None or (found.refused is not None and not is_significant(found.largest)):
+        return found
+    missing, term = empirical_term(found.chosen, found.search)
+    if term is None:
+        return replace(found, missing=missing)
+    names = dict.fromkeys(EffectKey(f"{UNNAMED}{d.port}").public for d in term.others)
+    curves = EffectGroup(term.fit.active[-1].public, tuple(Likeness(n, 0.0, 1.0) for n in names), ())
+    contest = contest_of(found.groups, None, found.search, found.largest)
+    return Decision(term.search, term.search.library, found.declared, term.fit, found.largest,
+                    [*found.groups, curves], missing=missing, term=term, contest=contest)  # fmt: skip
 
 
 def steps_of(found: Decision, judged: Sequence[Judgement]) -> tuple[Step, ...]:

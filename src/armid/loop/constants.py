@@ -126,14 +126,14 @@ class FreedConstants(LeastSquaresProblem):
         return {p.names[0]: float(u) * p.tolerance for p, u in zip(self.chosen, off, strict=True)}
 
 
-def freed_constants(base: Fit, chosen: Sequence[Product]) -> ConstantModel:
-    """Fit a model with some products of constants free, from where it stands.
+def freed_constants(base: Fit, chosen: Sequence[Product], limit: float = np.inf) -> ConstantModel:
+    """Fit a model with some products of constants free, from where it stands; limit: see `descend`.
 
     Raises ArmidError where the simulation diverges there.
     """
     posed = FreedConstants((), base.records.space, records=base.records, chosen=chosen)
     start = np.concatenate([base.z, np.full(len(chosen), 0.5)])
-    z = descend(posed, [start], SETTLED, limit=IN_REACH * len(posed.measured))
+    z = descend(posed, [start], SETTLED, limit=min(limit, IN_REACH * len(posed.measured)))
     off = posed.off(z[np.newaxis])[0]
     records, at = posed.moved(off), z[: -len(chosen)]
     fit = Fit(base.active, records, at, records.residuals(at)[0], constants=posed.shares_at(off))
@@ -145,10 +145,13 @@ def freed_constants(base: Fit, chosen: Sequence[Product]) -> ConstantModel:
     )
 
 
-def constant_models(base: Fit, found: Sequence[Product], library: Library) -> list[ConstantModel]:
+def constant_models(
+    base: Fit, found: Sequence[Product], library: Library, limit: float = np.inf
+) -> list[ConstantModel]:  # fmt: skip
     """Return a model fitted with single products free, and with all of them, those that explain the records.
 
     Of single products those are fitted that to first order take away half of what is more than noise.
+    limit: chi2 that must be in reach, else a fit is given up.
     """
     if not found:
         return []
@@ -158,7 +161,7 @@ def constant_models(base: Fit, found: Sequence[Product], library: Library) -> li
     sets = [[found[i]] for i in np.argsort(-drops, kind="stable")[:MOST] if drops[i] > needed]
     sets += [list(found)] if len(found) > 1 else []
     library.say("fitting the declared model with its constants free within their tolerances")
-    models = library.each(unless_diverged, [partial(freed_constants, base, chosen) for chosen in sets])
+    models = library.each(unless_diverged, [partial(freed_constants, base, chosen, limit) for chosen in sets])
     return [m for m in models if m is not None and m.explains]
 
 

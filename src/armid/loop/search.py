@@ -44,6 +44,8 @@ WORTH = 8.0
 PROMISING = 12.0
 # Refits stop early; those are finished whose n ln(chi2) is within this of the best of their size, and so many anyhow.
 FAR, N_FINISHED = 50.0, 4
+# Where a limit is set, nothing is exchanged in a model that leaves more than this share of what is above it.
+LEFT = 0.5
 # Models within this factor of the least chi2 are told apart by the criterion; what they leave has about one character.
 COMPARABLE = 1.5
 
@@ -87,18 +89,31 @@ class Search:
     """Extend models until nothing earns its parameters.
 
     fits: every model that was fitted, by its effects. scores: of the candidates at each of them. rounds: the log.
+    limit: chi2 to which a model must be able to come, else it is given up. enough: asked of each level that earned its
+    effects, whether to look no further.
     """
 
     library: Library
     fits: dict[frozenset[EffectKey], Fit] = field(default_factory=dict)
     scores: dict[frozenset[EffectKey], list[Score]] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
+    limit: float = np.inf
+    enough: Callable[[SearchLevel], bool] = lambda _: False
 
     def start(self) -> Fit:
         """Return the declared model at its estimate."""
         if frozenset() not in self.fits:
             self.fits[frozenset()] = accurate(fit_globally(self.library.problem(()), ()), self.library)
         return self.fits[frozenset()]
+
+    def further(self, level: SearchLevel, limit: float) -> Fit | None:
+        """Return the best model with one effect more, if it earns it and leaves noise, and chi2 is below a limit."""
+        library = self.library.about(level.best.records.replays, level.best.misfit)
+        beside = replace(self, library=library, fits=dict(self.fits), rounds=[], limit=limit)
+        found = beside.next_level(level, level.best)
+        if found is None or not found.earned or found.best.chi2 > limit or is_significant(found.best):
+            return None
+        return found.best
 
     def run(self, most: int = MOST_EFFECTS) -> list[SearchLevel]:
         """Return the levels: the declared model, and all up to the last whose best earned its effects, at most so many.
@@ -116,6 +131,8 @@ class Search:
             self.library = self.library.about(level.best.records.replays, level.best.misfit)
             if level.earned:
                 earned = len(levels)
+                if self.enough(level):
+                    break
             elif len(levels) > LOOK_AHEAD or not is_significant(level.best):
                 break
         return levels[:earned]
@@ -139,6 +156,8 @@ class Search:
             self.extend(parent)
         if not self.of_size(size) or not promising(self.of_size(size - 1)[0], self.of_size(size)[0]):
             self.note_round(size, f"no candidate lowers n ln(chi2) by more than {PROMISING:g}")
+            return None
+        if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
             return None
         for _ in range(N_EXCHANGES):
             best = self.of_size(size)[0]
@@ -178,7 +197,7 @@ class Search:
         least = WORTH * max(1.0, parent.chi2 / len(parent.residual))
         worth = [s for s in self.scores_at(parent) if s.drop > least and s.twin is None]
         near = [s for s in worth if s.drop * WITHIN >= worth[0].drop]
-        leading = worth[: max(FEWEST, min(MOST, len(near)))]
+        leading = [s for s in worth[: max(FEWEST, min(MOST, len(near)))] if parent.chi2 - REACH * s.drop <= self.limit]
         self.add_each(parent, leading[:SURE])
         limit = min((f.chi2 for f in self.of_size(len(parent.active) + 1)), default=np.inf)
         self.add_each(parent, [s for s in leading[SURE:] if parent.chi2 - REACH * s.drop <= limit])
@@ -188,7 +207,8 @@ class Search:
         best = min(self.of_size(len(parent.active) + 1), key=lambda f: f.chi2, default=None)
         limit = np.inf if best is None else best.chi2 * max(COMPARABLE, float(np.exp(FAR / best.independent)))
         self.fit_each({
-            frozenset((*parent.active, s.key)): partial(refitted, parent, s, self.library, limit) for s in found
+            frozenset((*parent.active, s.key)): partial(refitted, parent, s, self.library, min(limit, self.limit))
+            for s in found
         })  # fmt: skip
 
     def reach_further(self, size: int) -> bool:

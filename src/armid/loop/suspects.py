@@ -17,7 +17,7 @@ from armid.estimation.information import NORMAL_95, start_changes
 from armid.loop.candidates import Library
 from armid.loop.diagnose import diagnose, holdout_residuals, is_significant
 from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
-from armid.loop.search import unless_diverged
+from armid.loop.search import start_of, unless_diverged
 from armid.loop.whitening import WhiteRecords
 from armid.model import Model, Plant
 from armid.problem.problem import Replay, signals_of
@@ -178,7 +178,7 @@ class Mended:
 
     def column(self, base: WhiteRecords) -> Array:
         """Return what its largest plausible size does to records without it, whitened, (n_samples,)."""
-        change = column_of(base, self.index, self.fit.z, self.fault, 0.0)
+        change = column_of(base, self.index, start_of(base, self.fit.values), self.fault, 0.0)
         return self.fault.largest(base.data.records[self.index]) * change
 
     def suspect(self, record: Record, plant: Plant, action: str) -> Suspect:
@@ -308,7 +308,10 @@ def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: flo
 
 
 def mended_records(declared: Fit, library: Library) -> list[Mended]:
-    """Return the declared model with one fault of one record undone, those that leave noise, the best fit first."""
+    """Return a model with one fault of one record undone, those that leave noise, the best fit first.
+
+    declared: the model, with effects or without.
+    """
     base, n = declared.records, len(declared.residual)
     if len(base.replays) < 2:
         return []
