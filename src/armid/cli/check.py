@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,18 +65,16 @@ def limited(points: "Iterator[ContractPoint]", seconds: float) -> "Iterator[Cont
     """Yield the points; where one takes longer, yield one that says so in its place, and no more."""
     from armid.contract.trials import ContractPoint
 
-    told = 0
-    while True:
+    for place in count(1):
         try:
             with alarm(seconds):
                 point = next(points)
         except StopIteration:
             return
         except TimeoutError:
-            yield ContractPoint("time limit", False, f"point {told + 1} takes longer than {seconds:g} s; those after "
+            yield ContractPoint("time limit", False, f"point {place} takes longer than {seconds:g} s; those after "
                                 "it were not tried")  # fmt: skip
             return
-        told += 1
         yield point
 
 

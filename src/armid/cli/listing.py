@@ -73,9 +73,8 @@ def long_text(identifier: Any) -> str:
 
     lines = [f"{identifier.name}: {identifier.note or 'no note'}"]
     for name, told in options_of(identifier).items():
-        value = (
-            "its own" if told["default"] is None or callable(told["default"]) else quoted(told["default"]).strip("'")
-        )
+        default = told["default"]
+        value = "its own" if default is None or callable(default) else quoted(default).strip("'")
         unit = f" [{told['unit']}]" if told["unit"] else ""
         lines.append(folded(f"  --option {name}={value}{unit} {told['meaning']}"))
     return "\n".join(lines)

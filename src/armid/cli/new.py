@@ -95,7 +95,7 @@ def python_file(template: str, name: str) -> str:
     return filled(f"{template}.py.txt", name=name)
 
 
-def check_new_name(kind: str, name: str, taken: Collection[str] = (), template: str = "") -> None:
+def check_new_name(kind: str, name: str, taken: Collection[str], template: str) -> None:
     """Refuse a name that a starting file could not have; taken: names of the same kind that are registered."""
     if kind == CAMPAIGN:
         if not FOLDER_NAME.fullmatch(name) or name.endswith("."):
@@ -104,7 +104,7 @@ def check_new_name(kind: str, name: str, taken: Collection[str] = (), template: 
     check_name(name, kind)
     if name in taken or (kind == "effect" and name in RESERVED):
         raise ArmidError(f"{kind} '{name}' is there already: another name is expected")
-    if name in names_in(python_file(template or kind, "_")):
+    if name in names_in(python_file(template, "_")):
         raise ArmidError(f"{kind} '{name}' cannot have this name, which the file itself uses: another is expected")
     module = find_spec(name)
     installed = module is not None and str(module.origin).startswith(tuple(sysconfig.get_paths().values()))

@@ -2,8 +2,6 @@
 
 import json
 import shlex
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ from armid.report.result import (
     IDENTIFIABILITY,
     IDENTIFICATION,
     LOOP,
+    UNSHOWABLE,
     Kind,
     NewFiles,
     Result,
@@ -50,12 +49,8 @@ STUDY, PAGE = "study.sqlite", "report.html"
     "armid report results/table1_short", "armid report results/four_strokes",
 ))  # fmt: skip
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option(
-    "--key",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Truth of blind campaigns, which studies/blind/score.py scores.",
-)
+@click.option("--key", type=click.Path(path_type=Path), metavar="FILE",
+              help="Truth of blind campaigns, which studies/blind/score.py scores.")  # fmt: skip
 @plugin_option
 def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
     """Write report.html, one self-contained page, beside stored results.
@@ -95,26 +90,19 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
     again = shlex.join(["armid", "report", f"results/{results.study['name']}", *named])
     analyses, place = load_registry(plugins).analyses, results.path.parent
     refuse_unwritable(place, PAGE)
-    with refuse_damaged_store(results.path):
+    try:
         document = report_of(results, key, analyses, again)
         present(document)
         with NewFiles(place) as files:
             write_report(document, files)
+    except UNSHOWABLE as error:
+        # what a plug-in does wrong stays its own
+        if isinstance(error, ArmidError) or place_in_plugin(error) is not None:
+            raise
+        expected = "its runs cannot be shown, what armid wrote is expected"
+        raise ArmidError(f"{results.path} is damaged: {expected}") from error
     say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
     give(answer=document.said, folder=place, files=files.names)
-
-
-@contextmanager
-def refuse_damaged_store(file: Path) -> Iterator[None]:
-    """Tell in one sentence that numbers of a store cannot be shown; what a plug-in does wrong stays its own."""
-    try:
-        yield
-    except ArmidError:
-        raise
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
-        if place_in_plugin(error) is not None:
-            raise
-        raise ArmidError(f"{file} is damaged: its runs cannot be shown, what armid wrote is expected") from error
 
 
 def kind_in(folder: Path) -> Kind | None:

@@ -44,15 +44,15 @@ def study_command(
     Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not. Ends
     with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
-    from armid.study.runner import TIME_LIMIT_S, ProgressBar, absolute, run
+    from armid.study.runner import TIME_LIMIT_S, absolute, progress_bar, run
     from armid.study.tasks import Study, read_study
 
-    with ProgressBar(speaks()) as watch:
+    with progress_bar(speaks()) as show_progress:
         known = read_study(study, absolute(plugins))
         if isinstance(known, Study) and speaks():
             tell(f"{known.name}: {known.cost()}; what is finished already is kept")
         limit = TIME_LIMIT_S if time_limit is None else time_limit
-        ending = run(known, study, jobs, dask, out, limit, only, retry, watch.update)
+        ending = run(known, study, jobs, dask, out, limit, only, retry, show_progress)
     answer = show_answer(ending.folder) if ending.counts.done else []
     say(*words(ending))
     counts = {key: getattr(ending.counts, key) for key in ("planned", "done", "failed", "missing")}

@@ -6,6 +6,7 @@ import platform
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
@@ -25,6 +26,8 @@ DETAILS, MANIFEST = "details.json", "manifest.json"
 LEAST_ROOM = 3_000_000
 # Letters of a result's `repr`.
 MOST_LETTERS = 1_500
+# What making a document of damaged numbers raises.
+UNSHOWABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
 Draw = Callable[[], Any]
 
 
@@ -101,13 +104,10 @@ class Result(Shown):
 
     kind: ClassVar[Kind]
 
-    @property
+    @cached_property
     def parts(self) -> Parts:
         """What is stored of it; made once."""
-        kept: dict[str, Any] = self.__dict__
-        if "_parts" not in kept:
-            kept["_parts"] = self.kind.parts_of(self)
-        return kept["_parts"]  # type: ignore[no-any-return]
+        return self.kind.parts_of(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as the command stores it as JSON, SI throughout; what is not known is None."""
@@ -167,9 +167,9 @@ def refuse_damaged(folder: Path, kind: Kind) -> Iterator[None]:
     """Tell in one sentence that stored JSON cannot be shown: what makes a document of it, or draws its figures."""
     try:
         yield
-    except ArmidError:
-        raise
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
+    except UNSHOWABLE as error:
+        if isinstance(error, ArmidError):
+            raise
         raise ArmidError(
             f"{folder / kind.file}, or details.json beside it, is not what `{kind.command}` writes, it was damaged or "
             "changed: a folder as that command left it is expected"

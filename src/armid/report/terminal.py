@@ -11,7 +11,6 @@ from armid.report.document import Cell, Column, Document, Sentences, Table, Text
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
-    from rich.text import Text as RichText
 
 # Letters that stand beside each column, and those of the frame.
 BESIDE, FRAME = 3, 1
@@ -30,32 +29,24 @@ def show(document: Document) -> None:
     """
     from rich.console import Console
 
-    console = Console()
+    console, whole = Console(), not sys.stdout.isatty()
+
+    def say(*sentences: str) -> None:
+        for text in filter(None, sentences):
+            console.print(printable(text), highlight=False, markup=False, emoji=False, soft_wrap=whole)
+
     with console.capture() as captured:
-        show_on(console, document)
+        say(*document.said)
+        for part in document.main:
+            if isinstance(part, Table):
+                print_table(part, console)
+                say(part.note)
+            elif isinstance(part, Sentences):
+                say(part.title and f"{part.title}:", *(f"- {text}" for text in part.sentences))
+            elif isinstance(part, Text):
+                say(part.text)
     # not by rich, which ends the program where a pipe is broken
     print(captured.get(), end="", flush=True)
-
-
-def show_on(console: "Console", document: Document) -> None:
-    whole = not sys.stdout.isatty()
-
-    def say(text: str) -> None:
-        console.print(printable(text), highlight=False, markup=False, emoji=False, soft_wrap=whole)
-
-    for sentence in document.said:
-        say(sentence)
-    for part in document.main:
-        if isinstance(part, Table):
-            print_table(part, console)
-            if part.note:
-                say(part.note)
-        elif isinstance(part, Sentences):
-            for sentence in (part.title and f"{part.title}:", *(f"- {text}" for text in part.sentences)):
-                if sentence:
-                    say(sentence)
-        elif isinstance(part, Text):
-            say(part.text)
 
 
 def print_table(table: Table, console: "Console") -> None:
@@ -68,15 +59,17 @@ def print_table(table: Table, console: "Console") -> None:
     widths = fitted(columns[skip:], [row[skip:] for row in rows], console.width)
     names = [printable(c.header or c.key) for c in columns[skip + len(widths) :] if c.header or table.name]
     kept = columns[skip : skip + len(widths)]
-    console.print(printable(table.title), style="italic", markup=False, highlight=False, soft_wrap=True)
+    console.print(printable(table.title), style="italic", markup=False, emoji=False, highlight=False, soft_wrap=True)
     for i, (group, own) in enumerate(groupby(rows, lambda row: row[0].text if skip else "")):
         if skip and group:
             heading = f"{printable(columns[0].header)}: {printable(group)}"
-            console.print(heading, style="bold", markup=False, highlight=False, soft_wrap=True)
+            console.print(heading, style="bold", markup=False, emoji=False, highlight=False, soft_wrap=True)
         console.print(drawn(kept, [row[skip:] for row in own], widths, not i))
     if names:
         place = f"in {table.name}.csv" if table.name else "on the page, and on a wider terminal"
-        console.print(f"({place}: {', '.join(names)})", style="dim", markup=False, highlight=False, soft_wrap=True)
+        console.print(
+            f"({place}: {', '.join(names)})", style="dim", markup=False, emoji=False, highlight=False, soft_wrap=True
+        )
 
 
 def fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int) -> list[int]:
@@ -125,14 +118,9 @@ def drawn(
         shown = RichText(header if len(header) <= width else words(column.header))
         made.add_column(shown, width=width, overflow="fold", justify="right" if column.digits else "left")
     for row in rows:
-        made.add_row(*(text_of(cell) for cell, _ in zip(row, widths, strict=False)))
+        made.add_row(*(RichText(printable(cell.text), style="strike" if cell.is_struck else "")
+                       for cell, _ in zip(row, widths, strict=False)))  # fmt: skip
     return made
-
-
-def text_of(cell: Cell) -> "RichText":
-    from rich.text import Text as RichText
-
-    return RichText(printable(cell.text), style="strike" if cell.is_struck else "")
 
 
 def printable(text: str) -> str:

@@ -3,6 +3,7 @@
 import fnmatch
 import hashlib
 import os.path
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -89,9 +90,8 @@ def cases_of(spec: StudySpec, model: Model, registry: StudyRegistry, folder: Pat
         cases += _random_cases(spec, model, f"{where}, random_cases")
     if not cases:
         raise ArmidError(f"{where}: there is no case, a table [[cases]], [random_cases] or [suite] is expected")
-    names = [case.name for case in cases]
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(case.name for case in cases).items():
+        if count > 1:
             raise ArmidError(f"{where}: case '{name}' is there twice, each name once is expected")
         if "/" in name:
             raise ArmidError(f"{where}: the name of case '{name}' holds '/', which --only needs between case and "

@@ -22,23 +22,17 @@ from armid.study.run_cache import RunCache
 from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE, LoopSpec, StudyRegistry, lookup
 
 
-@dataclass(frozen=True)
-class LoopCase:
-    """Hold one campaign: its folder's name, and a hash of campaign.toml and the records in it."""
-
-    name: str
-    digest: str
-
-
 @dataclass(frozen=True, eq=False)
 class LoopStudy:
+    """A study that closes loops; cases: name of a campaign's folder -> hash of campaign.toml and the records in it."""
+
     kind: ClassVar[str] = CLOSES_LOOP
     labels: ClassVar[list[str]] = [CLOSES_LOOP]
 
     spec: LoopSpec
     text: str
     folder: Path
-    cases: tuple[LoopCase, ...]
+    cases: Mapping[str, str]
     candidates: tuple[str, ...]
     registry: StudyRegistry
 
@@ -48,7 +42,7 @@ class LoopStudy:
 
     @property
     def case_names(self) -> list[str]:
-        return [case.name for case in self.cases]
+        return list(self.cases)
 
     @classmethod
     def read(
@@ -87,20 +81,20 @@ class LoopStudy:
             "rivals": {pattern: list(names) for pattern, names in spec.rivals.items()},
             "identifiers": list(self.labels),
             "plugins": list(self.registry.plugins),
-            "cases": [{"name": case.name, "truth": {}, "bounds": {}} for case in self.cases],
+            "cases": [{"name": name, "truth": {}, "bounds": {}} for name in self.cases],
         }
 
     def plan(self) -> Iterator[Planned]:
         """Yield the runs, campaign by campaign; settings hold all that decides a result, and not where the key is."""
         spec = self.spec
-        for case in self.cases:
-            wanted = self.candidates_for(case.name)
+        for case, digest in self.cases.items():
+            wanted = self.candidates_for(case)
             settings = {
                 "kind": self.kind, "campaigns": spec.campaigns, "bounds": spec.bounds, "fixed": spec.fixed,
                 "seed": spec.seed, "candidates": list(wanted), "own": self.registry.own("effects", *wanted),
-                "case": case.name, "digest": case.digest,
+                "case": case, "digest": digest,
             }  # fmt: skip
-            yield planned(settings, case.name, CLOSES_LOOP, "", None, WHOLE, spec.seed, 0)
+            yield planned(settings, case, CLOSES_LOOP, "", None, WHOLE, spec.seed, 0)
 
     @staticmethod
     def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
@@ -118,7 +112,7 @@ class LoopStudy:
         return Performed(0, str(model), {"loops": [(closed.verdict, time.process_time() - began, report)]})
 
 
-def _campaigns(spec: LoopSpec, folder: Path, where: str) -> tuple[LoopCase, ...]:
+def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
     """Return the campaigns of a folder, by name; `made_by` is told where there are none."""
     place = folder / spec.campaigns
     made = f", `{spec.made_by}` makes them" if spec.made_by else ", a folder of campaigns is expected"
@@ -132,7 +126,7 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> tuple[LoopCase, ...]
             raise ArmidError(f"{where}: key 'only' holds {quoted(pattern)}, which is no campaign of "
                              f"{quoted(spec.campaigns)}, {nearest(pattern, names)}")  # fmt: skip
     chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in spec.only)]
-    return tuple(LoopCase(name, _digest(place / name)) for name in chosen)
+    return {name: _digest(place / name) for name in chosen}
 
 
 def _digest(folder: Path) -> str:

@@ -4,7 +4,7 @@ import json
 import shutil
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -146,11 +146,9 @@ class StudyResults(Shown):
         """Return a trace as a table with a column for every parameter of the study, None: one without rows."""
         if trace is None:
             trace = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
-        columns = {"run": [trace.run] * len(trace.values), "evaluation": trace.evaluations, "value": trace.values}
-        for name in self.study["parameters"]:
-            known = name in trace.names
-            columns[f"x_{name}"] = trace.X[:, trace.names.index(name)] if known else np.full(len(trace.values), np.nan)
-        return pd.DataFrame(columns)
+        found = pd.DataFrame({"run": trace.run, "evaluation": trace.evaluations, "value": trace.values})
+        candidates = pd.DataFrame(trace.X, columns=list(trace.names)).reindex(columns=self.study["parameters"])
+        return found.join(candidates.add_prefix("x_"))
 
 
 def documents() -> Any:
@@ -233,36 +231,18 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
 
     A store whose runner was killed has a log beside it, which cannot be read in a read-only folder: it is copied then.
     """
-    with translate_errors(path):
-        connection = _connected(path)
-        if connection is not None:
-            try:
-                yield connection
-            finally:
-                connection.close()
-            return
-    with translate_errors(path), TemporaryDirectory(prefix="armid-") as beside:
-        for file in path.parent.glob(f"{path.name}*"):
-            shutil.copy(file, beside)
-        copied = sqlite3.connect(Path(beside) / path.name, isolation_level=None)
+    with translate_errors(path), ExitStack() as stack:
+        uri = f"{path.resolve().as_uri()}?mode=ro"
+        connection = stack.enter_context(closing(sqlite3.connect(uri, uri=True, timeout=WAIT_S, isolation_level=None)))
         try:
-            check_format(copied, path)
-            yield copied
-        finally:
-            copied.close()
-
-
-def _connected(path: Path) -> sqlite3.Connection | None:
-    """Return a connection that only reads, None where the log beside the file cannot be read in its place."""
-    connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=WAIT_S, isolation_level=None)
-    try:
-        check_format(connection, path)
-    except sqlite3.OperationalError as error:
-        connection.close()
-        if error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
-            return None
-        raise
-    except BaseException:
-        connection.close()
-        raise
-    return connection
+            check_format(connection, path)
+        except sqlite3.OperationalError as error:
+            if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
+                raise
+            beside = stack.enter_context(TemporaryDirectory(prefix="armid-"))
+            for file in path.parent.glob(f"{path.name}*"):
+                shutil.copy(file, beside)
+            copied = sqlite3.connect(Path(beside) / path.name, isolation_level=None)
+            connection = stack.enter_context(closing(copied))
+            check_format(connection, path)
+        yield connection

@@ -20,18 +20,9 @@ from armid.study.spec import StudyRegistry, lookup
 # How many cases, each at one level of noise and in one window, are kept ready in a process.
 MOST_KEPT = 512
 SHARED = (
-    "plant",
-    "effects",
-    "bounds",
-    "fixed",
-    "accuracy",
-    "window_s",
-    "truth",
-    "strokes",
-    "interval_s",
-    "campaign",
+    "plant", "effects", "bounds", "fixed", "accuracy", "window_s", "truth", "strokes", "interval_s", "campaign",
     "suite",
-)
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,13 @@
 
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from armid.errors import ArmidError, nearest
 from armid.estimation.identify import ctrl_c_waits
@@ -200,50 +201,38 @@ def absolute(plugins: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"{Path(file).resolve()}:{attribute}" if file else attribute for file, _, attribute in split)
 
 
-class ProgressBar:
-    """Count runs and simulations, and show a bar with rate and time left on a terminal, nothing elsewhere."""
+@contextmanager
+def progress_bar(is_shown: bool) -> Iterator[Progress]:
+    """Yield what shows how far a study is, with rate and time left, on a terminal; nothing is shown elsewhere."""
+    if not (is_shown and sys.stderr.isatty()):
+        yield lambda counts, outcome: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn
+    from rich.progress import Progress as Bar
 
-    def __init__(self, is_shown: bool = True) -> None:
-        self.is_shown = is_shown
-        self.finished, self.simulations = 0, 0
-        self._began = time.monotonic()
-        self._bar: Any = None
+    columns = (TextColumn("{task.completed:.0f}/{task.total:.0f} runs"), BarColumn(),
+               TextColumn("{task.fields[rate]}"), TextColumn("{task.fields[left]}"))  # fmt: skip
+    with Bar(*columns, console=Console(stderr=True), refresh_per_second=4) as bar:
+        task = bar.add_task("", total=1, visible=False, rate="", left="")
+        began, finished, simulations = time.monotonic(), 0, 0
 
-    def __enter__(self) -> "ProgressBar":
-        if self.is_shown and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn
+        def update(counts: Counts, outcome: Outcome | None) -> None:
+            nonlocal began, finished, simulations
+            if outcome is None:
+                began = time.monotonic()
+            else:
+                finished, simulations = finished + 1, simulations + outcome.used
+            seconds, missing = max(time.monotonic() - began, 1e-9), counts.missing - finished
+            left = f"{span(seconds / finished * missing)} left" if finished else "starting"
+            rate = f"{simulations / seconds:,.0f} simulations/s"
+            if finished and not simulations:
+                # closed loops count none
+                rate = f"{60.0 * finished / seconds:.3g} runs/min"
+            done = counts.planned - missing
+            bar.update(task, total=counts.planned, completed=done, visible=True, rate=rate, left=left)
 
-            self._bar = Progress(
-                TextColumn("{task.completed:.0f}/{task.total:.0f} runs"), BarColumn(),
-                TextColumn("{task.fields[rate]}"), TextColumn("{task.fields[left]}"),
-                console=Console(stderr=True), refresh_per_second=4,
-            )  # fmt: skip
-            self._task = self._bar.add_task("", total=1, visible=False, rate="", left="")
-            self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def update(self, counts: Counts, outcome: Outcome | None) -> None:
-        if outcome is None:
-            self._began = time.monotonic()
-        else:
-            self.finished, self.simulations = self.finished + 1, self.simulations + outcome.used
-        if self._bar is not None:
-            seconds = max(time.monotonic() - self._began, 1e-9)
-            missing = counts.missing - self.finished
-            left = f"{span(seconds / self.finished * missing)} left" if self.finished else "starting"
-            shown = {"completed": counts.planned - missing, "rate": self._rate(seconds), "left": left}
-            self._bar.update(self._task, total=counts.planned, visible=True, **shown)
-
-    def _rate(self, seconds: float) -> str:
-        """Return simulations a second, or finished runs a minute where no run counts its simulations."""
-        if self.simulations or not self.finished:
-            return f"{self.simulations / seconds:,.0f} simulations/s"
-        return f"{60.0 * self.finished / seconds:.3g} runs/min"
+        yield update
 
 
 def span(seconds: float) -> str:

@@ -78,16 +78,12 @@ def seeds(value: object) -> tuple[int, ...]:
     return tuple(range(1, held_count(value) + 1))
 
 
-def counts(value: object) -> tuple[int, ...]:
-    """Return rising numbers above 0: one number stands for a list of it."""
-    found = (count(value),) if isinstance(value, int) else tuple(list_of(count, 1)(value))
-    if list(found) != sorted(set(found)):
-        raise KindError(value)
-    return found
+def one_or_more(kind: Kind) -> Kind:
+    """Return a kind of lists; one value stands for a list of it."""
+    return lambda value: list_of(kind, 1)(value) if isinstance(value, list) else (kind(value),)
 
 
-def names(value: object) -> tuple[str, ...]:
-    return (text(value),) if isinstance(value, str) else tuple(list_of(text, 1)(value))
+rising_counts = tested(one_or_more(count), lambda found: list(found) == sorted(set(found)))
 
 
 def at_least_zero(value: object) -> float:
@@ -97,18 +93,9 @@ def at_least_zero(value: object) -> float:
     return number(value) + 0.0
 
 
-def levels(value: object) -> tuple[float, ...]:
-    """Return noise levels: one number stands for a list of it."""
-    return tuple(list_of(at_least_zero, 1)(value)) if isinstance(value, list) else (at_least_zero(value),)
-
-
-def windows(value: object) -> tuple[tuple[float, ...] | str, ...]:
-    """Return windows, each [begin, end] or the word for all of a record; the word alone stands for a list of it."""
-
-    def window(each: object) -> tuple[float, ...] | str:
-        return WHOLE if each == WHOLE else tuple(list_of(number, 2, 2)(each))
-
-    return (WHOLE,) if value == WHOLE else tuple(list_of(window, 1)(value))
+def window(value: object) -> tuple[float, ...] | str:
+    """Return a window, [begin, end] or the word for all of a record."""
+    return WHOLE if value == WHOLE else tuple(list_of(number, 2, 2)(value))
 
 
 def options(value: object) -> dict[str, float | int | str | bool]:
@@ -128,16 +115,17 @@ def options(value: object) -> dict[str, float | int | str | bool]:
 
 NUMBERS = key(table_of(number), "a finite number in SI")
 BOUNDS = key(table_of(list_of(number, 2, 2)), "[low, high] in SI")
-NAMES = key(names, "a name or a list of names")
+NAMES = key(one_or_more(text), "a name or a list of names")
 EFFECT_NAMES = key(list_of(text, 1), "a list of names of effects")
-LEVELS = key(levels, "a number of at least 0 in deg/s, or a list of such")
+LEVELS = key(one_or_more(at_least_zero), "a number of at least 0 in deg/s, or a list of such")
 TABLES = key(list_of(any_table, 1), "a list of at least one table")
+WINDOWS = key(one_or_more(window), f"'{WHOLE}', or a list of [begin, end] in seconds and '{WHOLE}'")
 STUDY_NAME = key(plain_name, "a plain name of letters, digits, '_', '-' and '.'")
 LINE = key(line_of_text, "a text on one line")
 QUESTION = key(any_text, "a text")
 KIND = key(text, "the kind of a study")
 SEEDS = key(seeds, "at most 1,000,000 seeds or a list")
-PER_PARAMETER = key(counts, "a whole number above 0, or a rising list of such")
+PER_PARAMETER = key(rising_counts, "a whole number above 0, or a rising list of such")
 SEED = key(whole_number, "a whole number of at least 0")
 
 
@@ -215,9 +203,7 @@ class StudySpec:
     fitness: tuple[str, ...] = field(default=("similarity",), metadata=NAMES)
     noise_deg_s: tuple[float, ...] = field(default=(0.0,), metadata=LEVELS)
     noise_seed: int = field(default=1, metadata=SEED)
-    windows_s: tuple[tuple[float, float] | str, ...] = field(
-        default=(WHOLE,), metadata=key(windows, f"'{WHOLE}', or a list of [begin, end] in seconds and '{WHOLE}'")
-    )
+    windows_s: tuple[tuple[float, float] | str, ...] = field(default=(WHOLE,), metadata=WINDOWS)
     interval_s: float = field(default=1e-3, metadata=key(above_zero, "a sample interval in seconds above 0"))
     accuracy: str = field(
         default="auto", metadata=key(one_of("auto", *ALLOWED), f"one of 'auto', {', '.join(map(repr, ALLOWED))}")

@@ -183,7 +183,12 @@ class Store:
         return [ClaimedRun(run, settings) for _, run, settings in rows]
 
     def _next(self, n: int) -> list[tuple[int, str, str]]:
-        return self._connection.execute(NEXT, {**self._chosen, "after": self._place, "n": n}).fetchall()
+        return self._selected(NEXT, after=self._place, n=n)
+
+    def _selected(self, query: str, **further: object) -> list[Any]:
+        """Return rows of the runs that this runner looks at."""
+        with translate_errors(self.path):
+            return self._connection.execute(query, self._chosen | further).fetchall()
 
     def save(self, outcome: Outcome) -> bool:
         """Keep a finished run; tell whether it was not there yet."""
@@ -206,22 +211,17 @@ class Store:
         return digest
 
     def counts(self) -> Counts:
-        with translate_errors(self.path):
-            planned, finished, failed, left = self._connection.execute(COUNTS, self._chosen).fetchone()
+        ((planned, finished, failed, left),) = self._selected(COUNTS)
         return Counts(planned, finished - failed, failed, left)
 
     def first_error(self) -> str:
         """Return what the first failed run says, "" when none has failed."""
-        with translate_errors(self.path):
-            text = f"SELECT r.error {FAILURES} ORDER BY p.place LIMIT 1"
-            row = self._connection.execute(text, self._chosen).fetchone()
-        return str(row[0]) if row else ""
+        rows = self._selected(f"SELECT r.error {FAILURES} ORDER BY p.place LIMIT 1")
+        return str(rows[0][0]) if rows else ""
 
     def others(self) -> list[int]:
         """Return the processes of this machine that are at runs which this runner looks at."""
-        here = {"here": self._process.place, "pid": self._process.pid}
-        with translate_errors(self.path):
-            rows = self._connection.execute(OTHERS, {**self._chosen, **here}).fetchall()
+        rows = self._selected(OTHERS, here=self._process.place, pid=self._process.pid)
         return [int(row[0]) for row in rows]
 
 

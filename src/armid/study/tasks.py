@@ -126,9 +126,8 @@ def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
 
 def of_machine(error: BaseException) -> bool:
     """Tell whether disk or memory are at fault; what a plug-in itself opens or asks for is its own fault."""
-    if isinstance(error, OSError):
-        return error.errno in MACHINE and place_in_plugin(error) is None
-    return isinstance(error, MemoryError) and place_in_plugin(error) is None
+    lacks = error.errno in MACHINE if isinstance(error, OSError) else isinstance(error, MemoryError)
+    return lacks and place_in_plugin(error) is None
 
 
 def sentence(error: BaseException) -> str:
@@ -358,9 +357,10 @@ def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
     One of the user is built later, see `Study.check`: whatever its function does has to happen in another process.
     """
     identifier = registry.identifier(entry.name, where)
+    asked = [lookup(registry.fitness, fitness.partition(":")[0], "fitness", where) for fitness in entry.fitness]
     try:
-        for fitness in entry.fitness:
-            identifier.refuse(lookup(registry.fitness, fitness.partition(":")[0], "fitness", where))
+        for fitness in asked:
+            identifier.refuse(fitness)
         built = identifier.with_options(entry.options)
         if not registry.own("identifiers", entry.name):
             built.build(entry.budget)
@@ -426,11 +426,9 @@ def _parameter_rows(space: Space, x: np.ndarray, train: tuple[Replay, ...]) -> l
     information = information_at(train, space, x)
     low, high = space.low[space.free], space.high[space.free]
     units = [u for u, f in zip(space.units, space.free, strict=True) if f]
-    largest: list[float | None] = []
-    for i, row in enumerate(information.correlation):
-        others = np.abs(np.delete(row, i))
-        known = others[np.isfinite(others)]
-        largest.append(float(known.max()) if known.size else None)
+    sizes = np.abs(information.correlation)
+    known = np.isfinite(sizes) & ~np.eye(len(sizes), dtype=bool)
+    largest = [float(row[there].max()) if there.any() else None for row, there in zip(sizes, known, strict=True)]
     columns = (space.free_names, units, x.tolist(), low.tolist(), high.tolist(), information.deviation.tolist(),
                largest, held_by_bound(space, x).tolist())  # fmt: skip
     return list(zip(*columns, strict=True))

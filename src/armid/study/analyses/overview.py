@@ -4,7 +4,7 @@ Also the last table of every report: what was run, and why runs stopped.
 """
 
 import numpy as np
-from pandas import DataFrame
+from pandas import DataFrame, Series, factorize
 
 from armid.report.document import Column, Table
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VARIANT, Analysis, Evidence
@@ -59,19 +59,17 @@ def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Tab
     names = list(dict.fromkeys(estimates["parameter"]))
     rows = [paper_row(published, names)] if len(published) else []
     by = ["setting", "variant"]
-    groups = estimates.groupby([*by, "parameter"], sort=False)["relative_error"].agg(["mean", "median"])
+    of_each = estimates.groupby([*by, "parameter"], sort=False)["relative_error"].agg(["mean", "median"])
     for key, group in runs.groupby(by, sort=False):
         failed = int((group["status"] != "done").sum())
         row: dict[str, object] = {**dict(zip(by, key, strict=True)), "n": len(group), "n_failed_runs": failed}
         row |= {"used": group["used"].median()} | tail(group["largest_error"].to_numpy())
         for name in names:
-            there = (*key, name) in groups.index
-            both = groups.loc[(*key, name)] if there else {"mean": np.nan, "median": np.nan}
+            both = of_each.loc[(*key, name)] if (*key, name) in of_each.index else {"mean": np.nan, "median": np.nan}
             row |= {f"{name}_mean": both["mean"], f"{name}_median": both["median"]}
         rows.append(row)
-    frame = DataFrame(rows)
-    place = {setting: i for i, setting in enumerate(dict.fromkeys(frame["setting"]))}
-    frame = frame.sort_values("setting", key=lambda s: s.map(place), kind="stable")
+    # rows of a setting stand together, settings in the order of their first row
+    frame = DataFrame(rows).sort_values("setting", key=lambda s: Series(factorize(s)[0], s.index), kind="stable")
     columns = [Column("used", "simulations", ",.0f")]
     columns += [Column(f"largest_{key}", f"largest {text}", ".3g", 100.0)
                 for key, text in (("median", "median"), ("worst", "worst"), ("p95", "95 %"))]  # fmt: skip
@@ -89,14 +87,8 @@ def tail(errors: np.ndarray) -> dict[str, float]:
 
 def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
     errors = published.pivot(index="case", columns="parameter", values="relative_error")
-    largest = errors.max(axis=1).to_numpy()
-    row: dict[str, object] = {
-        "setting": "",
-        "variant": PAPER,
-        "n": len(errors),
-        "n_failed_runs": 0,
-        "used": np.nan,
-    } | tail(largest)
+    row: dict[str, object] = {"setting": "", "variant": PAPER, "n": len(errors), "n_failed_runs": 0, "used": np.nan}
+    row |= tail(errors.max(axis=1).to_numpy())
     for name in names:
         if name in errors:
             row |= {f"{name}_mean": errors[name].mean(), f"{name}_median": errors[name].median()}

@@ -1,6 +1,7 @@
 """Ranks over cases: Friedman's test, Wilcoxon's signed-rank test for each pair with Holm's correction, effect sizes."""
 
 import warnings
+from bisect import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -160,11 +161,7 @@ def a12(first: ArrayLike, second: ArrayLike) -> float:
 
 def size_in_words(value: float) -> str:
     """Return how large the effect is: negligible, small, medium, large (Vargha and Delaney's 0.56, 0.64, 0.71)."""
-    distance = abs(value - 0.5)
-    for limit, word in ((0.06, "negligible"), (0.14, "small"), (0.21, "medium")):
-        if distance < limit:
-            return word
-    return "large"
+    return ("negligible", "small", "medium", "large")[bisect((0.06, 0.14, 0.21), abs(value - 0.5))]
 
 
 def mean_ranks(tests: RankTests, setting: str, name: str) -> Table:
@@ -251,13 +248,6 @@ def final_values(evidence: Evidence, setting: str) -> DataFrame:
 
 
 def class_ranks(evidence: Evidence) -> Table:
-    frame = class_frame(evidence)
-    columns = (BUDGET, VARIANT, Column("n", "cases", ".0f"), Column("text", "mean rank"),
-               Column("first", "first", ".0f"), *(Column(c, c, ".2f") for c in CLASSES if c in frame))  # fmt: skip
-    return Table("by_class", "Ranks by class of difficulty", CLASS_CAPTION, frame, columns, grouped=True)
-
-
-def class_frame(evidence: Evidence) -> DataFrame:
     problem_of, class_of = ({c["name"]: c[key] for c in evidence.study["cases"]} for key in ("suite", "difficulty"))
     there, rows = [name for name in CLASSES if name in class_of.values()], []
     for setting in evidence.settings:
@@ -274,7 +264,10 @@ def class_frame(evidence: Evidence) -> DataFrame:
             text = f"{mean:.2f} ({low:.2f} to {high:.2f})"
             rows.append((setting, variant, len(ranks), mean, low, high, text, n_first, *classes[variant]))
     names = ["setting", "variant", "n", "rank", "low", "high", "text", "first", *there]
-    return DataFrame(rows, columns=names)
+    columns = (BUDGET, VARIANT, Column("n", "cases", ".0f"), Column("text", "mean rank"),
+               Column("first", "first", ".0f"), *(Column(c, c, ".2f") for c in there))  # fmt: skip
+    return Table("by_class", "Ranks by class of difficulty", CLASS_CAPTION, DataFrame(rows, columns=names), columns,
+                 grouped=True)  # fmt: skip
 
 
 PROBLEMS_CAPTION = (
@@ -306,13 +299,6 @@ SWARM_CAPTION = (
 
 
 def swarm_pairs(evidence: Evidence) -> Table:
-    columns = (BUDGET, Column("swarm", "swarm"), Column("variant", "against"), Column("ratio", "ratio", ".3g"),
-               Column("p", "p, Holm", ".2g"))  # fmt: skip
-    title = "The paper's swarm against the others"
-    return Table("swarm", title, SWARM_CAPTION, swarm_frame(evidence), columns, grouped=True)
-
-
-def swarm_frame(evidence: Evidence) -> DataFrame:
     from statsmodels.stats.multitest import multipletests
 
     problem_of, rows = {c["name"]: c["suite"] for c in evidence.study["cases"]}, []
@@ -328,13 +314,16 @@ def swarm_frame(evidence: Evidence) -> DataFrame:
         p = [signed_rank(means[swarm].to_numpy(), means[other].to_numpy()) for other in others]
         corrected = multipletests(p, method="holm")[1]
         rows += [(setting, swarm, *line) for line in zip(others, ratios, corrected, strict=True)]
-    return DataFrame(rows, columns=["setting", "swarm", "variant", "ratio", "p"])
+    columns = (BUDGET, Column("swarm", "swarm"), Column("variant", "against"), Column("ratio", "ratio", ".3g"),
+               Column("p", "p, Holm", ".2g"))  # fmt: skip
+    frame = DataFrame(rows, columns=[column.key for column in columns])
+    return Table("swarm", "The paper's swarm against the others", SWARM_CAPTION, frame, columns, grouped=True)
 
 
 def suite_answer(evidence: Evidence) -> tuple[str, ...]:
     """Return who is best at each budget, where the paper's swarm wins and loses, and whether the suite is too easy."""
-    ranks, pairs, said = class_frame(evidence), swarm_frame(evidence), []
-    classes, winners = [name for name in CLASSES if name in ranks], set()
+    ranks, pairs = DataFrame(class_ranks(evidence).frame), DataFrame(swarm_pairs(evidence).frame)
+    said, winners, classes = [], set(), [name for name in CLASSES if name in ranks]
     for setting, own in ranks.groupby("setting", sort=False):
         for name in classes:
             winners |= set(own.loc[own[name] <= own[name].min(), "variant"])

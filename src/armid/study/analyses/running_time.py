@@ -16,7 +16,7 @@ from armid.study.analyses.analysis import N_RUNS, SETTING, TARGETS, VARIANT, Ana
 from armid.study.analyses.success import TOLERANCES
 
 Array = NDArray[np.floating[Any]]
-# Said of both targets, see best_fitness.py too.
+# Said of both targets.
 CAPTION = (
     "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
     "runs that hit it), over all cases and seeds; inf where no run hits it. In brackets the share of runs that hit. "

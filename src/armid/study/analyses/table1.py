@@ -10,7 +10,7 @@ from pandas import DataFrame
 from armid.report.document import Column, Figure, Part, Table, Text, slug, unlike
 from armid.report.style import COLOURS, legend_below, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence
-from armid.units import SHOWN
+from armid.units import shown
 
 MEAN_ROW = "mean of the rows"
 AVERAGED = ["published_error", "error_of_median", "median_error", "mean_error"]
@@ -94,7 +94,7 @@ def one_row(group: DataFrame) -> dict[str, object]:
     truth, published, published_error = group[["truth", "published", "published_error"]].to_numpy(float)[0]
     middle = float(group["value"].median())
     low, high = median_interval(errors)
-    unit, factor = SHOWN.get(group["unit"].iloc[0], (group["unit"].iloc[0], 1.0))
+    factor, unit = shown(1.0, group["unit"].iloc[0])
     return {
         "unit": unit, "n": len(group), "truth": factor * truth, "published": factor * published,
         "median": factor * middle, "published_error": published_error,

@@ -10,7 +10,7 @@ from pandas import DataFrame
 from armid.report.document import Column, Figure, Part, Table
 from armid.report.style import COLOURS, MARKERS, legend_below, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, VARIANT, Analysis, Evidence
-from armid.units import SHOWN
+from armid.units import shown
 
 COLUMNS = (
     Column("setting", "noise, window"), VARIANT, PARAMETER,
@@ -59,9 +59,8 @@ def table2(estimates: DataFrame, published: DataFrame) -> Table:
     keys = ["setting", "variant", "parameter"]
     rows += [dict(zip(keys, k, strict=True)) | one_row(g) for k, g in estimates.groupby(keys, sort=False)]
     frame = DataFrame(rows)
-    factor = frame["parameter"].map(lambda p: SHOWN.get(units[p], ("", 1.0))[1])
-    shown = {key: frame[key] * factor for key in IN_UNIT}
-    frame = frame.assign(**shown, unit=frame["parameter"].map(lambda p: SHOWN.get(units[p], (units[p], 1.0))[0]))
+    factors, names = zip(*(shown(1.0, units[p]) for p in frame["parameter"]), strict=True)
+    frame = frame.assign(**{key: frame[key] * list(factors) for key in IN_UNIT}, unit=names)
     return Table("table2", "Table II beside ours", TABLE_CAPTION, frame[[c.key for c in COLUMNS]], COLUMNS)
 
 
@@ -121,7 +120,7 @@ def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
     figure, axes = panels(len(names), 2, 6.8, 1.6 + 0.5 * (len(groups) + 1))
     for i, (axis, name) in enumerate(zip(axes, names, strict=True)):
         own = estimates[estimates["parameter"] == name]
-        unit, factor = SHOWN.get(own["unit"].iloc[0], (own["unit"].iloc[0], 1.0))
+        factor, unit = shown(1.0, own["unit"].iloc[0])
         paper = factor * published.loc[published["parameter"] == name, "published"].to_numpy(float)
         axis.plot(paper, np.zeros(paper.size), "D", color="black", ms=5)
         for j, (variant, setting) in enumerate(groups):
