@@ -330,7 +330,10 @@ def test_times_in_ms_are_noticed_whatever_the_model_makes_of_them(write_axis, tm
     (folder / "move.csv").write_text("\n".join([rows[0], *(f"{1e3 * float(t)!r},{rest}" for t, _, rest in split), ""]))
     read = read_campaign(folder)
     (found,) = (s for s in screen(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "time")
-    assert found.sentence.startswith("move.csv: its samples are 5 s apart, which looks like times in ms: seconds")
+    # A rough fit that happens to follow the motion tells it of all records, with the errors on either side.
+    assert re.match(r"(move\.csv: its samples are 5 s apart, which looks like times in ms: seconds"
+                    r"|every train record: time_s looks like milliseconds: in seconds the error falls )",
+                    found.sentence), found  # fmt: skip
 
 
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
