@@ -26,7 +26,6 @@ from armid.engine.calibrate import difference
 from armid.errors import ArmidError
 from armid.model import PLANTS, Effect, Manoeuvre, Model, Plant
 from armid.model.effect import Equation
-from armid.model.plant import SPEEDS
 
 Array = NDArray[np.float64]
 # Shares of the size of an output: at null, and against scipy.
@@ -55,10 +54,9 @@ def plant_declared(model: Model) -> list[ContractPoint]:
     asked = {key for node in graph.nodes.values() for key in node.needs}
     idle = [g.name for g in plant.guards if graph.is_static(f"guard__{g.name}") or (g.latch and g.name not in asked)]
     return [
-        ContractPoint("binds", True, f"{len(model.parameters)} parameters, {len(model.states)} states; ports: {ports}"),
+        ContractPoint("binds", True, f"{len(model.parameters)} parameters, {len(model.states)} states; records "
+                                     f"{units_of(plant)}; ports: {ports}"),
         *check_parameters(plant.parameters),
-        ContractPoint("unit", not plant.records_one_speed or plant.output_unit in SPEEDS,
-                      f"records {units_of(plant)}; {' or '.join(SPEEDS)} without `outputs`"),
         ContractPoint("printed", all(o.signal in str(model) for o in plant.outputs),
                       "print(model) shows its equations"),
         finding("guards", idle, "nothing depends on guard {}, or it never moves",

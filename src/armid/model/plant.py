@@ -169,7 +169,7 @@ SPEEDS = {
 }
 
 
-def speed_output(signal: str, unit: str) -> Output:
+def sole_output(signal: str, unit: str) -> Output:
     """Return the output that `output` and `output_unit` of a plant declare."""
     name, columns = SPEEDS.get(unit, (signal, ()))
     return Output(name, signal, unit, columns)
@@ -194,8 +194,8 @@ class Plant:
     guards: where the equations have a kink or switch; without one at a limit or a step of theirs the engine is slower
         and less accurate there.
     keys: further keys of a record in campaign.toml that set constants.
-    outputs: the signals that are recorded; a record brings any of them. Where it is one speed, `output` (the state or
-        quantity) and `output_unit` ("rad/s" or "m/s") say it as well; else these are those of the first output.
+    outputs: the signals that are recorded; a record brings any of them. Where it is one, `output` (the state or
+        quantity) and `output_unit` say it as well; else these are those of the first output.
     aliases: further names for states and quantities, so that effects can be written once for many plants: ours ask for
         `omega` (speed), `theta` (position), `drive_effort` and `load_effort` (what drives, what it works against).
     from_rest: True when a record starts at t = 0 from the declared initial state; False when it starts at its first
@@ -257,7 +257,7 @@ class Plant:
         first = self.outputs[0] if self.outputs else None
         if self.output and (first is None or self.records_one_speed):
             # a copy with another unit brings the outputs of the plant that it was made from
-            first = speed_output(self.output, self.output_unit)
+            first = sole_output(self.output, self.output_unit)
             object.__setattr__(self, "outputs", (first,))
         names = [o.name for o in self.outputs]
         if first is None or len(set(names)) < len(names):
@@ -272,8 +272,9 @@ class Plant:
 
     @property
     def records_one_speed(self) -> bool:
-        """Tell whether `output` and `output_unit` alone would declare the same."""
-        return len(self.outputs) == 1 and self.outputs[0] == speed_output(self.outputs[0].signal, self.outputs[0].unit)
+        """Tell whether it is one speed that `output` and `output_unit` alone would declare."""
+        first = self.outputs[0]
+        return len(self.outputs) == 1 and first.unit in SPEEDS and first == sole_output(first.signal, first.unit)
 
     @property
     def start_constants(self) -> dict[str, str]:
