@@ -1,6 +1,7 @@
 """Mistakes in campaigns of machines with other outputs are named, right campaigns are not accused."""
 
 import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,7 +9,10 @@ import pytest
 from made_machines import write_arm, write_axis, write_link
 from test_screen import accusations, change, header, pendulum, said_of
 
-from armid.record import write_table
+from armid.estimation.screen import screen
+from armid.model import PLANTS, Model
+from armid.problem.space import space_of
+from armid.record import read_campaign, write_table
 from armid.record.table import read_table
 
 FILES = ("a.csv", "b.csv", "c.csv")
@@ -142,3 +146,18 @@ def test_a_mistake_is_named(name, tmp_path):
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_campaign_is_not_accused(name, tmp_path):
     assert accusations(said_of(RIGHT[name](tmp_path / "campaign"))) == []
+
+
+@pytest.mark.parametrize("begins", [0.1, 0.3])
+def test_records_that_all_begin_elsewhere_than_the_model_are_told(tmp_path, begins):
+    """The records begin at 0.1 rad, which a plant that starts where it is declared to be may know or not."""
+    folder = write_arm(tmp_path / "campaign")
+    starts = tuple(replace(c, value=begins) if c.name == "start_angle" else c for c in PLANTS["rotary_arm"].constants)
+    plant = replace(PLANTS["rotary_arm"], constants=starts, from_rest=True)
+    read = read_campaign(folder, {"rotary_arm": plant})
+    said = [s.sentence for s in screen(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "start"]
+    if begins == 0.1:
+        assert said == []
+    else:
+        (sentence,) = said
+        assert re.match(r"angle: every train record begins -11\.\d to -11\.\d deg away from where rotary_arm", sentence)

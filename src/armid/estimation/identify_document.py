@@ -262,7 +262,7 @@ def fit_section(details: Mapping[str, Any], unit: str) -> Section:
         for i, r in enumerate(details["records"])
     )  # fmt: skip
     text = (
-        "Measured and simulated speed, the residual (measured minus simulated) below. Of long records the least and "
+        "Measured and simulated, the residual (measured minus simulated) below. Of long records the least and "
         "the largest sample of each short interval are drawn. "
     )
     gallery = Gallery(figures, name="fit")

@@ -45,8 +45,8 @@ class Suspicion:
     """One mistake that the records seem to contain.
 
     kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "angle" (of a key), "input",
-    "bounds", "position", "noise", "rest", "twice", "unlike" or "unjudged" (no mistake was found, and the model misses
-    most of a record). record: file, "" for every train record; other: the second of two files.
+    "bounds", "position", "noise", "rest", "twice", "start", "unlike" or "unjudged" (no mistake was found, and the
+    model misses most of a record). record: file, "" for every train record; other: the second of two files.
     factor: what the signal or the times are to be multiplied by, for "late" the seconds, for "zero" what is to be added
     [rad], else NaN. before, after: rms error over rms of the signal, as declared and with the mistake undone.
     """

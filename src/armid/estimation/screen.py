@@ -22,6 +22,7 @@ from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
 from armid.record.noise import correlation_sum
 from armid.record.table import POSITIONS
+from armid.units import shown
 
 Array = NDArray[np.float64]
 # An error (rms over the rms of the signal) up to this is the business of missing effects, not of this screen.
@@ -52,6 +53,9 @@ LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 SUBSTEPS, TOLERANCE = 4, 1e-3
 # Samples of a motion that a motor drives are not further apart [s].
 LONGEST_INTERVAL = 1.0
+# A record begins elsewhere than the model where each of so many first samples is more than so many times the noise, and
+# than this share of the motion, away.
+FIRST, ELSEWHERE, FAR_OF_MOTION = 3, 10.0, 0.02
 # Successive samples, of so many values, that two recordings do not have in common by chance.
 ALIKE, DIFFERENT = 40, 10
 # Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is no rest.
@@ -82,6 +86,7 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
         worst = int(np.argmax(errors))
         if not found and LEFT < errors[worst] < np.inf:
             found = [beyond(train[worst].file, float(errors[worst]))]
+    found += () if found else begun_elsewhere(trial, train, z)
     told = {s.record for s in found if s.kind == "time"}
     return (*seen, *(s for s in times if not told & {"", s.record}), *found)
 
@@ -405,6 +410,26 @@ def every(record: Record, step: int, plant: Plant) -> Record:
     others = tuple(every(one, step, plant) for one in record.others)
     return replace(record, manoeuvre=rarer(record.manoeuvre), measured=record.measured[::step], pieces=(kept,),
                    others=others)  # fmt: skip
+
+
+def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator[Suspicion]:
+    """Yield the angles or positions that in every record begin away from the declared start of the model."""
+    plant = trial.model.plant
+    away: dict[str, list[tuple[float, str]]] = {}
+    for record in train:
+        for one, simulated in zip(record.each, trial.signals(record, z[np.newaxis]), strict=True):
+            off, piece = one.measured[:FIRST] - simulated[0][:FIRST], one.pieces[0]
+            least = max(ELSEWHERE * one.noise.rms, FAR_OF_MOTION * float(np.ptp(one.measured)))
+            known = one.unit in ("rad", "m") and not piece.window.start and not piece.start_deviation
+            if known and abs(np.sign(off).sum()) == off.size and float(np.min(np.abs(off))) > least:
+                away.setdefault(one.output, []).append(shown(float(np.mean(off)), one.unit))
+    for output, sizes in away.items():
+        if len(sizes) == len(train):
+            yield Suspicion("start", "", f"{output or plant.outputs[0].name}: every train record begins "
+                            f"{min(sizes)[0]:.3g} to {max(sizes)[0]:.3g} {sizes[0][1]} away from where {plant.name} "
+                            "starts: another start under [constants], a plant that takes it from the record "
+                            "(from_rest = False, start_position), or another zero of the sensor, is expected."
+                            )  # fmt: skip
 
 
 def noise_or_rest(record: Record) -> Iterator[Suspicion]:

@@ -408,9 +408,11 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
 
     def judged(run: Simulation, finer: Simulation) -> tuple[float, bool, bool]:
         """Return the error of a simulation, whether the noise hides it, and whether it is accurate enough."""
-        error = difference(run, finer, model) * 16 / 15
+        # Steps with which nothing is simulated have no error to be judged by.
+        error = np.inf if finer.failed.all() else difference(run, finer, model) * 16 / 15
         is_hidden = rms is not None and bool((rms_difference(run, finer) * 16 / 15 <= MARGIN * rms).all())
-        good = (error <= MARGIN * allowed or is_hidden) and not (run.failed & ~finer.failed).any()
+        good = (error <= MARGIN * allowed or is_hidden) and not finer.failed.all()
+        good = good and not (run.failed & ~finer.failed).any()
         return error, is_hidden, good
 
     runs = {n: simulate(model, manoeuvre, spread, Schedule(n)) for n in SUBSTEPS[:2]}

@@ -12,6 +12,7 @@ from armid.estimation.advice import Advice, Rival, advise
 from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import Estimates, with_fitted_starts
+from armid.estimation.mends import Suspicion
 from armid.estimation.screen import screen
 from armid.loop.candidates import (
     CONSTANT,
@@ -76,6 +77,8 @@ from armid.record import Campaign, Record
 MOST_ADVICE, MOST_RIVALS = 5, 4
 # Models of each size whose predictions are compared before a name is claimed.
 MOST_COMPARED = 4
+# Models of a size beside which a fault of one record is looked for, the best first.
+MOST_FAULTY = 4
 # Held-out records deny an addition with which their error is so many times that before, and that of the noise.
 DENIED, OVER_NOISE = 1.02, 1.1
 # Mistakes of the screen of records that leave nothing to search for.
@@ -147,8 +150,9 @@ def close_loop(
         return with_starts_fitted(library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {},
                                              threads, told, within))  # fmt: skip
 
-    implausible = implausible_records(model, campaign, bounds or {}, fixed or {})
-    found, suspects, train = settled(library_for, campaign.train, bool(implausible))
+    screened = screened_train(model, campaign, bounds or {}, fixed or {})
+    implausible = any(s.kind in GROSS for s in screened)
+    found, suspects, train = settled(library_for, campaign.train, implausible)
     found = with_curve(found) if curve and not implausible else found
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
@@ -179,21 +183,20 @@ def close_loop(
     named = next(f for f in reversed(found.path) if not any(k.is_empirical for k in f.active))
     together = known_together(named, library)
     steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
-    said = (*implausible, *next_steps_of(found, suspects))
+    said = (*(s.sentence for s in screened if s.kind in (*GROSS, "start")), *next_steps_of(found, suspects))
     return ClosedLoop(there, noise, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
                       () if withdrawn else found.rivals, advice, said, together, tuple(suspects), every, library,
                       search, found.missing, term)  # fmt: skip
 
 
-def implausible_records(
+def screened_train(
     model: Model, campaign: Campaign, bounds: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
-) -> list[str]:
-    """Return the mistakes in the train records (sign, unit, clock, angles, exchanged files) behind a gross misfit."""
+) -> tuple[Suspicion, ...]:
+    """Return the mistakes in the train records; the gross ones (sign, unit, clock, exchanged files) end a search."""
     train, own = replace(campaign, records=campaign.train), model.parameters
     space = space_of(model, campaign.parameters, {n: b for n, b in bounds.items() if n in own},
                      {n: v for n, v in fixed.items() if n in own})  # fmt: skip
-    found = screen(train, model, space)
-    return [s.sentence for s in found if s.kind in GROSS]
+    return screen(train, model, space)
 
 
 def settled(
@@ -201,8 +204,9 @@ def settled(
 ) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
     """Suspect the records, then decide; return what was decided, who is suspected, and the train records as taken.
 
-    A fault of one record that leaves noise is undone, unless one effect or constants do clearly better on all records;
-    where several faults of it do as well, the record is left out. So it is beside effects that were found already.
+    A fault of one record that leaves noise, or next to nothing of what was more, is undone, unless one effect or
+    constants do clearly better on all records; where several faults of it do as well, the record is left out. So it is
+    beside effects that were found already.
     A trend from record to record that leaves noise is undone where it does clearly better than any of these.
     Where nothing does and all but one record agree, that one is left out. Nothing is looked for in implausible records.
     """
@@ -217,7 +221,7 @@ def settled(
         # Of constants and effects only those count that come down to this.
         limit = max([*(m.chi2 for m in mended[:1]), *(t.chi2 for t in trends[:1])]) + WITHIN
         constants = constant_models(declared, declared.products(library.tolerances), library, limit)
-        single = search.further(SearchLevel((declared,)), limit)
+        single = search.further(SearchLevel((declared,)), limit, not any(is_significant(m.fit) for m in mended[:1]))
         least = min([*(m.chi2 for m in constants), *([single.chi2] if single is not None else [])], default=np.inf)
         if trends and trends[0].chi2 + WITHIN < min([least, *(m.chi2 for m in mended)]):
             return decided_without_trend(library_for, trends, library, train)
@@ -227,8 +231,10 @@ def settled(
 
     def is_faulty(level: SearchLevel) -> bool:
         """Tell whether a fault of one record explains what is left, and no effect more does clearly better."""
-        found = mended_records(level.best, search.library) if is_significant(level.best) else []
-        rival = search.further(level, found[0].chi2 + WITHIN) if found else None
+        # It may be the fault that makes another model than the true one the best.
+        asked = (mended_records(f, search.library) for f in level.fits[:MOST_FAULTY] if is_significant(level.best))
+        found: list[Mended] = next(filter(None, asked), [])
+        rival = search.further(level, found[0].chi2 + WITHIN, not is_significant(found[0].fit)) if found else None
         if found and (rival is None or found[0].chi2 < rival.chi2 + WITHIN):
             faults.extend(found)
         return bool(faults)

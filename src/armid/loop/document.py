@@ -218,7 +218,8 @@ def log_table(log: list[Mapping[str, Any]]) -> Table:
 def parameter_table(report: Mapping[str, Any]) -> Table:
     before, after = report["parameters"]["before"], report["parameters"]["after"]
     rows = [(name, held_text(p), "yes" if p["trusted"] else "fixed or not determined" if p["low"] is None else "no",
-             held_text(before[name]) if name in before else "") for name, p in after.items()]  # fmt: skip
+             held_text(before[name]) if name in before else "") for name, p in after.items()
+            if p["low"] is not None or not name.startswith(SHOWN_AS)]  # fmt: skip
     note = (
         "Values with 95 % intervals; struck (~ ~) where the interval does not hold: more than noise "
         "remains, or a bound holds it."
@@ -239,7 +240,7 @@ def residual_section(details: Mapping[str, Any], unit: str, errors: tuple[Part, 
         title = f"{record['file']} ({record['role']}), RMSE {was} to {now} {shown(0.0, own)[1]}"
         figures.append(Figure(f"r{i}", title, "", partial(record_figure, record, own)))
     text = (
-        "Measured minus simulated speed; the grey band is two standard deviations of the noise. Slide to one end to "
+        "Measured minus simulated; the grey band is two standard deviations of the noise. Slide to one end to "
         "see one model alone. Of long records the least and the largest sample of each short interval are drawn. "
     )
     gallery = Gallery(tuple(figures), "Measured minus simulated", "residuals")

@@ -205,7 +205,14 @@ def with_standard_accuracy(fit: Fit) -> Fit:
         return fit
     # the pieces are those of the fit, whose constants may be others than the record's
     pairs = zip(records.replays, standard, strict=True)
-    replays = tuple(replace(ours, calibrations=finer.calibrations) for ours, finer in pairs)
+    # nor coarser than what the fit was made with
+    replays = tuple(
+        replace(ours, calibrations=tuple(
+            max(both, key=lambda c: c.schedule.substeps)
+            for both in zip(theirs.calibrations, ours.calibrations, strict=True)
+        ))
+        for ours, theirs in pairs
+    )  # fmt: skip
     return replace(fit_from(replace(records, replays=replays), fit.active, [fit.z]), constants=fit.constants)
 
 

@@ -106,12 +106,15 @@ class Search:
             self.fits[frozenset()] = accurate(fit_globally(self.library.problem(()), ()), self.library)
         return self.fits[frozenset()]
 
-    def further(self, level: SearchLevel, limit: float) -> Fit | None:
-        """Return the best model with one effect more, if it earns it and leaves noise, and chi2 is below a limit."""
+    def further(self, level: SearchLevel, limit: float, to_noise: bool = True) -> Fit | None:
+        """Return the best model with one effect more, if it earns it, chi2 is below a limit, and noise is left.
+
+        to_noise: whether it must leave noise.
+        """
         library = self.library.about(level.best.records.replays, level.best.misfit)
         beside = replace(self, library=library, fits=dict(self.fits), rounds=[], limit=limit)
         found = beside.next_level(level, level.best)
-        if found is None or not found.earned or found.best.chi2 > limit or is_significant(found.best):
+        if found is None or not found.earned or found.best.chi2 > limit or (to_noise and is_significant(found.best)):
             return None
         return found.best
 

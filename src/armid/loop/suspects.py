@@ -41,7 +41,7 @@ DISAGREE = 0.5
 SHARE = 0.2
 # A fault that moves the record by less than this many times its noise accuses nobody.
 MOVES = 0.7
-# Of held-out records a fault is told that leaves noise, or so little of what was more than noise.
+# A fault is told that leaves noise, or so little of what was more than noise.
 LEFT = 0.01
 # Samples on either side from which one between them is made.
 REACH = 32
@@ -308,9 +308,10 @@ def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: flo
 
 
 def mended_records(declared: Fit, library: Library) -> list[Mended]:
-    """Return a model with one fault of one record undone, those that leave noise, the best fit first.
+    """Return a model with one fault of one record undone, the best fit first.
 
-    declared: the model, with effects or without.
+    Those that leave noise, or next to nothing of what was more than noise: a friction whose form is not quite that of
+    the library does not hide a late record. declared: the model, with effects or without.
     """
     base, n = declared.records, len(declared.residual)
     if len(base.replays) < 2:
@@ -331,7 +332,8 @@ def mended_records(declared: Fit, library: Library) -> list[Mended]:
     library.say("asking whether one record disagrees with the others")
     found = library.each(lambda t: unless_diverged(lambda: mended(declared, *t[1:])),
                          [*sized, *(t for t in tried if t[0] == np.inf)])  # fmt: skip
-    good = [m for m in found if m is not None and not is_significant(m.fit)]
+    few = n + LEFT * (declared.chi2 - n)
+    good = [m for m in found if m is not None and (m.chi2 < few or not is_significant(m.fit))]
     return sorted(good, key=lambda m: m.chi2)
 
 
@@ -368,7 +370,7 @@ def mended(declared: Fit, index: int, fault: Fault) -> Mended:
         raise ArmidError(f"{record.file}: a fault that is lost in the noise is none")
     # Samples that nobody measured must not speak for the fault.
     lost = len(of_file(base, index)) * sum(fault.lost(record, value))
-    return Mended(fit, index, fault, value, square**-0.5, fit.chi2 + (value / largest) ** 2 + lost)
+    return Mended(fit, index, fault, value, fit.misfit * square**-0.5, fit.chi2 + (value / largest) ** 2 + lost)
 
 
 def moved_by(base: WhiteRecords, index: int, z: Array, fault: Fault, value: float) -> float:
