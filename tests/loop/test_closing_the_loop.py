@@ -18,7 +18,7 @@ from armid.record.campaign import tolerances_of
 pytestmark = pytest.mark.slow
 KEYS = ["campaign", "plant", "unit", "noise_rms", "noise_rms_holdout", "outputs", "verdict", "also", "effects", "error",
         "error_all_records", "suspects", "parameters", "steps", "withdrawn", "advice", "next_steps",
-        "known_together", "log"]  # fmt: skip
+        "known_together", "taken_as_exact", "log"]  # fmt: skip
 ENTRY = ["value", "unit", "low", "high", "trusted", "interval_holds", "given_low", "given_high",
          "trusted_given_constants"]  # fmt: skip
 STEP = ["effect", "port", "alternatives", "empirical", "claimed", "constants", "error", "parameters"]

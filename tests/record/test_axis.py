@@ -52,6 +52,12 @@ def test_scales_come_from_train_records_only(write, axis_columns):
     assert driven_axis.scales.effort == 1.0
 
 
+@pytest.mark.parametrize(("told", "exact"), [("", ("gain",)), ("[tolerances]\ngain = 0", ()),
+                                             ("[tolerances]\ndefault = 0.02", ())])  # fmt: skip
+def test_a_constant_whose_tolerance_nobody_told_is_taken_as_exact(write_axis, told, exact):
+    assert read_campaign(write_axis(toml=AXIS.format(f"[constants]\ngain = 35.0\n{told}"))).taken_as_exact == exact
+
+
 def test_a_pendulum_without_drive_takes_its_scale_from_gravity(write_axis, axis_columns):
     toml = AXIS.format("[constants]\ngravity_moment = 1.5")
     campaign = read_campaign(write_axis(toml=toml, columns={**axis_columns, "drive_V": axis_columns["drive_V"] * 0}))

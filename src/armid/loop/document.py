@@ -61,7 +61,7 @@ from armid.units import SHOWN, shown
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
 # A shift of a parameter by more than this share of its value, and of its interval, is told.
 SHIFTED = 0.01
-MOST_TOLD, MOST_PORTS = 3, 5
+MOST_TOLD, MOST_PORTS, MOST_EXACT = 3, 5, 5
 # A manoeuvre that separates rivals with a smaller chance is no advice.
 HOPELESS = 0.2
 # Smaller chances than this are all the same.
@@ -165,7 +165,10 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     found = report["parameters"]["after"]
     sure = [f"{name} = {value_text(p)}" for name, p in found.items() if p["trusted"]]
     unsure = [name for name, p in found.items() if p["low"] is not None and not p["trusted"]]
-    said = [f"To be trusted: {', '.join(sure)}."] if sure else []
+    exact = report.get("taken_as_exact", [])
+    names = ", ".join(exact[:MOST_EXACT]) + (f" and {len(exact) - MOST_EXACT} more" if exact[MOST_EXACT:] else "")
+    given = f", with {names} taken as exact (no tolerance is told)" if exact else ""
+    said = [f"To be trusted{given}: {', '.join(sure)}."] if sure else []
     also = [VERDICTS.get(word, word).lower() for word in report.get("also", ())]
     first += f" Also: {', '.join(also)}." if also else ""
     said += details.get("doubts") or ([f"Not to be trusted: {', '.join(unsure)}."] if unsure else [])

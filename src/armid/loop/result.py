@@ -330,6 +330,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
         ],
         "next_steps": list(found.next_steps),
         "known_together": list(found.known_together),
+        "taken_as_exact": list(found.campaign.taken_as_exact),
         "log": [
             {
                 "n_effects": r.n_effects, "n_tried": r.n_tried, "refused": r.refused,

@@ -44,6 +44,7 @@ class Campaign(Shown):
     declared beforehand. parameters: qualified name -> Override. constants: those of the campaign, SI; each record's
     manoeuvre holds all that apply to it. gyro_range: [rad/s], None when not given. tolerances: constant -> relative
     half-range within which it is known. rough: those of a tenth or more, with parameters of the plant that are fixed.
+    taken_as_exact: constants of which neither the plant nor the campaign says how well they are known.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Campaign(Shown):
     unmeasured: tuple[Output, ...] = ()
     tolerances: Mapping[str, float] = field(default_factory=dict)
     rough: Mapping[str, float] = field(default_factory=dict)
+    taken_as_exact: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
@@ -190,8 +192,10 @@ def read_campaign(
         gyro_range=gyro_range,
         tolerances={name: t for name, t in tolerances.items() if name not in fixed and values[name]},
         rough={name: t for name, t in tolerances.items() if t >= ROUGH and values[name]},
+        taken_as_exact=tuple(c.name for c in plant.constants if c.tolerance is None and values[c.name]
+                             and not {c.name, DEFAULT} & {*sheet.tolerances, *set_by_records(plant)}),
         unmeasured=tuple(o for o in whole.outputs if o.name not in recorded),
-    )
+    )  # fmt: skip
 
 
 def write_campaign(
@@ -293,12 +297,15 @@ def tolerances_of(
     for name in told:
         if name not in declared and name != DEFAULT:
             raise unknown_name("constant", name, [*declared, DEFAULT], f"{where}, tolerances")
-    of_records = {*plant.start_constants.values(), *(key.constant for key in plant.keys)}
-    found = {}
+    of_records, found = set_by_records(plant), {}
     for name, usual in declared.items():
         otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT, usual or 0.0)
         found[name] = told.get(name, otherwise)
     return {name: tolerance for name, tolerance in found.items() if tolerance > 0.0}
+
+
+def set_by_records(plant: Plant) -> set[str]:
+    return {*plant.start_constants.values(), *(key.constant for key in plant.keys)}
 
 
 def largest_speed(record: Record) -> float:
