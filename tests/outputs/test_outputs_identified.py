@@ -14,7 +14,8 @@ from armid.problem.fitness import FITNESS, fitness_of_name
 from armid.problem.problem import IdentificationProblem, replays, signals_of
 from armid.problem.space import space_of
 from armid.problem.starts import with_starts
-from armid.record import read_campaign
+from armid.record import read_campaign, write_table
+from armid.record.table import read_table
 
 WHOLE = np.array(list(TRUTH.values()))
 
@@ -54,6 +55,19 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     assert np.linalg.norm(near) == pytest.approx(
         np.linalg.norm(own.measured - own.signal(other[np.newaxis])[0]), rel=0.01
     )
+
+
+def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path) -> None:
+    folder = write_drive(tmp_path / "c")
+    columns = dict(read_table(folder / "b.csv", "b.csv").columns)
+    columns["load_angle_deg"][60:260] = columns["load_angle_deg"][60]
+    write_table(folder / "b.csv", columns)
+    read = read_campaign(folder, {"two_inertias": two_inertias})
+    model = Model(read.plant)
+    found = with_starts(replays(read.train, model, space_of(model)), WHOLE)[3]
+    assert found.pieces[0].manoeuvre.constants["start_load"] == pytest.approx(0.25, abs=0.03)
+    residual = (found.measured - found.signal(WHOLE[np.newaxis])[0])[260:]
+    assert np.sqrt(np.mean(residual**2)) == pytest.approx(NOISE_ANGLE, rel=0.1)
 
 
 @pytest.mark.parametrize("fitness", ["rmse", "likelihood", "rmse:load_angle"])

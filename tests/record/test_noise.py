@@ -32,6 +32,16 @@ def test_short_white_rest_stays_white(rng):
     assert noise_of(alternating, MOTION, INTERVAL).effective_fraction == 1.0
 
 
+def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise(rng):
+    signal = np.round((MOTION + rng.normal(0, 0.01, MOTION.size)) / 0.002) * 0.002
+    stuck = signal.copy()
+    stuck[500:1300] = stuck[500]
+    assert difference_rms(stuck) == pytest.approx(difference_rms(signal), rel=0.1)
+    # a quiet sensor of coarse steps repeats itself, and is not stuck
+    coarse = np.round(MOTION / 0.05) * 0.05
+    assert difference_rms(coarse) < 0.01
+
+
 @pytest.mark.parametrize("time_constant", [0.002, 0.01])
 def test_coloured_rest(rng, time_constant):
     phi = np.exp(-INTERVAL / time_constant)

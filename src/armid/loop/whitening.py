@@ -20,7 +20,7 @@ from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.model import Plant
 from armid.problem.problem import signals_of
 from armid.record import Record
-from armid.record.broken import broken_samples
+from armid.record.broken import sound_samples
 from armid.record.noise import correlation_sum
 
 Array = NDArray[np.float64]
@@ -287,9 +287,7 @@ def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] =
 
 def soundness(record: Record, reach: int) -> Array:
     """Return 0 for each sample in the windows of a record that is no data, and for as many behind it, else 1."""
-    broken = np.zeros(record.measured.size, dtype=np.bool_)
-    for found in broken_samples(record):
-        broken |= found.samples
+    broken = ~sound_samples(record)
     for _ in range(reach):
         broken[1:] |= broken[:-1]
     places = [np.arange(p.window.start, p.window.stop) + p.start_index for p in record.pieces]

@@ -18,6 +18,7 @@ from armid.engine import probes
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Piece
+from armid.record.broken import sound_samples
 from armid.record.record import StartCorrection
 
 Array = NDArray[np.float64]
@@ -102,10 +103,12 @@ class Start:
 
     @cached_property
     def weights(self) -> Array:
-        """1/noise of each sample in the windows, the outputs one behind the other, (n_seen,)."""
+        """1/noise of each sample in the windows, the outputs one behind the other, (n_seen,); 0 where it is no data."""
         sizes = self.outputs[0].model.plant.sizes
         noise = [max(r.record.noise.rms, LEAST_NOISE * sizes[r.place]) for r in self.outputs]
-        return np.repeat(1.0 / np.array(noise), [p.n_samples for p in self.pieces])
+        windows = [np.arange(p.window.start, p.window.stop) + p.start_index for p in self.pieces]
+        sound = np.concatenate([sound_samples(r.record)[w] for r, w in zip(self.outputs, windows, strict=True)])
+        return np.where(sound, np.repeat(1.0 / np.array(noise), [len(w) for w in windows]), 0.0)
 
     @cached_property
     def measured(self) -> Array:
@@ -167,7 +170,7 @@ class Start:
             residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
                 return pieces
-            misfit = max(self.left(residual, seen) / len(residual), 1.0)
+            misfit = max(self.left(residual, seen) / max(np.count_nonzero(self.weights), 1), 1.0)
             gain, offset = self.answer(constants, seen, misfit)
             shorter = constants + (gain @ residual + offset) / 2.0 ** np.arange(MOST_HALVINGS)[:, np.newaxis]
             tried = self.residual(self.signals(shorter, np.repeat(population, MOST_HALVINGS, axis=0)))

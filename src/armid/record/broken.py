@@ -49,6 +49,14 @@ def broken_samples(record: Record) -> tuple[Broken, ...]:
     return tuple(found)
 
 
+def sound_samples(record: Record) -> Mask:
+    """Return which samples of a record are data, (n_samples,)."""
+    sound = np.ones(record.measured.size, dtype=np.bool_)
+    for _, samples in kinds_of(record):
+        sound &= ~samples
+    return sound
+
+
 def kinds_of(record: Record) -> Iterator[tuple[str, Mask]]:
     signal, noise = record.measured, record.noise.rms
     rounding = ROUNDING * max(float(np.abs(signal).max()), 1e-300)

@@ -5,6 +5,7 @@ from math import comb, log1p
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.record.broken import REPEATED, in_runs
 from armid.record.record import Noise
 
 Array = NDArray[np.float64]
@@ -53,8 +54,15 @@ def difference_rms(motion: Array, times: Array | None = None) -> float:
     The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
     where the next order gives less than a tenth of it, the motion was still in it (low-passed noise falls less fast)
     and the next is taken. The median of the absolute values keeps the transients of the motion out.
+    Runs of equal samples are left out where the noise of the others is more than a step of the values: a sensor that
+    is stuck tells nothing of its noise.
     times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
     """
+    moved = ~in_runs(np.append(np.diff(motion) == 0.0, False), REPEATED - 1, 0)
+    if FEWEST_REST_SAMPLES <= moved.sum() < motion.size:
+        apart = difference_rms(motion[moved], None if times is None else times[moved])
+        if apart > smallest_step(motion):
+            return apart
     estimates = []
     for order in ORDERS:
         if times is None:
