@@ -1,6 +1,7 @@
 """The small study written, run, and run by a process of its own."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -43,7 +44,12 @@ def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
     def popen(*arguments: object, **options: object) -> "subprocess.Popen[str]":
         command = [sys.executable, "-m", "armid", "study", *map(str, arguments)]
         told = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": os.environ}
-        process = subprocess.Popen(command, cwd=tmp_path, **(told | options))
+        # a child goes on ignoring what is ignored, as it is where a shell started the tests in the background
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        try:
+            process = subprocess.Popen(command, cwd=tmp_path, **(told | options))
+        finally:
+            signal.signal(signal.SIGINT, before)
         started.append(process)
         return process
 

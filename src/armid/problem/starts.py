@@ -170,7 +170,7 @@ class Start:
             residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
                 return pieces
-            misfit = max(self.left(residual, seen) / max(np.count_nonzero(self.weights), 1), 1.0)
+            misfit = max(self.left(residual, seen) / max(int(np.count_nonzero(self.weights)), 1), 1.0)
             gain, offset = self.answer(constants, seen, misfit)
             shorter = constants + (gain @ residual + offset) / 2.0 ** np.arange(MOST_HALVINGS)[:, np.newaxis]
             tried = self.residual(self.signals(shorter, np.repeat(population, MOST_HALVINGS, axis=0)))
