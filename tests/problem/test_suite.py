@@ -120,6 +120,24 @@ def test_what_is_hard_is_measured():
     assert {measure for _, measure, _ in CLASSES} < set(arm.landscape)
 
 
+def test_a_campaign_is_a_problem_on_top(paper_arm, paper_arm_folder):
+    suite = armid.suite(campaigns=[paper_arm_folder])
+    problem = suite[-1]
+    assert (len(suite), problem.name, str(problem)) == (
+        len(armid.suite()) + 1, "paper_arm/1", "<MeasuredProblem paper_arm/1, version 1: p0, k, eta3, n>")  # fmt: skip
+    assert problem.truth is problem.optimum_x is problem.optimum_value is None
+    # the records are simulated with parameters that are known here
+    near = problem((np.array([3.05e6, 1.0, 0.55, 1.4]) - [2.6e6, 0.6, 0.45, 0.9]) / [0.9e6, 0.5, 0.25, 0.6])
+    assert near == pytest.approx(problem.floor, rel=0.03)
+    assert problem.landscape["valley"] > 3.0
+    assert problem.difficulty == "smooth"
+    records = armid.suite("records", campaigns=[paper_arm])[-1]
+    u = np.random.default_rng(1).random((2, 4))
+    assert records(u).shape == (2, len(paper_arm.train))
+    with pytest.raises(ArmidError, match="campaign 'paper_arm': the suite has a problem of that name already"):
+        armid.suite(campaigns=[paper_arm, paper_arm_folder])
+
+
 def test_minima_on_a_line():
     for values, n in (((3, 2, 1, 2, 3), 1), ((1, 2, 3), 1), ((1, 2, 1), 2), ((2, 1, 1, 2, 0), 2), ((1, 1), 1)):
         assert n_minima(np.array(values, dtype=float)) == n

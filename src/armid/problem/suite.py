@@ -1,26 +1,28 @@
 """Problems to take away: the suite, for people who benchmark optimisers of any kind.
 
-All records are simulated (synthetic): the parameters that made them are drawn from name, version and instance.
+Its records are simulated (synthetic): the parameters that made them are drawn from name, version and instance. Only
+problems that are made of somebody's campaigns hold measured ones.
 """
 
 import hashlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pymoo.core.problem import Problem
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, nearest, quoted
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import PENALTY
-from armid.problem.problem import IdentificationProblem, replay_of, residuals
+from armid.problem.problem import IdentificationProblem, replay_of, replays, residuals
 from armid.problem.space import Space, space_of
-from armid.record import Noise, Piece, Record
+from armid.record import Campaign, Noise, Piece, Record, read_campaign
 
 Array = NDArray[np.float64]
 VERSION = 1
@@ -117,7 +119,7 @@ DEFINITIONS: dict[str, Definition] = {
 """Name -> problem, in the order of the suite; a change of one of them changes VERSION."""
 
 
-def suite(objectives: str = "one", units: str = "box") -> "Suite":
+def suite(objectives: str = "one", units: str = "box", campaigns: Iterable[Campaign | str | Path] = ()) -> "Suite":
     """Return all instances of all problems, each made when it is asked for; none is compiled before its first call.
 
     Parameters
@@ -126,6 +128,8 @@ def suite(objectives: str = "one", units: str = "box") -> "Suite":
         "one", or "records": an objective a record, and then those problems alone that have several.
     units
         "box": candidates in the unit cube; "SI": in the parameters' own units.
+    campaigns
+        Campaigns of measured machines, or their folders: a `MeasuredProblem` of each, `NAME/1`, comes on top.
 
     Returns
     -------
@@ -135,7 +139,7 @@ def suite(objectives: str = "one", units: str = "box") -> "Suite":
     Raises
     ------
     ArmidError
-        For another word.
+        For another word, a campaign that cannot be used, and a name that is there twice.
 
     >>> problems = suite()
     >>> len(problems), problems[0].name, problems["whole/15"].n_var
@@ -145,16 +149,30 @@ def suite(objectives: str = "one", units: str = "box") -> "Suite":
         if given not in known:
             raise ArmidError(f"{what} is {given!r}, {nearest(str(given), known)}")
     several = [name for name, d in DEFINITIONS.items() if objectives == "one" or len(d.strokes) > 1]
-    return Suite(tuple((name, i) for name in several for i in range(1, N_INSTANCES + 1)), objectives, units)
+    keys = [(name, i) for name in several for i in range(1, N_INSTANCES + 1)]
+    measured: dict[str, Campaign] = {}
+    for one in campaigns:
+        campaign = one if isinstance(one, Campaign) else read_campaign(one)
+        if campaign.name in (*DEFINITIONS, *measured):
+            raise ArmidError(f"campaign {quoted(campaign.name)}: the suite has a problem of that name already, another "
+                             "name is expected in campaign.toml")  # fmt: skip
+        measured[campaign.name] = campaign
+        if objectives == "one" or sum(len(r.each) for r in campaign.train) > 1:
+            keys.append((campaign.name, 1))
+    return Suite(tuple(keys), objectives, units, measured)
 
 
 @dataclass(frozen=True)
 class Suite(Sequence["SuiteProblem"]):
-    """Hold instances by place or name, such as `arm/1`; a slice is a suite too. keys: (problem, instance from 1)."""
+    """Hold instances by place or name, such as `arm/1`; a slice is a suite too.
+
+    keys: (problem, instance from 1). measured: problem -> the campaign that it is made of.
+    """
 
     keys: tuple[tuple[str, int], ...]
     objectives: str = "one"
     units: str = "box"
+    measured: Mapping[str, Campaign] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -171,7 +189,10 @@ class Suite(Sequence["SuiteProblem"]):
             if which not in names:
                 raise ArmidError(f"problem '{which}' is not in the suite: {nearest(which, names)}")
             which = names.index(which)
-        return SuiteProblem(*self.keys[which], self.objectives, self.units)
+        problem, instance = self.keys[which]
+        if problem in self.measured:
+            return MeasuredProblem(self.measured[problem], self.objectives, self.units)
+        return SuiteProblem(problem, instance, self.objectives, self.units)
 
 
 class SuiteProblem(Problem):  # type: ignore[misc]
@@ -185,16 +206,27 @@ class SuiteProblem(Problem):  # type: ignore[misc]
     """
 
     def __init__(self, problem_name: str, instance: int, objectives: str = "one", units: str = "box") -> None:
+        self.definition = DEFINITIONS[problem_name]
+        model, space = composed(problem_name)
+        self._declare(problem_name, instance, model, space, len(self.definition.strokes), objectives, units)
+
+    def _declare(
+        self, problem_name: str, instance: int, model: Model, space: Space, n_records: int, objectives: str, units: str
+    ) -> None:
         self.problem_name, self.instance, self.version = problem_name, instance, VERSION
-        self.name, self.definition = f"{problem_name}/{instance}", DEFINITIONS[problem_name]
-        self.objectives, self.units = objectives, units
-        self.model, self.space = composed(problem_name)
-        self.names = self.space.free_names
-        self.parameter_units = tuple(u for u, f in zip(self.space.units, self.space.free, strict=True) if f)
-        self._low, self._high = self.space.low[self.space.free], self.space.high[self.space.free]
-        n_obj = len(self.definition.strokes) if objectives == "records" else 1
+        self.name, self.objectives, self.units = f"{problem_name}/{instance}", objectives, units
+        self.model, self.space, self.names = model, space, space.free_names
+        self.parameter_units = tuple(u for u, f in zip(space.units, space.free, strict=True) if f)
+        self._low, self._high = space.low[space.free], space.high[space.free]
+        n_obj = n_records if objectives == "records" else 1
         low, high = (self._low, self._high) if units == "SI" else (np.zeros(len(self.names)), np.ones(len(self.names)))
         super().__init__(n_var=len(self.names), n_obj=n_obj, xl=low, xu=high)
+
+    def __str__(self) -> str:
+        # pymoo's own calls name, which is a word here
+        return f"<{type(self).__name__} {self.name}, version {self.version}: {', '.join(self.names)}>"
+
+    __repr__ = __str__
 
     def __call__(self, x: ArrayLike) -> Any:
         """Return the value of a candidate, (n_var,), or those of several, (n_candidates, n_var)."""
@@ -229,6 +261,11 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         """The parameters that made the records, in the units of the problem, (n_var,)."""
         return self.own(self._drawn[0])
 
+    @property
+    def _reference(self) -> Array:
+        """The point about which the landscape is measured, SI, (n_var,)."""
+        return self._drawn[0]
+
     @cached_property
     def _drawn(self) -> tuple[Array, np.random.Generator]:
         """The truth, SI, and the generator from which the noise is drawn next."""
@@ -242,7 +279,7 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         """The problem in SI with its model, space and records; compiles the model."""
         from scipy.special import ndtri
 
-        given, (truth, rng), replays = self.definition, self._drawn, []
+        given, (truth, rng), ready = self.definition, self._drawn, []
         for number, (start, target, shell, supply) in enumerate(given.strokes, 1):
             n_samples = round(given.duration_s / INTERVAL_S) + 1
             constants = {"theta_C": start * DEGREE, "theta_D": target * DEGREE, "shell": shell, "U": supply}
@@ -260,8 +297,8 @@ class SuiteProblem(Problem):  # type: ignore[misc]
             # bit; normal numbers by the inverse distribution, as numpy's own may change between its versions
             measured = replay.signal(self.space.complete(truth[np.newaxis]))[0] + rms * ndtri(rng.random(n_samples))
             pieces = (Piece(manoeuvre, measured, slice(0, n_samples)),)
-            replays.append(replace(replay, record=replace(record, measured=measured, pieces=pieces), pieces=pieces))
-        return IdentificationProblem(self.space, tuple(replays), FITNESS[given.fitness])
+            ready.append(replace(replay, record=replace(record, measured=measured, pieces=pieces), pieces=pieces))
+        return IdentificationProblem(self.space, tuple(ready), FITNESS[given.fitness])
 
     @cached_property
     def floor(self) -> float:
@@ -278,13 +315,17 @@ class SuiteProblem(Problem):  # type: ignore[misc]
             return self.truth
         if self.definition.fitness != "rmse":
             return None
+        return self.own(self._least_squares(self._drawn[0]))
+
+    def _least_squares(self, start: Array) -> Array:
+        """Return what least squares finds from a point, both SI."""
         from scipy.optimize import least_squares
 
         def vector(u: Array) -> Array:
             return np.asarray(self._residuals(u)[0])
 
-        found = least_squares(vector, self._cube(self._drawn[0]), bounds=(0.0, 1.0), xtol=1e-12, ftol=1e-14)
-        return self.own(np.asarray(self._low + found.x * (self._high - self._low)))
+        found = least_squares(vector, self._cube(start), bounds=(0.0, 1.0), xtol=1e-12, ftol=1e-14)
+        return np.asarray(self._low + found.x * (self._high - self._low))
 
     @cached_property
     def optimum_value(self) -> float | None:
@@ -311,10 +352,9 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         return self.identification.value(self._low + u * (self._high - self._low))
 
     def _residuals(self, u: Array) -> Array:
-        """Return the residuals of points of the unit cube, (n_candidates, n_total) [rad/s]."""
-        replays = self.identification.replays
+        """Return the residuals of points of the unit cube, (n_candidates, n_total) [signal's unit, or in its noise]."""
         X: Array = self._low + np.atleast_2d(u) * (self._high - self._low)
-        return residuals(replays, self.space, X, np.ones(len(replays)))
+        return residuals(self.identification.replays, self.space, X, 1.0 / self.identification.sizes)
 
     @cached_property
     def landscape(self) -> dict[str, float]:
@@ -326,7 +366,7 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         from its median over the box to the floor. minima: local minima on a straight line through the truth from bound
         to bound, mean over 24 lines of 201 points. holes: share of the box where the simulation diverges.
         """
-        rng, truth = np.random.default_rng(VERSION), self._cube(self._drawn[0])
+        rng, truth = np.random.default_rng(VERSION), self._cube(self._reference)
         shifts = 1e-4 * np.eye(self.n_var)
         slopes = self._residuals(truth + shifts) - self._residuals(truth - shifts)
         widths = np.linalg.svd(slopes, compute_uv=False)
@@ -334,7 +374,7 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         here, near, far = (self._values(np.clip(points + step * directions, 0.0, 1.0)) for step in (0.0, 1e-3, 0.05))
         finite = np.isfinite([here, near, far]).all(axis=0)
-        height = float(np.median(here)) - self.floor
+        height = float(np.median(here) - self._values(truth)[0])
         with np.errstate(invalid="ignore"):
             flat = np.abs(far - here)[finite] < 2e-3 * height
         return {
@@ -348,6 +388,44 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         """The first class whose limit the landscape exceeds: stair, plateau, rugged, valley; else smooth."""
         of = self.landscape
         return next((name for name, measure, limit in CLASSES if of[measure] > limit), "smooth")
+
+
+class MeasuredProblem(SuiteProblem):
+    """Minimise the rmse of the declared model of a campaign on its train records; `SuiteProblem` says how to call it.
+
+    campaign: its plant, the effects that it declares, and its bounds make the problem; its name and records are the
+    only thing that says which version it is. Outputs of several units count in units of their noise each.
+    Nobody knows the truth of a machine: `truth`, `optimum_x` and `optimum_value` are None. `floor` is what the noise
+    of the records leaves; what the model lacks comes on top, so that a search may end far above it. The landscape is
+    measured about the best point that least squares finds from 4 of 64 spread ones.
+    """
+
+    def __init__(self, campaign: Campaign, objectives: str = "one", units: str = "box") -> None:
+        self.campaign, model = campaign, campaign.model()
+        space, n_records = space_of(model, campaign.parameters), sum(len(r.each) for r in campaign.train)
+        self._declare(campaign.name, 1, model, space, n_records, objectives, units)
+
+    truth = optimum_x = optimum_value = None  # type: ignore[assignment]
+
+    @cached_property
+    def identification(self) -> IdentificationProblem:
+        """The problem in SI with its model, space and records; compiles the model."""
+        ready = replays(self.campaign.train, self.model, self.space, "standard")
+        return IdentificationProblem(self.space, ready, FITNESS["rmse"])
+
+    @cached_property
+    def floor(self) -> float:
+        """The rmse that the noise of the records leaves, as far as they tell it."""
+        problem = self.identification
+        noise = np.array([r.record.noise.rms for r in problem.replays]) / problem.sizes
+        return float(np.sqrt(np.average(noise**2, weights=problem.record_weights)))
+
+    @cached_property
+    def _reference(self) -> Array:
+        spread = self.spread(64)
+        starts = spread[np.argsort(self.identification.value(spread), kind="stable")[:4]]
+        ends = np.array([self._least_squares(start) for start in starts])
+        return np.asarray(ends[int(np.argmin(self.identification.value(ends)))])
 
 
 @cache
