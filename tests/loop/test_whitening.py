@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from armid.loop.diagnose import motion_phases, time_in_words
+from armid.loop.diagnose import memory_of, motion_phases, time_in_words
 from armid.loop.whitening import coloured_level, white_level, yule_walker
 
 TERMS = np.array([1.5, -0.7])
@@ -71,3 +71,14 @@ def test_when_a_residual_is_no_noise_is_told_by_what_the_motion_does():
         stages={"before 'closed'": np.arange(200) < 100, "after 'closed'": np.arange(200) >= 100},
     )  # fmt: skip
     assert time_in_words(seen) == "When it is: 100% of it while it slows down, after 'closed', in 10% of the samples."
+
+
+def test_memory_is_that_of_the_noise_and_not_of_what_the_model_lacks():
+    rng = np.random.default_rng(5)
+    slow = [6.0 * np.sin(2.0 * np.pi * (1.0 + i) * np.arange(800) / 200.0) for i in range(5)]
+    for rho, beside in ((0.0, 0.0), (0.35, 0.0), (0.7, 0.0), (0.35, 1.0)):
+        noise = [lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], rng.standard_normal(1000))[200:] for _ in range(5)]
+        found = memory_of([n + beside * s for n, s in zip(noise, slow, strict=True)])
+        assert found == (pytest.approx(rho, abs=0.15) if rho else 0.0)
+    # too long to be told from a discrepancy, and nothing at all
+    assert memory_of(slow) == memory_of([np.zeros(100)]) == 0.0

@@ -33,6 +33,12 @@ INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
 MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
 # Products of columns whose share of the largest is below this are rounding.
 DEPENDENT = 1e-11
+# Where no rest tells the noise, neighbours may correlate as the noise of a filtered sensor does: up to the largest of
+# these correlations, from so many standard errors (about 2/sqrt(n)) on.
+MEMORIES, DISTINCT = np.linspace(-0.5, 0.95, 146), 3.0
+LONGEST_MEMORY = 0.8
+# Values farther out than this many standard deviations are no noise.
+OUTLYING = 4.0
 # Shares of the largest speed and of its largest change, up to which it is a rest and an even speed.
 STILL, EVEN = 0.02, 0.1
 
@@ -69,6 +75,20 @@ class Residuals:
         of = [(level.rms, len(r.measured)) for level, r in zip(self.data.levels, self.replays, strict=True)
               if r.place == place]  # fmt: skip
         return float(np.sqrt(sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)))
+
+    @cached_property
+    def renewed(self) -> list[Array]:
+        """What each sample of the residual brings beyond what its neighbour told, by record.
+
+        Where no rest was recorded, the colour of the noise is not known: e_t = rho e_(t-1) + w_t, with rho of each
+        output from the residual itself, see `memory_of`, and w_t here. Elsewhere the residual is white as it is.
+        """
+        parts = self.data.by_record(self.residual)
+        if self.data.known or not all(level.is_white for level in self.data.levels):
+            return parts
+        places = [r.place for r in self.replays]
+        rho = {place: memory_of([p for p, of in zip(parts, places, strict=True) if of == place]) for place in places}
+        return [np.append(p[:1], p[1:] - rho[place] * p[:-1]) for p, place in zip(parts, places, strict=True)]
 
     @cached_property
     def raw(self) -> list[Array]:
@@ -127,6 +147,25 @@ class Residuals:
         """Samples by what the simulated motion does, in words -> (n_samples,); empty where no state is a speed."""
         speed = self.variables.get(self.model.plant.aliases.get("omega", "omega"))
         return {} if speed is None else motion_phases([np.abs(v) for v in self.data.by_record(speed)])
+
+
+def memory_of(parts: Sequence[Array]) -> float:
+    """Return the correlation of neighbouring samples of the noise in residuals, 0 where none is seen or it is too long.
+
+    From second differences, which leave next to nothing of what a model lacks: their correlation tells that of an
+    exponential one, rho^k at lag k. Long memory is not told from what changes slowly.
+    """
+    differences = [np.diff(p, n=2) for p in parts]
+    size = OUTLYING * 1.4826 * float(np.median(np.abs(np.concatenate(differences))))
+    kept = [np.clip(d, -size, size) for d in differences]
+    whole, n = sum(float(d @ d) for d in kept), sum(len(d) for d in kept)
+    if not whole > 0.0:
+        return 0.0
+    # covariances of second differences of rho^|k|, at lags 0 and 1
+    lags = [6.0 - 8.0 * MEMORIES + 2.0 * MEMORIES**2, -4.0 + 7.0 * MEMORIES - 4.0 * MEMORIES**2 + MEMORIES**3]
+    seen = sum(float(d[1:] @ d[:-1]) for d in kept) / whole
+    rho = float(np.interp(seen, lags[1] / lags[0], MEMORIES))
+    return rho if 2.0 * DISTINCT / np.sqrt(n) < rho <= LONGEST_MEMORY else 0.0
 
 
 def motion_phases(speeds: Sequence[Array]) -> dict[str, NDArray[np.bool_]]:
@@ -306,7 +345,7 @@ def time_tests(seen: Residuals) -> Iterator[Finding]:
     """
     if not all(level.is_white for level in seen.data.levels):
         return
-    parts, hum = seen.data.by_record(seen.residual), [sum(ends) / 2.0 for ends in mains_hum(seen)]
+    parts, hum = seen.renewed, [sum(ends) / 2.0 for ends in mains_hum(seen)]
     if hum:
         parts = [without_lines(p, hum, r.manoeuvre.interval) for p, r in zip(parts, seen.data.records, strict=True)]
     lags = min(LAGS, *(len(p) // 4 for p in parts))
@@ -374,19 +413,21 @@ def square_along(columns: Array, values: Array) -> tuple[float, int]:
 def band_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare the power of the residual in bands of frequency with that of the rest, or with a flat one.
 
-    White noise has a flat spectrum, whose level the rest tells; of coloured noise the rest itself shows the spectrum.
+    White noise has a flat spectrum, whose level the rest tells, or without one the residual; of coloured noise the
+    rest itself shows the spectrum.
     Where the rest hums, frequencies near by are left out: a line does not scatter as noise does.
     """
     coloured = not seen.doubted and not all(level.is_white for level in seen.data.levels)
     hum = mains_hum(seen)
-    white = [level.rms * r for level, r in zip(seen.data.levels, seen.data.by_record(seen.residual), strict=True)]
+    white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
     left = spectra(seen.raw if coloured else white, seen, hum)
     rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.records], seen, hum) if coloured else {}
+    flat = 1.0 if seen.data.known else float(np.mean(np.concatenate(seen.renewed) ** 2))
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
         if coloured and len(other) < FEWEST_ORDINATES:
             continue
-        against = float(np.mean(other)) if coloured else seen.variance
+        against = float(np.mean(other)) if coloured else flat
         ratio, free = float(np.mean(values)) / against, 2.0 * INDEPENDENT * len(values)
         known = 2.0 * INDEPENDENT * len(other) if coloured else seen.data.n_noise(otherwise=np.inf)
         high = BANDS_HZ[band + 1]

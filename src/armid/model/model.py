@@ -77,7 +77,7 @@ class Model:
     @cached_property
     def starts(self) -> list[str]:
         """Constants in which candidates that are simulated together may differ: the starts that a fit may estimate."""
-        return [] if self.plant.records_one_speed else list(dict.fromkeys(self.plant.start_constants.values()))
+        return list(dict.fromkeys(self.plant.start_constants.values()))
 
     def constant_values(self, given: Mapping[str, float]) -> list[float]:
         """Return all constants in order, the given ones replacing defaults.

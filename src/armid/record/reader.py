@@ -142,8 +142,8 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
     An incomplete last piece is dropped.
     """
     manoeuvre, length = record.manoeuvre, record.measured.size
-    asked = {} if plant.records_one_speed else plant.start_constants
-    given = sorted(set(asked.values()) & set(manoeuvre.constants))
+    asked = plant.start_constants
+    given = [] if plant.records_one_speed else sorted(set(asked.values()) & set(manoeuvre.constants))
     if record.restart_s is not None:
         if plant.from_rest:
             raise ArmidError(f"{where}: restart_s is given, but plant '{plant.name}' starts at rest: a record without "
@@ -152,20 +152,22 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
             raise ArmidError(f"{where}: restart_s and the constant {given[0]} are both given: the start of one piece "
                              "or of each is expected")  # fmt: skip
         length = piece_length(record.restart_s, manoeuvre.interval, record.measured.size, where)
-    fitted = len(asked) > len(given)
-    spent = n_spent(length, manoeuvre.interval) if fitted and record.role == "holdout" else 0
+    fitted, trained = len(asked) > len(given), record.role == "train"
+    spent = 0 if trained or not fitted or plant.records_one_speed else n_spent(length, manoeuvre.interval)
     pieces: list[list[Piece]] = [[] for _ in record.each]
     for start in range(0, record.measured.size - length + 1, length):
-        if fitted and spent:
+        if plant.records_one_speed:
+            state = state_at(tracks, start)
+        elif spent:
             first = {name: replace(t, values=t.values[start : start + spent]) for name, t in tracks.items()}
             state = state_shown(plant, manoeuvre.constants, first, manoeuvre.interval, 0)
         elif fitted:
             state = state_shown(plant, manoeuvre.constants, tracks, manoeuvre.interval, start)
         else:
-            state = ({}, {}) if asked else state_at(tracks, start)
+            state = ({}, {})
         cut = manoeuvre.part(start, length, state[0])
         for one, found in zip(record.each, pieces, strict=True):
-            measured, shown_start = one.measured[start : start + length], state[0] if fitted and not spent else {}
+            measured, shown_start = one.measured[start : start + length], state[0] if fitted and trained else {}
             found.append(Piece(cut, measured, slice(0, length), start, state[1], spent, shown_start))
     # the first piece starts where the record does
     from_there = replace(manoeuvre, constants=pieces[0][0].manoeuvre.constants)

@@ -1,0 +1,75 @@
+"""A pendulum whose records begin in motion, with noise that correlates from sample to sample and no rest to show it."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
+
+from armid.estimation.least_squares import with_fitted_starts
+from armid.loop import close_loop
+from armid.model import EFFECTS, Model
+from armid.problem.problem import replays
+from armid.problem.space import space_of
+from armid.record import read_campaign, write_campaign
+
+INERTIA, GRAVITY_MOMENT, NOISE, STEP_S = 0.02, 0.5, 0.02, 0.005
+RECORD = '[[records]]\nfile = "{file}"\nrole = "{role}"\n'
+TOML = 'name = "swinging"\nplant = "driven_axis"\nhold = "zero"\n[constants]\ngain = 1.0\ngravity_moment = 0.5\n'
+
+
+def swing(torque, friction, start):
+    """Angle [rad] and speed [rad/s] of each sample, from a start (angle, speed), by another integrator."""
+    states = [np.array(start)]
+    for u in torque[:-1]:
+
+        def rates(_, y, u=u):
+            return [y[1], (u - GRAVITY_MOMENT * np.sin(y[0]) - friction * y[1]) / INERTIA]
+
+        states.append(solve_ivp(rates, (0.0, STEP_S), states[-1], rtol=1e-8, atol=1e-10).y[:, -1])
+    return np.array(states).T
+
+
+def swinging(folder, friction, rho=0.35, n_records=4, seed=3):
+    """Write a campaign of swings, the last one held out; return it with the true starts."""
+    rng, tables, starts = np.random.default_rng(seed), {}, []
+    times = STEP_S * np.arange(500)
+    for i in range(n_records):
+        waves = zip(rng.uniform(0.3, 2.0, 4), rng.uniform(0.0, 6.0, 4), strict=True)
+        torque = 0.07 * sum(np.sin(2.0 * np.pi * f * times + p) for f, p in waves)
+        starts.append((rng.uniform(-0.3, 0.3), rng.uniform(-0.5, 0.5)))
+        angle, speed = swing(torque, friction, starts[-1])
+        noise = NOISE * lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], rng.standard_normal(len(times)))
+        tables[f"r{i}.csv"] = {"time_s": times, "angular_velocity_rad_s": speed + noise, "drive_N_m": torque,
+                               "angle_rad": angle + 1e-4 * rng.standard_normal(len(times))}  # fmt: skip
+    roles = ["train"] * (n_records - 1) + ["holdout"]
+    entries = [RECORD.format(file=file, role=role) for file, role in zip(tables, roles, strict=True)]
+    return read_campaign(write_campaign(folder, TOML + "".join(entries), tables)), starts
+
+
+def test_the_start_of_an_axis_is_fitted(tmp_path):
+    """Its speed is known no better than noise lets the first samples tell, and a free swing keeps that for long."""
+    campaign, starts = swinging(tmp_path / "c", 0.0)
+    model = Model(campaign.plant)
+    space = space_of(model)
+    started = with_fitted_starts(replays(campaign.train, model, space), space)
+    read, fitted = ([piece.manoeuvre.constants["start_speed"] for piece in pieces] for pieces in
+                    ([r.pieces[0] for r in campaign.train], [r.pieces[0] for r in started]))  # fmt: skip
+    truth = [speed for _, speed in starts[:-1]]
+    assert np.abs(np.subtract(fitted, truth)).max() < 0.006 < np.abs(np.subtract(read, truth)).max()
+    for replay in started:
+        residual = replay.measured - replay.signal(np.array([[INERTIA]]))[0]
+        assert np.sqrt(np.mean(residual**2)) == pytest.approx(NOISE, rel=0.1)
+    assert not campaign.holdout[0].pieces[0].shown_start
+
+
+@pytest.mark.slow
+def test_nothing_is_missing_where_noise_has_a_colour_that_no_rest_shows(tmp_path):
+    candidates = {name: EFFECTS[name] for name in ("coulomb", "viscous", "torque_offset")}
+    clean, _ = swinging(tmp_path / "clean", 0.0)
+    found = close_loop(Model(clean.plant), clean, candidates)
+    assert (found.verdict, found.also, found.steps, found.suspects) == ("no_discrepancy", (), (), ())
+    estimate = found.before.estimates[0]
+    assert estimate.low < INERTIA < estimate.high
+    damped, _ = swinging(tmp_path / "damped", 0.01)
+    found = close_loop(Model(damped.plant), damped, candidates)
+    assert (found.verdict, [s.effect for s in found.steps], found.suspects) == ("explained", ["viscous"], ())
