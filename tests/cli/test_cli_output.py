@@ -7,7 +7,7 @@ from threading import Thread
 import pytest
 from click.testing import CliRunner
 
-from armid.cli.main import app
+from armid.cli.main import app, show_warning, tell_more
 from armid.cli.options import command
 from armid.report import files, html, style
 from armid.report.document import Column, Struck, Table, table
@@ -192,3 +192,14 @@ def test_options_of_every_identifier_have_a_meaning(run):
             assert about["meaning"], (name, option)
             assert f"--option {option}=" in said
     assert told["pso"]["options"]["velocity_limit"]["default"] == "literal"
+
+
+def test_a_warning_of_no_record_is_told_once_and_not_as_that_of_a_file(capsys):
+    seen = {}
+    for message in ("tables are in pieces", "tables are in pieces", "c/a.csv: late by 1 ms", "c/b.csv: late by 2 ms"):
+        show_warning(seen, message)
+    tell_more(seen)
+    assert capsys.readouterr().err.splitlines() == [
+        "armid: warning: tables are in pieces", "armid: warning: c/a.csv: late by 1 ms",
+        "armid: warning: as of c/a.csv, so of c/b.csv",
+    ]  # fmt: skip

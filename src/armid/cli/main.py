@@ -80,7 +80,8 @@ def show_warning(seen: dict[str, list[str]], message: Warning | str, *_: Any, **
     alike = seen.setdefault(re.sub(r"\d[\d.e+-]*", "", what) if is_of_file else str(message), [])
     if not alike:
         tell(f"armid: warning: {message}")
-    alike.append(f"{file}.csv")
+    if is_of_file or not alike:
+        alike.append(f"{file}.csv")
 
 
 def tell_more(seen: dict[str, list[str]]) -> None:

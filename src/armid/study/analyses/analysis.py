@@ -230,10 +230,12 @@ def wide_runs(evidence: Evidence) -> DataFrame:
                "at_bound": "_at_bound"}  # fmt: skip
     wide = evidence.runs.drop(columns=["started_at", "model", "versions"], errors="ignore")
     wide.insert(0, "study", str(evidence.study["name"]))
+    values: dict[str, Series[Any]] = {}
     for name, rows in evidence.parameters.groupby("parameter", sort=False):
         own = rows.set_index("run")
-        wide = wide.assign(**{f"{name}{end}": wide["run"].map(own[key]) for key, end in columns.items()})
-    return wide
+        values |= {f"{name}{end}": wide["run"].map(own[key]) for key, end in columns.items()}
+    # at once: column by column, those of 40 parameters leave a table in pieces
+    return wide.join(DataFrame(values, index=wide.index))
 
 
 def outcomes(runs: DataFrame, parameters: DataFrame) -> DataFrame:
