@@ -18,6 +18,7 @@ from armid.loop.whitening import WhitenedData, WhiteRecords, whitened
 from armid.model import Model
 from armid.problem.problem import Replay
 from armid.record import Record
+from armid.record.noise import memory_of
 
 Array = NDArray[np.float64]
 # Chance of a false alarm, all tests together.
@@ -33,12 +34,6 @@ INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
 MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
 # Products of columns whose share of the largest is below this are rounding.
 DEPENDENT = 1e-11
-# Where no rest tells the noise, neighbours may correlate as the noise of a filtered sensor does: up to the largest of
-# these correlations, from so many standard errors (about 2/sqrt(n)) on.
-MEMORIES, DISTINCT = np.linspace(-0.5, 0.95, 146), 3.0
-LONGEST_MEMORY = 0.8
-# Values farther out than this many standard deviations are no noise.
-OUTLYING = 4.0
 # Shares of the largest speed and of its largest change, up to which it is a rest and an even speed.
 STILL, EVEN = 0.02, 0.1
 
@@ -147,25 +142,6 @@ class Residuals:
         """Samples by what the simulated motion does, in words -> (n_samples,); empty where no state is a speed."""
         speed = self.variables.get(self.model.plant.aliases.get("omega", "omega"))
         return {} if speed is None else motion_phases([np.abs(v) for v in self.data.by_record(speed)])
-
-
-def memory_of(parts: Sequence[Array]) -> float:
-    """Return the correlation of neighbouring samples of the noise in residuals, 0 where none is seen or it is too long.
-
-    From second differences, which leave next to nothing of what a model lacks: their correlation tells that of an
-    exponential one, rho^k at lag k. Long memory is not told from what changes slowly.
-    """
-    differences = [np.diff(p, n=2) for p in parts]
-    size = OUTLYING * 1.4826 * float(np.median(np.abs(np.concatenate(differences))))
-    kept = [np.clip(d, -size, size) for d in differences]
-    whole, n = sum(float(d @ d) for d in kept), sum(len(d) for d in kept)
-    if not whole > 0.0:
-        return 0.0
-    # covariances of second differences of rho^|k|, at lags 0 and 1
-    lags = [6.0 - 8.0 * MEMORIES + 2.0 * MEMORIES**2, -4.0 + 7.0 * MEMORIES - 4.0 * MEMORIES**2 + MEMORIES**3]
-    seen = sum(float(d[1:] @ d[:-1]) for d in kept) / whole
-    rho = float(np.interp(seen, lags[1] / lags[0], MEMORIES))
-    return rho if 2.0 * DISTINCT / np.sqrt(n) < rho <= LONGEST_MEMORY else 0.0
 
 
 def motion_phases(speeds: Sequence[Array]) -> dict[str, NDArray[np.bool_]]:

@@ -21,7 +21,7 @@ from armid.model import Plant
 from armid.problem.problem import signals_of
 from armid.record import Record
 from armid.record.broken import sound_samples
-from armid.record.noise import correlation_sum
+from armid.record.noise import correlation_sum, memory_of
 
 Array = NDArray[np.float64]
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
@@ -240,17 +240,23 @@ class WhitenedData:
         return float(sum(len(x) / (1.0 + 2.0 * correlation_sum(x)) for x in parts))
 
     def trust(self, residual: Array) -> Array:
-        """Return the weight of each sample in intervals: 1, or n_eff/chi2 in records whose residual is no noise.
+        """Return the weight of each sample in intervals: 1, or n_eff/chi2 in records whose residual tells of more.
 
-        There the residual itself, with its correlation in time, is what scatters (as in `information.level_of`).
+        In those whose residual is no noise the residual itself, with its correlation in time, is what scatters (as in
+        `information.level_of`).
         """
         found = []
         for level, part in zip(self.levels, self.by_record(residual), strict=True):
             # How well the noise itself is known: its mean square scatters by 2/n.
             doubt = 1.0 + 3.0 * np.sqrt(2.0 / (level.n_slow if level.known else len(part)))
-            square = float(np.mean(part**2))
-            misfit = square > MISFIT * doubt
-            found.append(np.full(len(part), 1.0 / square / (1.0 + 2.0 * correlation_sum(part)) if misfit else 1.0))
+            square, weight = float(np.mean(part**2)), 1.0
+            if square > MISFIT * doubt:
+                weight = 1.0 / square / (1.0 + 2.0 * correlation_sum(part))
+            elif not level.known:
+                # differences tell the least that the noise can be, and nothing of its colour
+                memory = memory_of([part])
+                weight = (1.0 - memory) / (1.0 + memory) / max(square, 1.0)
+            found.append(np.full(len(part), weight))
         return np.concatenate(found)
 
 

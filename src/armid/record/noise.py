@@ -1,5 +1,6 @@
 """Noise of a sensor, from rest or from the motion itself."""
 
+from collections.abc import Sequence
 from math import comb, log1p
 
 import numpy as np
@@ -12,6 +13,11 @@ Array = NDArray[np.float64]
 FEWEST_REST_SAMPLES = 50
 FINEST_STEP = 1e-6
 ORDERS = range(3, 9)
+# Neighbours may correlate as the noise of a filtered sensor does: up to the longest memory, from so many standard
+# errors (about 2/sqrt(n)) on.
+MEMORIES, DISTINCT, LONGEST_MEMORY = np.linspace(-0.5, 0.95, 146), 3.0, 0.8
+# Values farther out than this many standard deviations are no noise.
+OUTLYING = 4.0
 
 
 def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = None) -> Noise:
@@ -46,6 +52,25 @@ def correlation_sum(deviations: Array) -> float:
     correlation = covariance[1:] / covariance[0]
     small = np.flatnonzero(correlation < 2 / np.sqrt(n))
     return float(np.sum(correlation[: small[0] if small.size else None]))
+
+
+def memory_of(parts: Sequence[Array]) -> float:
+    """Return the correlation of neighbouring samples of the noise in residuals, 0 where none is seen or it is too long.
+
+    From second differences, which leave next to nothing of what a model lacks: their correlation tells that of an
+    exponential one, rho^k at lag k. Long memory is not told from what changes slowly.
+    """
+    differences = [np.diff(p, n=2) for p in parts]
+    size = OUTLYING * 1.4826 * float(np.median(np.abs(np.concatenate(differences))))
+    kept = [np.clip(d, -size, size) for d in differences]
+    whole, n = sum(float(d @ d) for d in kept), sum(len(d) for d in kept)
+    if not whole > 0.0:
+        return 0.0
+    # covariances of second differences of rho^|k|, at lags 0 and 1
+    lags = [6.0 - 8.0 * MEMORIES + 2.0 * MEMORIES**2, -4.0 + 7.0 * MEMORIES - 4.0 * MEMORIES**2 + MEMORIES**3]
+    seen = sum(float(d[1:] @ d[:-1]) for d in kept) / whole
+    rho = float(np.interp(seen, lags[1] / lags[0], MEMORIES))
+    return rho if 2.0 * DISTINCT / np.sqrt(n) < rho <= LONGEST_MEMORY else 0.0
 
 
 def difference_rms(motion: Array, times: Array | None = None) -> float:
