@@ -18,6 +18,9 @@ from armid.registry import Registry, load_plugin, load_registry
 if TYPE_CHECKING:
     from armid.contract.trials import ContractPoint
 
+# Time after which an alarm that was not heard is given once more [s].
+AGAIN_S = 1.0
+
 
 @command("check", epilog=examples(
     "armid check mine.py:my_drag --on driven_axis", "armid check studies/campaigns/paper_arm",
@@ -88,7 +91,8 @@ def alarm(seconds: float) -> Iterator[None]:
         raise TimeoutError
 
     before = signal.signal(signal.SIGALRM, over)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    # again and again: what is raised while the compiler calls back is lost
+    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN_S)
     try:
         yield
     finally:
