@@ -44,7 +44,8 @@ class Residuals:
 
     candidate: whole, SI. residual: whitened, measured minus simulated, (n_samples,). basis: what the fit has absorbed,
     (n_samples, n_absorbed), with no columns on records that it has not seen. doubted: whether the residual, and not the
-    raw one, tells of size: it is divided by the doubt of a prediction that tolerances of constants make large.
+    raw one, tells of size: it is divided by the doubt of a prediction that tolerances of constants make large. fitted:
+    those of the train records, where these are held out.
     """
 
     data: WhitenedData
@@ -53,6 +54,7 @@ class Residuals:
     residual: Array
     basis: Array
     doubted: bool = False
+    fitted: "Residuals | None" = None
 
     @property
     def model(self) -> Model:
@@ -72,18 +74,24 @@ class Residuals:
         return float(np.sqrt(sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)))
 
     @cached_property
-    def renewed(self) -> list[Array]:
-        """What each sample of the residual brings beyond what its neighbour told, by record.
+    def memory(self) -> dict[int, float]:
+        """Correlation of neighbouring samples of the noise, by place of the output; 0 where rests tell the noise.
 
-        Where no rest was recorded, the colour of the noise is not known: e_t = rho e_(t-1) + w_t, with rho of each
-        output from the residual itself, see `memory_of`, and w_t here. Elsewhere the residual is white as it is.
+        Elsewhere the residual itself tells it, see `memory_of`: that of the train records, which are more.
         """
-        parts = self.data.by_record(self.residual)
+        if self.fitted is not None:
+            return self.fitted.memory
+        parts, places = self.data.by_record(self.residual), [r.place for r in self.replays]
         if self.data.known or not all(level.is_white for level in self.data.levels):
-            return parts
-        places = [r.place for r in self.replays]
-        rho = {place: memory_of([p for p, of in zip(parts, places, strict=True) if of == place]) for place in places}
-        return [np.append(p[:1], p[1:] - rho[place] * p[:-1]) for p, place in zip(parts, places, strict=True)]
+            return dict.fromkeys(places, 0.0)
+        return {p: memory_of([x for x, of in zip(parts, places, strict=True) if of == p]) for p in places}
+
+    @cached_property
+    def renewed(self) -> list[Array]:
+        """What each sample of the residual brings beyond what its neighbour told, by record: e_t - rho e_(t-1)."""
+        pairs = [(x, self.memory.get(r.place, 0.0)) for x, r in
+                 zip(self.data.by_record(self.residual), self.replays, strict=True)]  # fmt: skip
+        return [x if rho == 0.0 else np.append(x[:1], x[1:] - rho * x[:-1]) for x, rho in pairs]
 
     @cached_property
     def raw(self) -> list[Array]:
@@ -227,7 +235,8 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     spread = np.column_stack([spread, *start_changes(posed, fit.z)])
     base, sizes, _ = np.linalg.svd(spread, full_matrices=False)
     left = residual - base @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (base.T @ residual))
-    return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)), bool(within))
+    return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)), bool(within),
+                     train_residuals(fit))  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,8 @@ class Judgement:
         """Whether train is noise and held-out records are not, by more than the doubt of the prediction."""
         if self.holdout is None or self.holdout_error is None or self.holdout_diagnosis is None:
             return False
-        is_larger = self.holdout_error.rmse > CARRIED * self.holdout.noise_rms
+        # what differences tell of the noise is the least that it can be
+        is_larger = self.holdout_error.rmse > CARRIED * max(self.holdout.noise_rms, self.train_error.rmse)
         return not self.diagnosis.significant and self.holdout_diagnosis.significant and is_larger
 
 
