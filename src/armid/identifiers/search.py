@@ -6,7 +6,7 @@ made, read and evaluated in a fraction of its time.
 
 import weakref
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite
 from queue import SimpleQueue
@@ -68,9 +68,6 @@ class SearchTask:
     start: Array | None = None
     ask: Asker | None = None
 
-    def at(self, start: Array | None) -> "SearchTask":
-        return replace(self, start=start)
-
     @property
     def cube(self) -> "Cube":
         return Cube(*bounds_of(self.problem))
@@ -105,17 +102,6 @@ Search = Generator[Ask, Told, bool]
 Method = Callable[[SearchTask], Search]
 """What makes a search of a task; the search returns whether it met any candidate that has a fitness."""
 Routine = Callable[[Asker], bool]
-
-
-class Best:
-    def __init__(self) -> None:
-        self.x: Array | None = None
-        self.f = np.inf
-
-    def see(self, X: Array, F: Array) -> None:
-        i = int(np.argmin(F))
-        if F[i] < self.f:
-            self.x, self.f = X[i].copy(), float(F[i])
 
 
 def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> Search:
