@@ -7,7 +7,6 @@ made, read and evaluated in a fraction of its time.
 import weakref
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from functools import cache
 from math import inf, isfinite
 from queue import SimpleQueue
 from threading import Thread, current_thread
@@ -251,19 +250,17 @@ class SwarmEvaluator(Evaluator):  # type: ignore[misc]
             self.callback(pop)
 
 
-@cache
-def blank() -> dict[str, Any]:
-    return dict(vars(Individual()))
+# What a new individual holds.
+BLANK = dict(vars(Individual()))
 
 
 def as_population(x: Array, n_iter: int | None) -> Population:
     """Return individuals at the candidates x, (n, n_parameters), as Population.new does, in a fraction of its time."""
-    attributes = blank()
     pop = np.empty(len(x), dtype=object).view(Population)
     for i in range(len(x)):
         pop[i] = individual = Individual.__new__(Individual)
         own = {"_X": x[i], "data": {"n_gen": n_iter, "n_iter": n_iter}, "evaluated": set()}
-        individual.__dict__ = attributes | own
+        individual.__dict__ = BLANK | own
     return pop
 
 
