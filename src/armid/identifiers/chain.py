@@ -14,7 +14,8 @@ from armid.engine import golden_steps
 from armid.errors import ArmidError, nearest
 from armid.identifiers.identifier import Identifier, checked_share
 from armid.identifiers.pymoo_adapter import SearchAlgorithm, search_of, takes_start
-from armid.identifiers.search import Array, Ask, Dropped, Search, SearchTask, Told
+from armid.identifiers.search import Ask, Dropped, Search, SearchTask, Told
+from armid.model import Array
 
 PREFIX = "multistart:"
 

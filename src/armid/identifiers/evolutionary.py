@@ -22,7 +22,8 @@ from armid.identifiers.identifier import (
     refuse_unknown,
 )
 from armid.identifiers.pymoo_adapter import declared
-from armid.identifiers.search import Array, Ask, Method, Search, SearchTask, SwarmEvaluator
+from armid.identifiers.search import Ask, Method, Search, SearchTask, SwarmEvaluator
+from armid.model import Array
 from armid.problem.meter import PENALTY
 
 Check = Callable[[str, Any], Any]

@@ -6,7 +6,8 @@ import numpy as np
 
 from armid.identifiers.identifier import checked, checked_choice, checked_share
 from armid.identifiers.pymoo_adapter import declared
-from armid.identifiers.search import Array, Asker, Cube, Method, NoFitnessError, Search, SearchTask, local_search
+from armid.identifiers.search import Asker, Cube, Method, NoFitnessError, Search, SearchTask, local_search
+from armid.model import Array
 
 FORWARD, CENTRAL = "forward", "central"
 KINDS = (FORWARD, CENTRAL)

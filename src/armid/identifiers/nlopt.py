@@ -10,7 +10,8 @@ import numpy as np
 from armid.identifiers.identifier import checked, checked_choice, checked_share
 from armid.identifiers.least_squares import CENTRAL, KINDS, slopes, stencil
 from armid.identifiers.pymoo_adapter import SEEDS, declared
-from armid.identifiers.search import Array, Asker, Height, Method, Search, SearchTask, local_search
+from armid.identifiers.search import Asker, Height, Method, Search, SearchTask, local_search
+from armid.model import Array
 
 # A model of BOBYQA that reached beyond both bounds would be refused.
 LONGEST_STEP = 0.5

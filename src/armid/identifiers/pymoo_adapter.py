@@ -27,7 +27,8 @@ from armid.identifiers.search import (
     as_population,
     bounds_of,
 )
-from armid.problem.meter import PENALTY, RESIDUALS, Array, Metered
+from armid.model import Array
+from armid.problem.meter import PENALTY, RESIDUALS, Metered
 
 SEEDS = 2**31 - 1
 PLAIN = ["F", "G", "H"]

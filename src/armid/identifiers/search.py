@@ -13,16 +13,15 @@ from threading import Thread, current_thread
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
 from armid.errors import ArmidError
+from armid.model import Array
 from armid.problem.meter import PENALTY
 
-Array = NDArray[np.float64]
 # A start on a bound stalls the simplex.
 PULLED = 1e-3
 

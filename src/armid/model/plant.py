@@ -13,6 +13,8 @@ from armid.model.effect import Equation, Guard, State
 from armid.model.parameter import Parameter, Scales, check_name
 from armid.units import SUFFIXES
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Manoeuvre:
@@ -27,11 +29,11 @@ class Manoeuvre:
     interval: float
     n_samples: int
     constants: Mapping[str, float] = field(default_factory=dict)
-    inputs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    inputs: Mapping[str, Array] = field(default_factory=dict)
     hold: str = "linear"
     start_time: float = 0.0
 
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Array:
         """Return the sample times [s], shape (n_samples,)."""
         return self.start_time + self.interval * np.arange(self.n_samples, dtype=np.float64)
 

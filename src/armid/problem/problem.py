@@ -6,17 +6,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armid.engine import Calibration, Prepared, Simulation, accuracy_against, calibrate, prepare, probes
 from armid.errors import ArmidError, nearest
-from armid.model import Model
+from armid.model import Array, Model
 from armid.problem.fitness import Fitness, joined, record_weights
 from armid.problem.meter import Meter, Metered
 from armid.problem.space import Space
 from armid.record import Piece, Record
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

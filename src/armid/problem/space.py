@@ -7,10 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest
-from armid.model import Model
+from armid.model import Array, Model
 from armid.record import Override
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,18 +11,17 @@ from functools import cache, cached_property
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pymoo.core.problem import Problem
 
 from armid.errors import ArmidError, nearest
-from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
+from armid.model import EFFECTS, PLANTS, Array, Manoeuvre, Model
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import PENALTY
 from armid.problem.problem import IdentificationProblem, replay_of, residuals
 from armid.problem.space import Space, space_of
 from armid.record import Noise, Piece, Record
 
-Array = NDArray[np.float64]
 VERSION = 1
 N_INSTANCES = 15
 DEGREE = np.pi / 180.0

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from armid.record.record import Record
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # So many equal samples in a row are no chance where the noise exceeds half a step of the values; so many lie on one
 # straight line only where a gap was bridged; a sensor at its limit shows as many in all.

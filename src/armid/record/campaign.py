@@ -10,10 +10,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import EFFECTS, PLANTS, Effect, Model, Output, Parameter, Plant
+from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
 from armid.record.reader import NAME, SharedEntries, campaign_path, gravity_of, read_record, record_path
@@ -198,9 +197,7 @@ def read_campaign(
     )  # fmt: skip
 
 
-def write_campaign(
-    out: str | Path, campaign_toml: str, tables: Mapping[str, Mapping[str, NDArray[np.float64]]]
-) -> Path:
+def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Mapping[str, Array]]) -> Path:
     """Write campaign.toml and its CSV files, whole or not at all.
 
     Parameters

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
+from armid.model import Array
 from armid.record.campaign import write_campaign
 from armid.record.table import read_table
 
-Array = NDArray[np.float64]
 EMPS_FILES = "DATA_EMPS", "DATA_EMPS_PULSES"
 CUTOFF_HZ, FILTER_ORDER = 100.0, 4
 EMPS_VARIABLES = ("t", "qm", "vir", "gtau")

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Manoeuvre, ManoeuvreKey, Output, Plant
+from armid.model import Array, Manoeuvre, ManoeuvreKey, Output, Plant
 from armid.record.noise import noise_of, smallest_step
 from armid.record.record import Piece, Record
 from armid.record.resample import Timing, is_constant, moved_onto_grid, onto_grid, piece_length, timing_of, with_window
@@ -28,7 +27,6 @@ from armid.record.table import (
     time_column,
 )
 
-Array = NDArray[np.float64]
 NAME, SUFFIX = "campaign.toml", ".csv"
 POSITION, SPEED = "start_position", "start_speed"
 ROUNDING = 1e-9

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Output, Plant
+from armid.model import Array, Output, Plant
 from armid.model.plant import SPEEDS
 from armid.units import DEGREE
 
-Array = NDArray[np.float64]
 LARGEST = 1e30
 LONGEST_HEADER = 1 << 16
 NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)

@@ -13,9 +13,8 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, ClassVar, Union
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armid.report.style import place_labels, pyplot, thinned
+from armid.report.style import Array, place_labels, pyplot, thinned
 from armid.units import shown
 
 if TYPE_CHECKING:
@@ -270,7 +269,6 @@ def unlike(names: list[str]) -> list[str]:
     return found
 
 
-Array = NDArray[np.float64]
 # Curves of more records than this would make a page that nobody scrolls through.
 MOST_RECORDS = 24
 ERROR_NOTE = (
