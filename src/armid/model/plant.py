@@ -55,9 +55,6 @@ class Manoeuvre:
         return self.interval, self.n_samples, self.hold, tuple(sorted(self.constants.items())), inputs
 
 
-HOLDS = ("", "linear", "zero")
-
-
 @dataclass(frozen=True)
 class Constant:
     """Declare a known quantity with its default value, SI.
@@ -102,7 +99,7 @@ class Input:
 
     def __post_init__(self) -> None:
         check_name(self.name, "input")
-        if self.hold not in HOLDS:
+        if self.hold not in ("", "linear", "zero"):
             raise ArmidError(f"input '{self.name}' has the hold '{self.hold}': 'linear', 'zero' or '' is expected")
         if self.typical is not None and not self.typical[0] < self.typical[1]:
             raise ArmidError(f"input '{self.name}' is typically {self.typical}: a smaller and a larger value are "

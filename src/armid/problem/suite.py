@@ -21,10 +21,10 @@ from armid.problem.meter import PENALTY
 from armid.problem.problem import IdentificationProblem, replay_of, residuals
 from armid.problem.space import Space, space_of
 from armid.record import Noise, Piece, Record
+from armid.units import DEGREE
 
 VERSION = 1
 N_INSTANCES = 15
-DEGREE = np.pi / 180.0
 INTERVAL_S = 1e-3
 # The truth keeps this share of the range away from each bound.
 MARGIN = 0.15

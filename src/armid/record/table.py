@@ -209,11 +209,6 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
     return found
 
 
-def si_factor(header: str) -> float:
-    """Return what turns an input column into SI: degrees into radians, all else taken as it is."""
-    return DEGREE if header.endswith(("_deg", "_deg_s")) else 1.0
-
-
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
     def quantity_of(header: str) -> str:
         return next((q for q in QUANTITIES if header == q or header.startswith(f"{q}_")), header)

@@ -11,8 +11,7 @@ import numpy as np
 from armid.model.effect import Guard, State
 from armid.model.parameter import Parameter, Scales
 from armid.model.plant import Constant, ManoeuvreKey, Plant
-
-DEGREE = np.pi / 180.0
+from armid.units import DEGREE
 
 
 def arm_inertia(I6_empty, I6_loaded, shell):

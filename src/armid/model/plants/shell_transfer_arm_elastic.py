@@ -12,6 +12,7 @@ from armid.model.plant import Constant
 from armid.model.plants import shell_transfer_arm as arm
 from armid.model.plants.flexible_link import CONTACTS, coupling_torque, play_half, twist_rate
 from armid.model.plants.shell_transfer_arm import demand as rigid_demand
+from armid.units import DEGREE
 
 
 def drive_inertia(I01, I23, I45, i1, i2, i3, eta1, eta2, eta3):
@@ -71,7 +72,7 @@ shell_transfer_arm_elastic = replace(
         *RIGID.constants,
         Constant("stiffness", 1e6, "N m/rad", arm.ESTIMATE),
         Constant("link_damping", 500.0, "N m s/rad", arm.ESTIMATE),
-        Constant("half_play", 0.05 * arm.DEGREE, "rad", arm.ESTIMATE),
+        Constant("half_play", 0.05 * DEGREE, "rad", arm.ESTIMATE),
     ),
     ports={**RIGID.ports, "play": "rad", "series_compliance": "rad/(N m)", "coupling": "N m"},
     guards=(*RIGID.guards, *CONTACTS),
