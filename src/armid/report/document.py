@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from math import isfinite
-from typing import TYPE_CHECKING, Any, ClassVar, Union
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
@@ -73,7 +73,6 @@ class Table:
     first column stand under it as a heading (terminal only).
     """
 
-    kind: ClassVar[str] = "table"
     name: str
     title: str
     caption: str
@@ -136,7 +135,6 @@ class Figure:
     is only stored. svg: its stored text; "" for one that is drawn when it is needed.
     """
 
-    kind: ClassVar[str] = "figure"
     name: str
     title: str
     caption: str
@@ -152,7 +150,6 @@ class Gallery:
     the PNG file that shows them together, for Markdown; "" for none. wide: whether each has a row of its own.
     """
 
-    kind: ClassVar[str] = "gallery"
     figures: tuple[Figure, ...]
     slider: str = ""
     name: str = ""
@@ -161,7 +158,6 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Text:
-    kind: ClassVar[str] = "text"
     text: str
 
 
@@ -169,7 +165,6 @@ class Text:
 class Sentences:
     """Sentences, one a bullet, under a title or none."""
 
-    kind: ClassVar[str] = "sentences"
     sentences: tuple[str, ...]
     title: str = ""
 
@@ -184,7 +179,6 @@ class Line:
 
 @dataclass(frozen=True)
 class Listing:
-    kind: ClassVar[str] = "listing"
     title: str
     lines: tuple[Line, ...]
     folded: bool = False
