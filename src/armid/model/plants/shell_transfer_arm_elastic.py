@@ -7,7 +7,7 @@ play are engineering estimates; with a stiff spring and no play it moves as `she
 
 from dataclasses import replace
 
-from armid.model.effect import State
+from armid.model.effect import State, zero
 from armid.model.plant import Constant
 from armid.model.plants import shell_transfer_arm as arm
 from armid.model.plants.flexible_link import CONTACTS, coupling_torque, play_half, twist_rate
@@ -64,8 +64,8 @@ shell_transfer_arm_elastic = replace(
     note="shell transfer arm with a torsion spring and play between drive and arm",
     states=(
         *(replace(s, rate=speed_rate) if s.name == "omega" else s for s in RIGID.states),
-        State("twist", "rad", twist_rate, arm.at_rest, "twist_rad"),
-        State("twist_speed", "rad/s", twist_speed_rate, arm.at_rest, "twist_speed_rad_s"),
+        State("twist", "rad", twist_rate, zero, "twist_rad"),
+        State("twist_speed", "rad/s", twist_speed_rate, zero, "twist_speed_rad_s"),
     ),
     quantities={n: f for n, f in RIGID.quantities.items() if n != "total_inertia"} | {f.__name__: f for f in OWN},
     constants=(
