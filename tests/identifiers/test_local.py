@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from searches import Bowl, identifier, ran
 
 from armid.identifiers.least_squares import CENTRAL, FORWARD, slopes, stencil
-from armid.identifiers.nlopt import NLOPT, Calls, optimised
+from armid.identifiers.nlopt import ALGORITHMS, Calls, optimised
 from armid.identifiers.search import Height, NoFitnessError, pulled
 
-ALGORITHMS = {kind.name: kind.algorithm for kind in NLOPT}
 Array = NDArray[np.float64]
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")
 # A seed whose start is in the middle of the box, where no step has to turn.
@@ -32,7 +31,7 @@ def nlopt_alone(name: str, problem: Bowl, start: Array, n: int) -> Array:
 
     first = problem.A @ start - problem.b
     scale = float(first @ first)
-    search = nlopt.opt(getattr(nlopt, ALGORITHMS[name]), 3)
+    search = nlopt.opt(getattr(nlopt, ALGORITHMS[name][1]), 3)
     search.set_lower_bounds(np.zeros(3))
     search.set_upper_bounds(np.ones(3))
     search.set_initial_step(0.05)

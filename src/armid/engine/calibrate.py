@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine.generate import LONGEST
-from armid.engine.simulate import Array, Schedule, Simulation, simulate
+from armid.engine.simulate import Schedule, Simulation, simulate
 from armid.errors import ArmidError
-from armid.model import Manoeuvre, Model
+from armid.model import Array, Manoeuvre, Model
 
 STANDARD, FINE = "standard", "fine"
 # Errors of the recorded signals that are allowed, as shares of their sizes (arm: 2 rad/s).

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model, compiling
 from armid.errors import ArmidError, nearest
-from armid.model import Manoeuvre, Model
+from armid.model import Array, Manoeuvre, Model
 
-Array = NDArray[np.float64]
 # Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
 SHARES = 4
 # A candidate one of whose signals exceeds so many times its size has diverged.

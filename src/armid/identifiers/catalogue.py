@@ -2,17 +2,18 @@
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from functools import partial
 from typing import Any
 
 from armid.errors import ArmidError, nearest
 from armid.identifiers.chain import PREFIX, chain_of, multistart_of
-from armid.identifiers.evolutionary import PYMOO, BipopCmaes, Cmaes, PymooAlgorithm, SobolSearch, UniformSearch
+from armid.identifiers.evolutionary import EVOLUTIONARY, PymooAlgorithm
 from armid.identifiers.foreign import FOREIGN
 from armid.identifiers.identifier import Identifier, checked_count, checked_population
-from armid.identifiers.least_squares import LeastSquares
+from armid.identifiers.least_squares import LEAST_SQUARES
 from armid.identifiers.nlopt import NLOPT
 from armid.identifiers.pso import PaperPSO
+from armid.identifiers.pymoo_adapter import built_search
 
 
 def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
@@ -53,7 +54,9 @@ def swarm(budget: int, **options: Any) -> PaperPSO:
 
 _IDENTIFIERS = (
     Identifier("pso", swarm, "the paper's particle swarm (Eqs 8-9)", is_global=True),
-    *(d.identifier() for d in (*PYMOO, Cmaes, BipopCmaes, UniformSearch, SobolSearch, *NLOPT, LeastSquares)),
+    *EVOLUTIONARY,
+    *NLOPT,
+    LEAST_SQUARES,
     *FOREIGN,
 )
 
@@ -95,16 +98,15 @@ OPTIONS = {
 def options_of(identifier: Identifier) -> dict[str, dict[str, Any]]:
     """Return option -> default, unit, meaning, of those that an identifier declares; a default of None is its own."""
     build = identifier.build
-    declared = getattr(build, "args", (None,))[0]
     if build is swarm:
         defaults = defaults_in(PaperPSO) | {"n_particles": None, "n_iterations": None}
     elif isinstance(build, PymooAlgorithm):
         of_pymoo = defaults_in(build.algorithm())
         defaults = {name: of_pymoo.get(name) for name in build.options} | {"pop_size": build.pop_size}
-    elif isinstance(declared, type) and is_dataclass(declared):
-        defaults = {f.name: f.default for f in fields(declared)}
+    elif isinstance(build, partial):
+        defaults = defaults_in(build.args[0]) if build.func is built_search else {}
     else:
-        defaults = {} if declared is not None else defaults_in(build)
+        defaults = defaults_in(build)
     none = ("", "")
     return {name: {"default": value, "unit": OPTIONS.get(name, none)[0], "meaning": OPTIONS.get(name, none)[1]}
             for name, value in defaults.items()}  # fmt: skip

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import accumulate
+from sys import maxsize
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,10 @@ from armid.engine import golden_steps
 from armid.errors import ArmidError, nearest
 from armid.identifiers.identifier import Identifier, checked_share
 from armid.identifiers.pymoo_adapter import SearchAlgorithm, search_of, takes_start
-from armid.identifiers.search import Array, Ask, Best, Dropped, Method, Search, SearchTask, Told
+from armid.identifiers.search import Ask, Dropped, Search, SearchTask, Told
+from armid.model import Array
 
 PREFIX = "multistart:"
-Build = Callable[[], Algorithm]
 
 
 def chain_of(phases: Sequence[Identifier]) -> Identifier:
@@ -44,8 +45,15 @@ def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> 
     for phase, build in zip(phases, builds, strict=True):
         if not takes_start(build()) and phase is not phases[0]:
             raise ArmidError(f"identifier '{phase.name}' takes no start x0, in a chain it is expected to be the first")
-    ends = [round(end * budget) for end in accumulate(shares[:-1])]
-    return SearchAlgorithm(chain_method(list(zip(builds, ends, strict=False)), builds[-1]), budget)
+    ends = [*(round(end * budget) for end in accumulate(shares[:-1])), maxsize]
+
+    def method(task: SearchTask) -> Search:
+        seen = Seen(task)
+        for build, end in zip(builds, ends, strict=True):
+            yield from seen.until(build, end)
+        return seen.best is not None
+
+    return SearchAlgorithm(method, budget)
 
 
 def shares_of(given: Any, n_phases: int) -> list[float]:
@@ -67,55 +75,37 @@ def as_number(part: Any) -> Any:
         return part
 
 
-def chain_method(first: Sequence[tuple[Build, int]], last: Build) -> Method:
-    def method(task: SearchTask) -> Search:
-        seen = Seen(task)
-        for build, end in first:
-            yield from seen.until(build, end)
-        yield from seen.until(last, None)
-        return seen.best.x is not None
-
-    return method
-
-
 class Seen:
     """Follow the phases of a chain: count what they ask for and keep the best, where the next one starts."""
 
     def __init__(self, task: SearchTask) -> None:
-        self.task, self.best, self.used = task, Best(), 0
-        self.best.x = task.start
+        self.task, self.best, self.least, self.used = task, task.start, np.inf, 0
 
-    def until(self, build: Build, end: int | None) -> Search:
+    def until(self, build: Callable[[], Algorithm], end: int) -> Search:
         """Run a fresh phase until it ends by itself or so many simulations are used; its last batch may be cut."""
-
-        def over() -> bool:
-            return end is not None and self.used >= end
-
-        def cut(X: Array) -> Array:
-            return X if end is None else X[: end - self.used]
 
         def ask(X: Array, residuals: bool = False) -> Told:
             assert self.task.ask is not None
-            kept = cut(X)
+            kept = X[: end - self.used]
             told = self.see(kept, self.task.ask(kept, residuals))
-            if over():
+            if self.used >= end:
                 raise Dropped
             return told
 
-        if over():
+        if self.used >= end:
             return True
         asker = None if self.task.ask is None else ask
-        search = search_of(build(), replace(self.task, start=self.best.x, ask=asker))
+        search = search_of(build(), replace(self.task, start=self.best, ask=asker))
         told: Told | None = None
         try:
-            while not over():
+            while self.used < end:
                 asked = search.send(told)  # type: ignore[arg-type]
-                kept = cut(asked.X)
+                kept = asked.X[: end - self.used]
                 told = self.see(kept, (yield Ask(kept, asked.residuals)))
         except StopIteration:
             return True
         except Dropped:
-            if not over():
+            if self.used < end:
                 raise
         finally:
             search.close()
@@ -123,7 +113,9 @@ class Seen:
 
     def see(self, X: Array, told: Told) -> Told:
         self.used += len(X)
-        self.best.see(X, told.F)
+        leader = int(np.argmin(told.F))
+        if told.F[leader] < self.least:
+            self.best, self.least = X[leader].copy(), float(told.F[leader])
         return told
 
 
@@ -140,24 +132,17 @@ def multistart_of(local: Identifier) -> Identifier:
 def built_multistart(local: Identifier, budget: int, **options: Any) -> SearchAlgorithm:
     (told,) = of_phases(options, (local,), (), f"'{PREFIX}{local.name}'")
     build = partial(told.build, budget)
-    algorithm = build()
-    if not takes_start(algorithm):
+    if not takes_start(build()):
         raise ArmidError(f"identifier '{local.name}' takes no start x0, {PREFIX} expects one that does")
-    return SearchAlgorithm(multistart_method(build), budget)
-
-
-def multistart_method(build: Callable[[], Algorithm]) -> Method:
-    """Return the search that starts a fresh local one at the task's start, if it has one, then at spread points."""
 
     def method(task: SearchTask) -> Search:
-        cube = task.cube
-        start = task.start
+        cube, start = task.cube, task.start
         for point in spread(task.random, cube.n):
-            yield from search_of(build(), task.at(cube.candidates(point)[0] if start is None else start))
+            yield from search_of(build(), replace(task, start=cube.candidates(point)[0] if start is None else start))
             start = None
         return True
 
-    return method
+    return SearchAlgorithm(method, budget)
 
 
 def spread(random: np.random.Generator, n: int) -> Iterator[Array]:

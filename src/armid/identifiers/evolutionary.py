@@ -21,8 +21,9 @@ from armid.identifiers.identifier import (
     checked_share,
     refuse_unknown,
 )
-from armid.identifiers.pymoo_adapter import DeclaredSearch
-from armid.identifiers.search import Array, Ask, Search, SearchTask, SwarmEvaluator
+from armid.identifiers.pymoo_adapter import declared
+from armid.identifiers.search import Ask, Method, Search, SearchTask, SwarmEvaluator
+from armid.model import Array
 from armid.problem.meter import PENALTY
 
 Check = Callable[[str, Any], Any]
@@ -59,9 +60,6 @@ class PymooAlgorithm:
         module, kind = self.place.split(":")
         return getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{module}"), kind)
 
-    def identifier(self) -> Identifier:
-        return Identifier(self.name, self, self.note, is_global=True)
-
 
 PYMOO = (
     PymooAlgorithm("pymoo_pso", "adaptive particle swarm (pymoo)", "pso:PSO", 40, {
@@ -79,8 +77,7 @@ PYMOO = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Cmaes(DeclaredSearch):
+def cmaes(initial_step: float = 0.25, n_candidates: int = 8, growth: float = 2.0) -> Method:
     """Covariance matrix adaptation (Hansen, arXiv:1604.00772) with restarts (IPOP, Auger 2005).
 
     Each start is a random point of the box; the first is the task's, if it has one.
@@ -88,30 +85,58 @@ class Cmaes(DeclaredSearch):
     population; growth: factor of the population at each restart.
     """
 
-    name, note, is_global = "cmaes", "CMA-ES, restarted with larger populations (cma)", True
-    initial_step: float = 0.25
-    n_candidates: int = 8
-    growth: float = 2.0
+    def restarts(random: np.random.Generator) -> Restarts:
+        population = float(n_candidates)
+        while True:
+            yield population, initial_step, np.inf
+            population *= growth
 
-    def __post_init__(self) -> None:
-        checked_share("initial_step", self.initial_step)
-        checked_population("n_candidates", self.n_candidates)
-        checked("growth", self.growth, 1.0, "a number of at least 1")
+    return restarted(restarts, initial_step, n_candidates, growth)
 
-    def search(self, task: SearchTask) -> Search:
+
+def bipop_cmaes(initial_step: float = 0.25, n_candidates: int = 8, growth: float = 2.0) -> Method:
+    """CMA-ES with two kinds of restarts that share the budget evenly (Hansen 2009, doi:10.1145/1570256.1570333).
+
+    The large ones grow as in IPOP. A small one has lambda_0 (lambda / 2 lambda_0)^(U^2) candidates, lambda those of the
+    last large one, a first step smaller by 10^(-2 U'), and at most half of what the last large one used.
+    """
+
+    def restarts(random: np.random.Generator) -> Restarts:
+        first, n_large, large, small = float(n_candidates), float(n_candidates), 0, 0
+        last = yield first, initial_step, np.inf
+        while True:
+            if small < large:
+                n_small = first * max(0.5 * n_large / first, 1.0) ** (random.random() ** 2)
+                small += yield n_small, initial_step * 10.0 ** (-2.0 * random.random()), 0.5 * last
+            else:
+                n_large *= growth
+                last = yield n_large, initial_step, np.inf
+                large += last
+
+    return restarted(restarts, initial_step, n_candidates, growth)
+
+
+def restarted(
+    restarts: Callable[[np.random.Generator], Restarts], initial_step: float, n_candidates: int, growth: float
+) -> Method:
+    checked_share("initial_step", initial_step)
+    checked_population("n_candidates", n_candidates)
+    checked("growth", growth, 1.0, "a number of at least 1")
+
+    def search(task: SearchTask) -> Search:
         from cma import CMAEvolutionStrategy
 
         def normal(*shape: int) -> Array:
             return task.random.standard_normal(shape)
 
-        cube, restarts = task.cube, self.restarts(task.random)
+        cube, starts = task.cube, restarts(task.random)
         start = cube.drawn(task.random) if task.start is None else cube.point(task.start)
-        n_candidates, step, most = next(restarts)
+        population, step, most = next(starts)
         while True:
             # quiet, writing no file, drawing from the task's generator and not from the global one; in one dimension
             # cma fails where a standard deviation reaches its limit, so that there is none
             settings = {
-                "bounds": [0.0, 1.0], "popsize": max(4, round(n_candidates)), "randn": normal, "seed": np.nan,
+                "bounds": [0.0, 1.0], "popsize": max(4, round(population)), "randn": normal, "seed": np.nan,
                 "verbose": -10, "verb_log": 0, "verb_disp": 0, "signals_filename": "",
                 "maxstd": np.inf if cube.n == 1 else None,
             }  # fmt: skip
@@ -121,67 +146,43 @@ class Cmaes(DeclaredSearch):
                 told = yield Ask(cube.candidates(np.array(points)))
                 strategy.tell(points, np.minimum(told.F, PENALTY))
                 used += len(points)
-            n_candidates, step, most = restarts.send(used)
+            population, step, most = starts.send(used)
             start = cube.drawn(task.random)
 
-    def restarts(self, random: np.random.Generator) -> Restarts:
-        """Yield population, first standard deviation and most simulations of each start; is sent what was used."""
-        n_candidates = float(self.n_candidates)
-        while True:
-            yield n_candidates, self.initial_step, np.inf
-            n_candidates *= self.growth
+    return search
 
 
-@dataclass(frozen=True)
-class BipopCmaes(Cmaes):
-    """CMA-ES with two kinds of restarts that share the budget evenly (Hansen 2009, doi:10.1145/1570256.1570333).
-
-    The large ones grow as in IPOP. A small one has lambda_0 (lambda / 2 lambda_0)^(U^2) candidates, lambda those of the
-    last large one, a first step smaller by 10^(-2 U'), and at most half of what the last large one used.
-    """
-
-    name, note = "bipop_cmaes", "CMA-ES, restarted with large and small populations in turn, BIPOP (cma)"
-
-    def restarts(self, random: np.random.Generator) -> Restarts:
-        """Yield as IPOP does, and small starts while they have used less."""
-        first, n_large, large, small = float(self.n_candidates), float(self.n_candidates), 0, 0
-        last = yield first, self.initial_step, np.inf
-        while True:
-            if small < large:
-                n_small = first * max(0.5 * n_large / first, 1.0) ** (random.random() ** 2)
-                small += yield n_small, self.initial_step * 10.0 ** (-2.0 * random.random()), 0.5 * last
-            else:
-                n_large *= self.growth
-                last = yield n_large, self.initial_step, np.inf
-                large += last
-
-
-@dataclass(frozen=True)
-class UniformSearch(DeclaredSearch):
+def uniform(n_candidates: int = 80) -> Method:
     """Draw candidates uniformly from the box and learn nothing. n_candidates: drawn at a time."""
+    checked_population("n_candidates", n_candidates)
 
-    name, note, is_global = "random", "uniform random search, to compare with", True
-    n_candidates: int = 80
-
-    def __post_init__(self) -> None:
-        checked_population("n_candidates", self.n_candidates)
-
-    def search(self, task: SearchTask) -> Search:
+    def search(task: SearchTask) -> Search:
         cube = task.cube
         while True:
-            yield Ask(cube.candidates(task.random.random((self.n_candidates, cube.n))))
+            yield Ask(cube.candidates(task.random.random((n_candidates, cube.n))))
+
+    return search
 
 
-@dataclass(frozen=True)
-class SobolSearch(UniformSearch):
+def sobol(n_candidates: int = 64) -> Method:
     """Draw scrambled Sobol points, a power of 2 at a time (Owen 1998, doi:10.1006/jcom.1998.0487)."""
+    checked_population("n_candidates", n_candidates)
 
-    name, note = "sobol", "scrambled Sobol points (scipy), to compare with"
-    n_candidates: int = 64
-
-    def search(self, task: SearchTask) -> Search:
+    def search(task: SearchTask) -> Search:
         from scipy.stats import qmc
 
         points = qmc.Sobol(task.cube.n, rng=task.random)
         while True:
-            yield Ask(task.cube.candidates(points.random(self.n_candidates)))
+            yield Ask(task.cube.candidates(points.random(n_candidates)))
+
+    return search
+
+
+EVOLUTIONARY = (
+    *(Identifier(build.name, build, build.note, is_global=True) for build in PYMOO),
+    declared("cmaes", "CMA-ES, restarted with larger populations (cma)", cmaes, is_global=True),
+    declared("bipop_cmaes", "CMA-ES, restarted with large and small populations in turn, BIPOP (cma)", bipop_cmaes,
+             is_global=True),
+    declared("random", "uniform random search, to compare with", uniform, is_global=True),
+    declared("sobol", "scrambled Sobol points (scipy), to compare with", sobol, is_global=True),
+)  # fmt: skip

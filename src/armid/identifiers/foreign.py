@@ -15,7 +15,7 @@ from armid.errors import ArmidError
 from armid.identifiers.identifier import Identifier, checked_count, checked_share
 from armid.identifiers.own import Value, as_identifier
 from armid.identifiers.pymoo_adapter import SEEDS, SearchAlgorithm
-from armid.identifiers.search import Array
+from armid.model import Array
 
 
 def lshade(

@@ -110,8 +110,7 @@ def checked_count(name: str, value: Any, most: int = LARGEST_COUNT) -> int:
     return int(value)
 
 
-def checked_population(name: str, value: Any) -> int:
-    return checked_count(name, value, LARGEST_POPULATION)
+checked_population = partial(checked_count, most=LARGEST_POPULATION)
 
 
 def checked_flag(name: str, value: Any) -> bool:

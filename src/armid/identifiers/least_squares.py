@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from armid.identifiers.identifier import checked, checked_choice, checked_share
-from armid.identifiers.pymoo_adapter import DeclaredSearch
-from armid.identifiers.search import Array, Asker, Cube, NoFitnessError, Search, SearchTask, local_search
+from armid.identifiers.pymoo_adapter import declared
+from armid.identifiers.search import Asker, Cube, Method, NoFitnessError, Search, SearchTask, local_search
+from armid.model import Array
 
 FORWARD, CENTRAL = "forward", "central"
 KINDS = (FORWARD, CENTRAL)
@@ -14,8 +15,7 @@ KINDS = (FORWARD, CENTRAL)
 MOST_CALLS = 10**9
 
 
-@dataclass(frozen=True)
-class LeastSquares(DeclaredSearch):
+def trust_region(differences: str = FORWARD, step: float = 1e-6, tolerance: float = 1e-12) -> Method:
     """Minimise sum r_i(x)^2 within the box by trust region reflective steps.
 
     The derivatives of r come from one batch of perturbed candidates a step. Source: Branch, Coleman, Li 1999,
@@ -23,38 +23,37 @@ class LeastSquares(DeclaredSearch):
     differences: "forward" or "central"; step: how far a perturbed candidate is, as a share of the range;
     tolerance: it ends when a step changes parameters or sum of squares by less than this share.
     """
+    checked_choice("differences", differences, KINDS)
+    checked_share("step", step)
+    checked("tolerance", tolerance, 1e-15, "a number of at least 1e-15")
 
-    name, note = "least_squares", "trust region on the residual vector (scipy)"
-    uses_gradient = needs_residuals = True
-    differences: str = FORWARD
-    step: float = 1e-6
-    tolerance: float = 1e-12
-
-    def __post_init__(self) -> None:
-        checked_choice("differences", self.differences, KINDS)
-        checked_share("step", self.step)
-        checked("tolerance", self.tolerance, 1e-15, "a number of at least 1e-15")
-
-    def search(self, task: SearchTask) -> Search:
+    def search(task: SearchTask) -> Search:
         cube = task.cube
-        return local_search(task, lambda ask, start: self.descend(cube, ask, start))
 
-    def descend(self, cube: Cube, ask: Asker, start: Array) -> None:
-        from scipy.optimize import least_squares
+        def descend(ask: Asker, start: Array) -> None:
+            from scipy.optimize import least_squares
 
-        residual = Residual(self, cube, ask)
-        # no limit on the gradient: it is no share of anything
-        least_squares(
-            residual.at, start, residual.derivative, (0.0, 1.0), "trf", ftol=self.tolerance, xtol=self.tolerance,
-            gtol=None, max_nfev=MOST_CALLS,
-        )  # fmt: skip
+            residual = Residual(cube, ask, step, differences)
+            # no limit on the gradient: it is no share of anything
+            least_squares(
+                residual.at, start, residual.derivative, (0.0, 1.0), "trf", ftol=tolerance, xtol=tolerance, gtol=None,
+                max_nfev=MOST_CALLS,
+            )  # fmt: skip
+
+        return local_search(task, descend)
+
+    return search
+
+
+LEAST_SQUARES = declared("least_squares", "trust region on the residual vector (scipy)", trust_region,
+                         uses_gradient=True, needs_residuals=True)  # fmt: skip
 
 
 class Residual:
     """Give scipy residuals and their derivatives; the latter at the point that it asked for last, which is accepted."""
 
-    def __init__(self, options: LeastSquares, cube: Cube, ask: Asker) -> None:
-        self.options, self.cube, self.ask = options, cube, ask
+    def __init__(self, cube: Cube, ask: Asker, step: float, differences: str) -> None:
+        self.cube, self.ask, self.step, self.differences = cube, ask, step, differences
         self.here: Array | None = None
 
     def at(self, u: Array) -> Array:
@@ -72,7 +71,7 @@ class Residual:
 
     def derivative(self, u: Array) -> Array:
         assert self.here is not None
-        beside = stencil(u, self.options.step, self.options.differences)
+        beside = stencil(u, self.step, self.differences)
         told = self.ask(self.cube.candidates(beside.points), residuals=True)
         assert told.residuals is not None
         there = np.where(np.isfinite(told.F)[:, np.newaxis], told.residuals, np.nan)

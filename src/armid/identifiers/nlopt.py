@@ -1,17 +1,17 @@
-"""The local searches of NLopt, with and without derivatives: each a small declaration, all run by `NloptSearch`."""
+"""The local searches of NLopt, with and without derivatives: all run by `by_gradient`."""
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import ClassVar
+from functools import partial
 
 import nlopt
 import numpy as np
 
 from armid.identifiers.identifier import checked, checked_choice, checked_share
 from armid.identifiers.least_squares import CENTRAL, KINDS, slopes, stencil
-from armid.identifiers.pymoo_adapter import SEEDS, DeclaredSearch
-from armid.identifiers.search import Array, Asker, Cube, Height, Search, SearchTask, local_search
+from armid.identifiers.pymoo_adapter import SEEDS, declared
+from armid.identifiers.search import Asker, Height, Method, Search, SearchTask, local_search
+from armid.model import Array
 
 # A model of BOBYQA that reached beyond both bounds would be refused.
 LONGEST_STEP = 0.5
@@ -20,127 +20,84 @@ LONGEST_STEP = 0.5
 NO_PROGRESS = (nlopt.RoundoffLimited, getattr(nlopt, "runtime_error", RuntimeError))
 
 
-@dataclass(frozen=True)
-class NloptSearch(DeclaredSearch):
-    """Minimise in the unit cube by one of NLopt's algorithms.
+def by_values(algorithm: str, initial_step: float = 0.05, tolerance: float = 1e-10) -> Method:
+    """Minimise in the unit cube by one of NLopt's algorithms that ask for values alone; options as of `by_gradient`."""
+    return by_gradient(algorithm, initial_step, tolerance)
+
+
+def by_gradient(
+    algorithm: str, initial_step: float = 0.05, tolerance: float = 1e-10, differences: str = CENTRAL, step: float = 1e-6
+) -> Method:
+    """Minimise in the unit cube by one of NLopt's algorithms, with derivatives where it asks for them.
 
     initial_step: first step, as a share of each parameter's range, at most 0.5; tolerance: it ends when a step changes
-    no parameter by more than this share of its range.
+    no parameter by more than this share of its range. differences: "central" or "forward"; step: how far a perturbed
+    candidate is, as a share of the range.
     """
+    checked_share("initial_step", initial_step, LONGEST_STEP)
+    checked("tolerance", tolerance)
+    checked_choice("differences", differences, KINDS)
+    checked_share("step", step)
 
-    algorithm: ClassVar[str]
-    initial_step: float = 0.05
-    tolerance: float = 1e-10
-
-    def __post_init__(self) -> None:
-        checked_share("initial_step", self.initial_step, LONGEST_STEP)
-        checked("tolerance", self.tolerance)
-
-    def search(self, task: SearchTask) -> Search:
+    def search(task: SearchTask) -> Search:
         cube, seed = task.cube, int(task.random.integers(1, SEEDS))
-        return local_search(task, lambda ask, start: self.descend(cube, seed, ask, start))
 
-    def descend(self, cube: Cube, seed: int, ask: Asker, start: Array) -> None:
-        # NLopt's generator belongs to the thread and would be seeded by the clock
-        nlopt.srand(seed)
-        search = nlopt.opt(getattr(nlopt, self.algorithm), cube.n)
-        search.set_lower_bounds(np.zeros(cube.n))
-        search.set_upper_bounds(np.ones(cube.n))
-        search.set_initial_step(self.initial_step)
-        search.set_xtol_abs(self.tolerance)
-        calls = Calls(self.objective(cube, ask))
-        search.set_min_objective(calls)
-        try:
-            optimised(search, start, calls)
-        finally:
-            # the frames of the error hold NLopt's object and that holds the calls: a reference cycle through NLopt,
-            # which the garbage collector cannot find
-            calls.error = None
+        def descend(ask: Asker, start: Array) -> None:
+            height = Height()
 
-    def objective(self, cube: Cube, ask: Asker) -> "Objective":
-        height = Height()
+            def value(u: Array, gradient: Array) -> float:
+                # the point is a buffer that NLopt uses again
+                here = u.copy()
+                if not gradient.size:
+                    return height.of(float(ask(cube.candidates(here)).F[0]))
+                beside = stencil(here, step, differences)
+                F = ask(cube.candidates(np.vstack([here, beside.points]))).F
+                found = height.of(float(F[0]))
+                gradient[:] = slopes(beside, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
+                return found
 
-        def value(u: Array, gradient: Array) -> float:
-            # the point is a buffer that NLopt uses again
-            here = u.copy()
-            if not gradient.size:
-                return height.of(float(ask(cube.candidates(here)).F[0]))
-            found, gradient[:] = self.with_gradient(here, cube, ask, height)
-            return found
+            # NLopt's generator belongs to the thread and would be seeded by the clock
+            nlopt.srand(seed)
+            search = nlopt.opt(getattr(nlopt, algorithm), cube.n)
+            search.set_lower_bounds(np.zeros(cube.n))
+            search.set_upper_bounds(np.ones(cube.n))
+            search.set_initial_step(initial_step)
+            search.set_xtol_abs(tolerance)
+            calls = Calls(value)
+            search.set_min_objective(calls)
+            try:
+                optimised(search, start, calls)
+            finally:
+                # the frames of the error hold NLopt's object and that holds the calls: a reference cycle through NLopt,
+                # which the garbage collector cannot find
+                calls.error = None
 
-        return value
+        return local_search(task, descend)
 
-    def with_gradient(self, u: Array, cube: Cube, ask: Asker, height: Height) -> tuple[float, Array]:
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class NloptGradientSearch(NloptSearch):
-    """Minimise by one of NLopt's algorithms that ask for derivatives.
-
-    differences: "central" or "forward"; step: how far a perturbed candidate is, as a share of the range.
-    """
-
-    uses_gradient = True
-    differences: str = CENTRAL
-    step: float = 1e-6
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        checked_choice("differences", self.differences, KINDS)
-        checked_share("step", self.step)
-
-    def with_gradient(self, u: Array, cube: Cube, ask: Asker, height: Height) -> tuple[float, Array]:
-        beside = stencil(u, self.step, self.differences)
-        F = ask(cube.candidates(np.vstack([u, beside.points]))).F
-        found = height.of(float(F[0]))
-        return found, slopes(beside, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
+    return search
 
 
-class NelderMead(NloptSearch):
-    """Simplex in the box (Nelder, Mead 1965; Box 1965)."""
-
-    name, note, algorithm = "nelder_mead", "simplex of Nelder and Mead (NLopt)", "LN_NELDERMEAD"
-
-
-class Bobyqa(NloptSearch):
-    """Quadratic models in a trust region (Powell 2009)."""
-
-    name, note, algorithm = "bobyqa", "quadratic models, BOBYQA (NLopt)", "LN_BOBYQA"
-
-
-class Sbplx(NloptSearch):
-    """Nelder-Mead on a sequence of subspaces (Rowan 1990)."""
-
-    name, note, algorithm = "sbplx", "Nelder-Mead on subspaces, Subplex (NLopt)", "LN_SBPLX"
-
-
-class Cobyla(NloptSearch):
-    """Linear models in a trust region (Powell 1994)."""
-
-    name, note, algorithm = "cobyla", "linear models, COBYLA (NLopt)", "LN_COBYLA"
-
-
-class Lbfgs(NloptGradientSearch):
-    """Limited-memory quasi-Newton steps (Nocedal 1980)."""
-
-    name, note, algorithm = "lbfgs", "quasi-Newton steps, L-BFGS (NLopt)", "LD_LBFGS"
-
-
-class Slsqp(NloptGradientSearch):
-    """Sequential least-squares quadratic programmes (Kraft 1994)."""
-
-    name, note, algorithm = "slsqp", "sequential quadratic programmes, SLSQP (NLopt)", "LD_SLSQP"
-
-
-NLOPT = (NelderMead, Bobyqa, Sbplx, Cobyla, Lbfgs, Slsqp)
-Objective = Callable[[Array, Array], float]
+# Name -> what it is, NLopt's name for it. Nelder, Mead 1965 and Box 1965; Powell 2009; Rowan 1990; Powell 1994; Nocedal
+# 1980; Kraft 1994.
+ALGORITHMS = {
+    "nelder_mead": ("simplex of Nelder and Mead (NLopt)", "LN_NELDERMEAD"),
+    "bobyqa": ("quadratic models, BOBYQA (NLopt)", "LN_BOBYQA"),
+    "sbplx": ("Nelder-Mead on subspaces, Subplex (NLopt)", "LN_SBPLX"),
+    "cobyla": ("linear models, COBYLA (NLopt)", "LN_COBYLA"),
+    "lbfgs": ("quasi-Newton steps, L-BFGS (NLopt)", "LD_LBFGS"),
+    "slsqp": ("sequential quadratic programmes, SLSQP (NLopt)", "LD_SLSQP"),
+}
+NLOPT = tuple(
+    declared(name, note, partial(by_gradient, algorithm), uses_gradient=True) if algorithm.startswith("LD_")
+    else declared(name, note, partial(by_values, algorithm))
+    for name, (note, algorithm) in ALGORITHMS.items()
+)  # fmt: skip
 
 
 class Calls:
     """Call an objective until it raises, then never again: L-BFGS goes on calling, and NLopt may lose the error."""
 
-    def __init__(self, value: Objective) -> None:
+    def __init__(self, value: Callable[[Array, Array], float]) -> None:
         self.value = value
         self.error: BaseException | None = None
 

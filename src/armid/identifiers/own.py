@@ -12,7 +12,8 @@ from pymoo.core.algorithm import Algorithm
 from armid.errors import ArmidError
 from armid.identifiers.identifier import Identifier, accepts, refuse_unknown
 from armid.identifiers.pymoo_adapter import SearchAlgorithm
-from armid.identifiers.search import Array, Asker, Search, SearchTask, in_thread
+from armid.identifiers.search import Asker, Search, SearchTask, in_thread
+from armid.model import Array
 from armid.problem.meter import PENALTY
 
 SEARCH_ARGUMENTS = {

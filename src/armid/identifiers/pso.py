@@ -9,7 +9,8 @@ from pymoo.core.problem import Problem
 
 from armid.errors import ArmidError
 from armid.identifiers.identifier import OF_PYMOO, OF_SETUP, checked, checked_count, checked_population, refuse_unknown
-from armid.identifiers.search import Array, SwarmEvaluator, as_population, bounds_of
+from armid.identifiers.search import SwarmEvaluator, as_population, bounds_of
+from armid.model import Array
 
 OWN = (
     "n_particles", "n_iterations", "c1", "c2", "first_inertia", "last_inertia", "velocity_limit", "first_velocity",

@@ -1,10 +1,9 @@
 """A search as an algorithm of pymoo, an algorithm of pymoo as a search, and a search run without pymoo's loop."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any, ClassVar, TypeGuard
+from inspect import signature
+from typing import Any, TypeGuard
 
 import numpy as np
 from pymoo.algorithms.base.local import LocalSearch
@@ -28,7 +27,8 @@ from armid.identifiers.search import (
     as_population,
     bounds_of,
 )
-from armid.problem.meter import PENALTY, RESIDUALS, Array, Metered
+from armid.model import Array
+from armid.problem.meter import PENALTY, RESIDUALS, Metered
 
 SEEDS = 2**31 - 1
 PLAIN = ["F", "G", "H"]
@@ -126,34 +126,18 @@ class SearchAlgorithm(Algorithm):  # type: ignore[misc]
         return self.__dict__ | {"_search": None}
 
 
-@dataclass(frozen=True)
-class DeclaredSearch(ABC):
-    """Declare a search of ours: its name, what it is in words, its capabilities, and as fields its options.
-
-    A subclass checks its options in `__post_init__`; what the capabilities mean, see `Identifier`.
-    """
-
-    name: ClassVar[str]
-    note: ClassVar[str]
-    is_global: ClassVar[bool] = False
-    uses_gradient: ClassVar[bool] = False
-    needs_residuals: ClassVar[bool] = False
-
-    @abstractmethod
-    def search(self, task: SearchTask) -> Search:
-        """Search; return whether any candidate has had a fitness."""
-
-    @classmethod
-    def identifier(cls) -> Identifier:
-        return Identifier(
-            cls.name, partial(built_search, cls), cls.note, is_global=cls.is_global, uses_gradient=cls.uses_gradient,
-            needs_residuals=cls.needs_residuals,
-        )  # fmt: skip
+def declared(
+    name: str, note: str, factory: Callable[..., Method], *, is_global: bool = False, uses_gradient: bool = False,
+    needs_residuals: bool = False,
+) -> Identifier:  # fmt: skip
+    """Return the identifier of a search of ours; factory: makes its method of its options, which it checks."""
+    return Identifier(name, partial(built_search, factory, name), note, is_global=is_global,
+                      uses_gradient=uses_gradient, needs_residuals=needs_residuals)  # fmt: skip
 
 
-def built_search(kind: type[DeclaredSearch], budget: int, **options: Any) -> SearchAlgorithm:
-    refuse_unknown(options, [f.name for f in fields(kind)], f"'{kind.name}'")
-    return SearchAlgorithm(kind(**options).search, budget)
+def built_search(factory: Callable[..., Method], name: str, budget: int, **options: Any) -> SearchAlgorithm:
+    refuse_unknown(options, signature(factory).parameters, f"'{name}'")
+    return SearchAlgorithm(factory(**options), budget)
 
 
 def search_of(algorithm: Algorithm, task: SearchTask) -> Search:

@@ -6,24 +6,22 @@ made, read and evaluated in a fraction of its time.
 
 import weakref
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass
 from math import inf, isfinite
 from queue import SimpleQueue
 from threading import Thread, current_thread
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
 from armid.errors import ArmidError
+from armid.model import Array
 from armid.problem.meter import PENALTY
 
-Array = NDArray[np.float64]
 # A start on a bound stalls the simplex.
 PULLED = 1e-3
 
@@ -68,9 +66,6 @@ class SearchTask:
     start: Array | None = None
     ask: Asker | None = None
 
-    def at(self, start: Array | None) -> "SearchTask":
-        return replace(self, start=start)
-
     @property
     def cube(self) -> "Cube":
         return Cube(*bounds_of(self.problem))
@@ -105,17 +100,6 @@ Search = Generator[Ask, Told, bool]
 Method = Callable[[SearchTask], Search]
 """What makes a search of a task; the search returns whether it met any candidate that has a fitness."""
 Routine = Callable[[Asker], bool]
-
-
-class Best:
-    def __init__(self) -> None:
-        self.x: Array | None = None
-        self.f = np.inf
-
-    def see(self, X: Array, F: Array) -> None:
-        i = int(np.argmin(F))
-        if F[i] < self.f:
-            self.x, self.f = X[i].copy(), float(F[i])
 
 
 def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> Search:
@@ -265,19 +249,17 @@ class SwarmEvaluator(Evaluator):  # type: ignore[misc]
             self.callback(pop)
 
 
-@cache
-def blank() -> dict[str, Any]:
-    return dict(vars(Individual()))
+# What a new individual holds.
+BLANK = dict(vars(Individual()))
 
 
 def as_population(x: Array, n_iter: int | None) -> Population:
     """Return individuals at the candidates x, (n, n_parameters), as Population.new does, in a fraction of its time."""
-    attributes = blank()
     pop = np.empty(len(x), dtype=object).view(Population)
     for i in range(len(x)):
         pop[i] = individual = Individual.__new__(Individual)
         own = {"_X": x[i], "data": {"n_gen": n_iter, "n_iter": n_iter}, "evaluated": set()}
-        individual.__dict__ = attributes | own
+        individual.__dict__ = BLANK | own
     return pop
 
 

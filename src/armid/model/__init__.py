@@ -8,9 +8,9 @@ from armid.model.catalogue import EFFECTS, PLANTS
 from armid.model.effect import Effect, Guard, State
 from armid.model.model import Model, applicable, refusal_of
 from armid.model.parameter import Parameter, Scales
-from armid.model.plant import Constant, Input, Manoeuvre, ManoeuvreKey, Output, Plant
+from armid.model.plant import Array, Constant, Input, Manoeuvre, ManoeuvreKey, Output, Plant
 
 __all__ = [
-    "EFFECTS", "PLANTS", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
+    "EFFECTS", "PLANTS", "Array", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
     "Output", "Parameter", "Plant", "Scales", "State", "applicable", "refusal_of",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 """A physical addition to a plant at named ports, and what several effects share."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from armid.errors import ArmidError, nearest
@@ -11,9 +11,7 @@ Equation = Callable[..., Any]
 # How the nodes of a composed model begin: an effect of this name could not be told from them.
 RESERVED = ("rate", "initial", "guard")
 SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
-SIZE_WIDTH = Parameter(
-    "width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the size of speed is smoothed"
-)
+SIZE_WIDTH = replace(SIGN_WIDTH, note="speed over which the size of speed is smoothed")
 
 
 @dataclass(frozen=True)

@@ -210,10 +210,7 @@ def spelled(key: str) -> str:
 def right_hand_side(node: Node) -> str:
     if node.function is None:
         return " + ".join(spelled(t) for t in node.terms) or "0"
-    expression = returned_expression(node.function)
-    if expression is None:
-        return f"{node.function.__name__}({', '.join(spelled(k) for _, k in node.arguments)})"
-    return ast.unparse(Rename({a: spelled(k) for a, k in node.arguments}).visit(expression))
+    return returned_text(node.function, {a: spelled(k) for a, k in node.arguments})
 
 
 def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> str:
@@ -233,8 +230,7 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
         f"    {spelled(n.key.removeprefix('initial__'))} = {right_hand_side(n).replace('initial.', '')}"
         for n in graph.of_kind("initial")
     ]
-    latches = {g.name for g in plant.guards if g.latch}
-    latches |= {f"{e.name}__{g.name}" for e in effects for g in e.guards if g.latch}
+    latches = {n.key for n in graph.of_kind("latch")}
     for guard in guards:
         name = guard.key.removeprefix("guard__")
         what = "switches once to 1 when" if name in latches else "kink where"
@@ -246,22 +242,24 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
     return "\n".join(lines)
 
 
-def returned_text(function: Equation) -> str:
-    """Return the expression that a function returns, in its own names, or its call when it has several lines."""
-    expression = returned_expression(function)
-    if expression is None:
-        return f"{function.__name__}({', '.join(inspect.signature(function).parameters)})"
-    return ast.unparse(Rename({}).visit(expression))
+def returned_text(function: Equation, names: Mapping[str, str] | None = None) -> str:
+    """Return the expression that a function returns, or its call when it has several lines.
+
+    names: argument -> what stands for it, those that are bound; None: every argument for itself.
+    """
+    names = {a: a for a in inspect.signature(function).parameters} if names is None else names
+    expression = returned_expression(function, names)
+    return f"{function.__name__}({', '.join(names.values())})" if expression is None else ast.unparse(expression)
 
 
-class Rename(ast.NodeTransformer):
-    """Put the bound names into an expression and drop the prefix of numpy."""
+class Insert(ast.NodeTransformer):
+    """Put expressions in the place of names, and drop the prefix of numpy."""
 
-    def __init__(self, names: dict[str, str]) -> None:
-        self.names = names
+    def __init__(self, known: Mapping[str, ast.expr]) -> None:
+        self.known = known
 
-    def visit_Name(self, node: ast.Name) -> ast.Name:
-        return ast.Name(self.names.get(node.id, node.id), node.ctx)
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return copy.deepcopy(self.known.get(node.id, node))
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         if isinstance(node.value, ast.Name) and node.value.id in ("np", "numpy", "math"):
@@ -269,21 +267,13 @@ class Rename(ast.NodeTransformer):
         return self.generic_visit(node)
 
 
-class Insert(ast.NodeTransformer):
-    def __init__(self, known: dict[str, ast.expr]) -> None:
-        self.known = known
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        return copy.deepcopy(self.known.get(node.id, node))
-
-
-def returned_expression(function: Equation) -> ast.expr | None:
+def returned_expression(function: Equation, names: Mapping[str, str]) -> ast.expr | None:
     """Return the expression of a function with its earlier assignments put in; None when it branches or loops."""
     try:
         body = definition_of(function).body
     except ArmidError:
         return None
-    known: dict[str, ast.expr] = {}
+    known: dict[str, ast.expr] = {a: ast.Name(name) for a, name in names.items()}
     for statement in body:
         if isinstance(statement, ast.Return) and statement.value is not None:
             return Insert(known).visit(statement.value)  # type: ignore[no-any-return]

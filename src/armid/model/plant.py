@@ -13,6 +13,8 @@ from armid.model.effect import Equation, Guard, State
 from armid.model.parameter import Parameter, Scales, check_name
 from armid.units import SUFFIXES
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Manoeuvre:
@@ -27,11 +29,11 @@ class Manoeuvre:
     interval: float
     n_samples: int
     constants: Mapping[str, float] = field(default_factory=dict)
-    inputs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    inputs: Mapping[str, Array] = field(default_factory=dict)
     hold: str = "linear"
     start_time: float = 0.0
 
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Array:
         """Return the sample times [s], shape (n_samples,)."""
         return self.start_time + self.interval * np.arange(self.n_samples, dtype=np.float64)
 
@@ -51,9 +53,6 @@ class Manoeuvre:
         """Return what two manoeuvres have in common when a machine answers both alike, hashable; not the start time."""
         inputs = tuple((name, values.tobytes()) for name, values in sorted(self.inputs.items()))
         return self.interval, self.n_samples, self.hold, tuple(sorted(self.constants.items())), inputs
-
-
-HOLDS = ("", "linear", "zero")
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ class Input:
 
     def __post_init__(self) -> None:
         check_name(self.name, "input")
-        if self.hold not in HOLDS:
+        if self.hold not in ("", "linear", "zero"):
             raise ArmidError(f"input '{self.name}' has the hold '{self.hold}': 'linear', 'zero' or '' is expected")
         if self.typical is not None and not self.typical[0] < self.typical[1]:
             raise ArmidError(f"input '{self.name}' is typically {self.typical}: a smaller and a larger value are "

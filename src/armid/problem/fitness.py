@@ -150,31 +150,27 @@ def as_fitness(name: str, obj: Fitness | Callable[..., Any]) -> Fitness:
     return obj if isinstance(obj, Fitness) else Fitness(name, obj, note="a function of the user")
 
 
-def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
-    """Return the mean of (x - x')^2 [signal's unit squared], (n_candidates,)."""
+def square_sums(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    """Return the sum of (x - x')^2 [signal's unit squared], (n_candidates,)."""
     from armid.problem.similarity import as_series, sums_of_squares
 
-    x, rows = as_series(measured, simulated)
-    return np.asarray(sums_of_squares(x, rows)) / x.size
+    return np.asarray(sums_of_squares(*as_series(measured, simulated)))
+
+
+def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
+    return square_sums(measured, simulated) / np.size(measured)
 
 
 def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
-    from armid.problem.similarity import as_series, sums_of_squares
-
-    x, rows = as_series(measured, simulated)
-    whole = float(np.square(x).sum())
+    sums, whole = square_sums(measured, simulated), float(np.square(measured).sum())
     if whole == 0.0:
         raise ArmidError("the measured series is zero throughout, expected an rms above 0 to divide by")
-    return np.asarray(sums_of_squares(x, rows)) / whole
+    return sums / whole
 
 
 def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array:
     """Return the sum of (x - x')^2 / noise^2, (n_candidates,): -2 log likelihood for white noise, up to a constant."""
-    from armid.problem.similarity import as_series, sums_of_squares
-
-    weight = inverse_noise(noise)
-    x, rows = as_series(measured, simulated)
-    return weight**2 * np.asarray(sums_of_squares(x, rows))
+    return inverse_noise(noise) ** 2 * square_sums(measured, simulated)
 
 
 def inverse_noise(noise: float) -> float:

@@ -9,8 +9,7 @@ from pymoo.core.problem import Problem
 from pymoo.core.termination import Termination
 
 from armid.errors import ArmidError
-
-Array = NDArray[np.float64]
+from armid.model import Array
 
 FIRST_CHUNK = 1024
 # Candidates that may be asked for after the budget at least: an algorithm ends with its generation.

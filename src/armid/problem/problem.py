@@ -6,17 +6,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armid.engine import Calibration, Prepared, Simulation, accuracy_against, calibrate, prepare, probes
 from armid.errors import ArmidError, nearest
-from armid.model import Model
+from armid.model import Array, Model
 from armid.problem.fitness import Fitness, joined, record_weights
 from armid.problem.meter import Meter, Metered
 from armid.problem.space import Space
 from armid.record import Piece, Record
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +224,9 @@ class IdentificationProblem(Metered):
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
         """Return fitness, +inf where one diverged, and where asked the weighted residuals, (n_candidates, n_total)."""
         if not residuals:
-            parts = [self._fitness(X[part])[0] for part in self._parts(len(X))]
+            # so many candidates have their signals in memory at a time; no result depends on it
+            size = LANES * max(MOST_VALUES // (LANES * sum(x.size for x in self.measured)), 1)
+            parts = [self._fitness(X[first : first + size])[0] for first in range(0, max(len(X), 1), size)]
             return parts[0] if len(parts) == 1 else np.concatenate(parts), None
         values, signals = self._fitness(X)
         pairs = [(r.record.noise.rms, size) for r, size in zip(self.replays, self.sizes, strict=True)]
@@ -239,11 +239,6 @@ class IdentificationProblem(Metered):
         signals = signals_of(self.replays, candidates)
         values = fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights, self.sizes)
         return values, signals
-
-    def _parts(self, n_candidates: int) -> list[slice]:
-        """Return the parts of a population whose signals are in memory at a time; no result depends on them."""
-        size = LANES * max(MOST_VALUES // (LANES * sum(x.size for x in self.measured)), 1)
-        return [slice(first, first + size) for first in range(0, max(n_candidates, 1), size)]
 
     @cached_property
     def record_weights(self) -> Array:

@@ -1,12 +1,12 @@
 """The paper's similarity degree S of two series with its parts S1 and S2 (Eqs 10-14); sums of squares."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armid.engine.cache import kept
 from armid.errors import ArmidError
+from armid.model import Array
 
-Array = NDArray[np.float64]
 # A lone extremum is noise nearer to an end than this share of the length, and lower than so many times the noise.
 NEAR_END, LEAST_HEIGHT = 0.03, 3.0
 

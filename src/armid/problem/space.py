@@ -7,10 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest
-from armid.model import Model
+from armid.model import Array, Model
 from armid.record import Override
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -57,12 +55,8 @@ class Space:
         at = np.arange(len(self.names)) == self.index(name)
         if not (np.isfinite([low, high]).all() and low < high):
             raise ArmidError(f"bounds of '{name}' are {low:g} and {high:g}: finite numbers, low < high, are expected")
-        lows, highs, fixed = (
-            np.where(at, low, self.low),
-            np.where(at, high, self.high),
-            np.where(at, np.nan, self.fixed),
-        )
-        return replace(self, low=lows, high=highs, fixed=fixed)
+        fixed = np.where(at, np.nan, self.fixed)
+        return replace(self, low=np.where(at, low, self.low), high=np.where(at, high, self.high), fixed=fixed)
 
     def with_fixed(self, name: str, value: float) -> "Space":
         """Return the space with a parameter fixed.

@@ -12,16 +12,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.engine import probes
+from armid.model import Array
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Piece
 from armid.record.broken import sound_samples
 from armid.record.record import StartCorrection
 
-Array = NDArray[np.float64]
 # Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
 MOVE = 1e-4
 # So many steps to the start at most; a step ends them that lowers chi2 by less than this. Steps that do not are halved.

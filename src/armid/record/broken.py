@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from armid.record.record import Record
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # So many equal samples in a row are no chance where the noise exceeds half a step of the values; so many lie on one
 # straight line only where a gap was bridged; a sensor at its limit shows as many in all.
@@ -63,11 +62,8 @@ def kinds_of(record: Record) -> Iterator[tuple[str, Mask]]:
     level = np.abs(np.diff(signal)) <= rounding
     if record.irregularity is not None:
         straight = np.abs(np.diff(signal, 2)) <= rounding
-        yield (
-            "gap",
-            in_runs(np.concatenate([[False], straight, [False]]), BRIDGED - 2, 1)
-            & ~in_runs(np.append(level, False), REPEATED, 0),
-        )
+        bridged = in_runs(np.concatenate([[False], straight, [False]]), BRIDGED - 2, 1)
+        yield "gap", bridged & ~in_runs(np.append(level, False), REPEATED, 0)
     steps = np.unique(np.abs(np.diff(signal)))
     smallest = float(steps[steps > rounding].min(initial=np.inf))
     # A quiet sensor of coarse steps repeats itself.

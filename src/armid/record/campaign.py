@@ -10,13 +10,12 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import EFFECTS, PLANTS, Effect, Model, Output, Parameter, Plant
+from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
-from armid.record.reader import NAME, SharedEntries, campaign_path, gravity_of, read_record, record_path
+from armid.record.reader import NAME, campaign_path, gravity_of, read_record, record_path
 from armid.record.record import Record
 from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Override, RecordSheet, load_toml, unknown_name, validated
@@ -157,13 +156,10 @@ def read_campaign(
             raise ArmidError(f"{where}: effect '{name}' is declared twice, each effect once is expected")
     declared = plants[sheet.plant]
     entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
-    gyro_range = None if sheet.gyro_range_deg_s is None else sheet.gyro_range_deg_s * DEGREE
-    shared = SharedEntries(folder, sheet.constants, sheet.inputs, sheet.hold, gyro_range)
     places = [f"{where}, record {quoted(entry.file)}" for entry in entries]
     paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
-    records = [
-        read_record(path, entry, declared, shared, at) for path, entry, at in zip(paths, entries, places, strict=True)
-    ]
+    records = [read_record(path, folder, entry, sheet, declared, at)
+               for path, entry, at in zip(paths, entries, places, strict=True)]  # fmt: skip
     for record in records if declared.records_one_speed else ():
         if record.unit != records[0].unit:
             raise ArmidError(f"{folder}{record.file}: the speed is in {record.unit}, {records[0].unit} is expected "
@@ -189,7 +185,7 @@ def read_campaign(
         records=tuple(records),
         parameters=parameters,
         constants=dict(sheet.constants),
-        gyro_range=gyro_range,
+        gyro_range=None if sheet.gyro_range_deg_s is None else sheet.gyro_range_deg_s * DEGREE,
         tolerances={name: t for name, t in tolerances.items() if name not in fixed and values[name]},
         rough={name: t for name, t in tolerances.items() if t >= ROUGH and values[name]},
         taken_as_exact=tuple(c.name for c in plant.constants if c.tolerance is None and values[c.name]
@@ -198,9 +194,7 @@ def read_campaign(
     )  # fmt: skip
 
 
-def write_campaign(
-    out: str | Path, campaign_toml: str, tables: Mapping[str, Mapping[str, NDArray[np.float64]]]
-) -> Path:
+def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Mapping[str, Array]]) -> Path:
     """Write campaign.toml and its CSV files, whole or not at all.
 
     Parameters

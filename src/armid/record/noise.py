@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from math import comb, log1p
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armid.model import Array
 from armid.record.broken import REPEATED, in_runs
 from armid.record.record import Noise
 
-Array = NDArray[np.float64]
 FEWEST_REST_SAMPLES = 50
 FINEST_STEP = 1e-6
 ORDERS = range(3, 9)

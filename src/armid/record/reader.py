@@ -2,18 +2,17 @@
 
 import os.path
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Manoeuvre, ManoeuvreKey, Output, Plant
+from armid.model import Array, Manoeuvre, ManoeuvreKey, Output, Plant
 from armid.record.noise import noise_of, smallest_step
 from armid.record.record import Piece, Record
 from armid.record.resample import Timing, is_constant, moved_onto_grid, onto_grid, piece_length, timing_of, with_window
-from armid.record.schema import KindError, RecordSheet, number
+from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
     LARGEST,
@@ -24,45 +23,35 @@ from armid.record.table import (
     output_columns,
     position_of,
     read_table,
-    si_factor,
     time_column,
 )
+from armid.units import DEGREE
 
-Array = NDArray[np.float64]
 NAME, SUFFIX = "campaign.toml", ".csv"
 POSITION, SPEED = "start_position", "start_speed"
 ROUNDING = 1e-9
 SATURATED_SAMPLES = 5
 
 
-@dataclass(frozen=True)
-class SharedEntries:
-    """What the records of a campaign have in common; folder: what messages put before the name of a file."""
-
-    folder: str
-    constants: Mapping[str, float]
-    inputs: Mapping[str, str]
-    hold: str
-    gyro_range: float | None
-
-
-def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: SharedEntries, where: str) -> Record:
+def read_record(
+    path: Path, folder: str, sheet: RecordSheet, campaign: CampaignSheet, plant: Plant, where: str
+) -> Record:
     """Read the record of one [[records]] entry: of the first output in the file, with those of the others.
 
-    plant: the one that the campaign names; its sibling for the record's unit is taken. Warns with
-    IrregularSamplingWarning where the file is resampled for its uneven times.
+    folder: what messages put before the name of the file. plant: the one that the campaign names; its sibling for the
+    record's unit is taken. Warns with IrregularSamplingWarning where the file is resampled for its uneven times.
     """
-    table = read_table(path, f"{shared.folder}{sheet.file}")
+    table = read_table(path, f"{folder}{sheet.file}")
     times = time_column(table)
     plant, found = output_columns(table, plant)
     timing = timing_of(times, plant.from_rest, table.file)
     signals = {output: table.columns[header] * output.factors[header] for output, header in found.items()}
-    check_signals(signals, timing, shared.gyro_range, table)
+    check_signals(signals, timing, campaign.gyro_range_deg_s, table)
     rest_interval = float(np.median(np.diff(times[: timing.first]))) if timing.first > 1 else timing.interval
     irregular = times[timing.first :] if timing.irregularity else None
     others = {name: values for name, values in table.columns.items() if name not in (TIME, *found.values())}
     columns = {name: onto_grid(values, times, timing) for name, values in others.items()}
-    manoeuvre = manoeuvre_of(plant, shared, sheet, table, timing, where=where)
+    manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, where=where)
     first, *further = (
         Record(
             file=sheet.file,
@@ -88,26 +77,25 @@ def read_record(path: Path, sheet: RecordSheet, plant: Plant, shared: SharedEntr
 
 
 def manoeuvre_of(
-    plant: Plant, shared: SharedEntries, sheet: RecordSheet, table: CsvTable, timing: Timing, *, where: str
+    plant: Plant, campaign: CampaignSheet, sheet: RecordSheet, table: CsvTable, timing: Timing, *, where: str
 ) -> Manoeuvre:
     """Return the manoeuvre of a whole record, still without the measured state at its start."""
-    constants = record_constants(plant, shared.constants, sheet, where)
-    hold = sheet.hold or shared.hold
-    sources = input_columns(plant, {**shared.inputs, **sheet.inputs}, table, where)
+    constants = record_constants(plant, campaign.constants, sheet, where)
+    hold = sheet.hold or campaign.hold
+    sources = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where)
     inputs = {}
     for driven in plant.inputs:
         header = sources.get(driven.name)
         if header is None:
             inputs[driven.name] = np.full(timing.n_samples, driven.default)
         else:
-            values = table.columns[header] * si_factor(header)
+            # what is no angle is taken as it is
+            values = table.columns[header] * (DEGREE if header.endswith(("_deg", "_deg_s")) else 1.0)
             inputs[driven.name] = onto_grid(values, table.columns[TIME], timing, driven.hold or hold)
     return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
 
 
-def check_signals(
-    signals: Mapping[Output, Array], timing: Timing, gyro_range: float | None, table: CsvTable
-) -> None:  # fmt: skip
+def check_signals(signals: Mapping[Output, Array], timing: Timing, range_deg_s: float | None, table: CsvTable) -> None:
     """Refuse a signal that shows no motion, and a speed that is cut off by the range of the gyro.
 
     Saturated are 5 samples in a row within one quantisation step of the range; the step is the smallest change between
@@ -117,13 +105,14 @@ def check_signals(
         if is_constant(signal[timing.first :]):
             what = "speed" if output.unit in ("rad/s", "m/s") else output.name
             raise ArmidError(f"{table.file}: the measured {what} is constant after the start, a motion is expected")
-    if gyro_range is None:
+    if range_deg_s is None:
         return
     speed = next((signal for output, signal in signals.items() if output.unit == "rad/s"), None)
     if speed is None:
         unit = next(iter(signals)).unit
         raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {unit}: a speed in deg/s or "
                          "rad/s is expected")  # fmt: skip
+    gyro_range = range_deg_s * DEGREE
     step = min(smallest_step(speed), gyro_range / 100)
     # the slack keeps a value that is one step below the range inside, whatever its last binary digit
     near = np.abs(speed) >= gyro_range - step * (1 + 1e-6)

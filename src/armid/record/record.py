@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armid.model import Manoeuvre
+from armid.model import Array, Manoeuvre
 
-Array = NDArray[np.float64]
 NOISE_FREE = 1e-6
 
 

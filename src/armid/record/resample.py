@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
+from armid.model import Array
 from armid.record.record import Irregularity, Record
 
-Array = NDArray[np.float64]
 FEWEST_SAMPLES = 20
 SHORTEST_INTERVAL = 1e-9
 LATEST_START = 2.0

@@ -6,13 +6,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armid.model import Model, Plant
+from armid.model import Array, Model, Plant
 from armid.record.noise import noise_of, quantisation_step
 from armid.record.resample import Timing, moved_onto_grid
 
-Array = NDArray[np.float64]
 State = tuple[dict[str, float], dict[str, float]]
 # Of a record that is held out, the start comes from this share of its first samples, at most so long [s], at least so
 # many samples; they do not judge.

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Output, Plant
+from armid.model import Array, Output, Plant
 from armid.model.plant import SPEEDS
 from armid.units import DEGREE
 
-Array = NDArray[np.float64]
 LARGEST = 1e30
 LONGEST_HEADER = 1 << 16
 NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
@@ -209,11 +207,6 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
             elif wanted.required:
                 raise missing(table, f"column for input '{wanted.name}'", wanted.columns)
     return found
-
-
-def si_factor(header: str) -> float:
-    """Return what turns an input column into SI: degrees into radians, all else taken as it is."""
-    return DEGREE if header.endswith(("_deg", "_deg_s")) else 1.0
 
 
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:

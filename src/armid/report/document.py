@@ -10,12 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from math import isfinite
-from typing import TYPE_CHECKING, Any, ClassVar, Union
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armid.report.style import place_labels, pyplot, thinned
+from armid.report.style import Array, place_labels, pyplot, thinned
 from armid.units import shown
 
 if TYPE_CHECKING:
@@ -74,7 +73,6 @@ class Table:
     first column stand under it as a heading (terminal only).
     """
 
-    kind: ClassVar[str] = "table"
     name: str
     title: str
     caption: str
@@ -137,7 +135,6 @@ class Figure:
     is only stored. svg: its stored text; "" for one that is drawn when it is needed.
     """
 
-    kind: ClassVar[str] = "figure"
     name: str
     title: str
     caption: str
@@ -153,7 +150,6 @@ class Gallery:
     the PNG file that shows them together, for Markdown; "" for none. wide: whether each has a row of its own.
     """
 
-    kind: ClassVar[str] = "gallery"
     figures: tuple[Figure, ...]
     slider: str = ""
     name: str = ""
@@ -162,7 +158,6 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Text:
-    kind: ClassVar[str] = "text"
     text: str
 
 
@@ -170,7 +165,6 @@ class Text:
 class Sentences:
     """Sentences, one a bullet, under a title or none."""
 
-    kind: ClassVar[str] = "sentences"
     sentences: tuple[str, ...]
     title: str = ""
 
@@ -185,7 +179,6 @@ class Line:
 
 @dataclass(frozen=True)
 class Listing:
-    kind: ClassVar[str] = "listing"
     title: str
     lines: tuple[Line, ...]
     folded: bool = False
@@ -270,7 +263,6 @@ def unlike(names: list[str]) -> list[str]:
     return found
 
 
-Array = NDArray[np.float64]
 # Curves of more records than this would make a page that nobody scrolls through.
 MOST_RECORDS = 24
 ERROR_NOTE = (

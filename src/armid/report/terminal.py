@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -59,17 +60,15 @@ def print_table(table: Table, console: "Console") -> None:
     widths = fitted(columns[skip:], [row[skip:] for row in rows], console.width)
     names = [printable(c.header or c.key) for c in columns[skip + len(widths) :] if c.header or table.name]
     kept = columns[skip : skip + len(widths)]
-    console.print(printable(table.title), style="italic", markup=False, emoji=False, highlight=False, soft_wrap=True)
+    say = partial(console.print, markup=False, emoji=False, highlight=False, soft_wrap=True)
+    say(printable(table.title), style="italic")
     for i, (group, own) in enumerate(groupby(rows, lambda row: row[0].text if skip else "")):
         if skip and group:
-            heading = f"{printable(columns[0].header)}: {printable(group)}"
-            console.print(heading, style="bold", markup=False, emoji=False, highlight=False, soft_wrap=True)
+            say(f"{printable(columns[0].header)}: {printable(group)}", style="bold")
         console.print(drawn(kept, [row[skip:] for row in own], widths, not i))
     if names:
         place = f"in {table.name}.csv" if table.name else "on the page, and on a wider terminal"
-        console.print(
-            f"({place}: {', '.join(names)})", style="dim", markup=False, emoji=False, highlight=False, soft_wrap=True
-        )
+        say(f"({place}: {', '.join(names)})", style="dim")
 
 
 def fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int) -> list[int]:

@@ -8,11 +8,10 @@ angle are integrated too: the same as p0 (V0/V)**n and cos(theta), but without p
 
 import numpy as np
 
-from armid.model.effect import Guard, State
+from armid.model.effect import Guard, State, zero
 from armid.model.parameter import Parameter, Scales
 from armid.model.plant import Constant, ManoeuvreKey, Plant
-
-DEGREE = np.pi / 180.0
+from armid.units import DEGREE
 
 
 def arm_inertia(I6_empty, I6_loaded, shell):
@@ -161,10 +160,6 @@ def start_cosine(theta_C):
     return np.cos(theta_C)
 
 
-def at_rest():
-    return 0.0
-
-
 def start_compression(V0, S, l, theta_C, theta_A):
     return V0 / (V0 - S * l * (theta_C - theta_A))
 
@@ -253,8 +248,8 @@ shell_transfer_arm = Plant(
     ),
     states=(
         State("theta", "rad", angle_rate, start_angle, "angle_rad"),
-        State("omega", "rad/s", speed_rate, at_rest, "shaft_speed_rad_s"),
-        State("current", "A", current_rate, at_rest, "current_A"),
+        State("omega", "rad/s", speed_rate, zero, "shaft_speed_rad_s"),
+        State("current", "A", current_rate, zero, "current_A"),
         State("sine", "1", sine_rate, start_sine),
         State("cosine", "1", cosine_rate, start_cosine),
         State("compression", "1", compression_rate, start_compression),

@@ -7,11 +7,12 @@ play are engineering estimates; with a stiff spring and no play it moves as `she
 
 from dataclasses import replace
 
-from armid.model.effect import State
+from armid.model.effect import State, zero
 from armid.model.plant import Constant
 from armid.model.plants import shell_transfer_arm as arm
 from armid.model.plants.flexible_link import CONTACTS, coupling_torque, play_half, twist_rate
 from armid.model.plants.shell_transfer_arm import demand as rigid_demand
+from armid.units import DEGREE
 
 
 def drive_inertia(I01, I23, I45, i1, i2, i3, eta1, eta2, eta3):
@@ -63,15 +64,15 @@ shell_transfer_arm_elastic = replace(
     note="shell transfer arm with a torsion spring and play between drive and arm",
     states=(
         *(replace(s, rate=speed_rate) if s.name == "omega" else s for s in RIGID.states),
-        State("twist", "rad", twist_rate, arm.at_rest, "twist_rad"),
-        State("twist_speed", "rad/s", twist_speed_rate, arm.at_rest, "twist_speed_rad_s"),
+        State("twist", "rad", twist_rate, zero, "twist_rad"),
+        State("twist_speed", "rad/s", twist_speed_rate, zero, "twist_speed_rad_s"),
     ),
     quantities={n: f for n, f in RIGID.quantities.items() if n != "total_inertia"} | {f.__name__: f for f in OWN},
     constants=(
         *RIGID.constants,
         Constant("stiffness", 1e6, "N m/rad", arm.ESTIMATE),
         Constant("link_damping", 500.0, "N m s/rad", arm.ESTIMATE),
-        Constant("half_play", 0.05 * arm.DEGREE, "rad", arm.ESTIMATE),
+        Constant("half_play", 0.05 * DEGREE, "rad", arm.ESTIMATE),
     ),
     ports={**RIGID.ports, "play": "rad", "series_compliance": "rad/(N m)", "coupling": "N m"},
     guards=(*RIGID.guards, *CONTACTS),
