@@ -145,11 +145,15 @@ KNOWN = {
 
 
 def read_manoeuvre(text: str) -> Manoeuvre:
-    """Read a manoeuvre written as NAME=START:TARGET:shell|empty:SUPPLY (deg, deg, load, V).
+    """Look a manoeuvre up by its name, or read it as NAME=START:TARGET:shell|empty:SUPPLY (deg, deg, load, V).
 
     Raises RefusalError when the text is no such manoeuvre.
     """
-    name, _, stroke = text.partition("=")
+    name, written, stroke = text.partition("=")
+    if not written and name in KNOWN:
+        return KNOWN[name]
+    if not written:
+        raise RefusalError(f"there is no manoeuvre {name!r}; the known ones are {', '.join(KNOWN)}")
     parts = stroke.split(":")
     if len(parts) != 4 or parts[2] not in ("shell", "empty"):
         raise RefusalError(
