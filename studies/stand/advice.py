@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,6 @@ class Pair:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Give the names of both."""
         return (self.kinds[0].name, self.kinds[1].name)
 
 
@@ -60,24 +60,21 @@ class Proof:
 def read_proof(path: Path) -> Proof:
     """Read the [suite] table of a proof. Raises RefusalError with one sentence when that is none."""
 
+    def kind(entry: Mapping[str, Any]) -> Kind:
+        form, signed = "the library's", entry.get("signed", False)
+        return Kind(entry["name"], entry["port"], form, (entry["size"],), signed=signed)
+
     def make(table: Mapping[str, Any]) -> Proof:
-        return Proof(make_suite(table), _pairs(table["pairs"]), int(table["tried"]), int(table["taken"]))
+        pairs = tuple(
+            Pair(letter, (kind(entry["first"]), kind(entry["second"])), tuple(entry["strokes"]))
+            for letter, entry in zip(ascii_lowercase, table["pairs"], strict=False)
+        )
+        return Proof(make_suite(table), pairs, int(table["tried"]), int(table["taken"]))
 
     proof = made_of_table(path, make, "proof of advice")
     if not 1 <= proof.taken <= proof.tried <= MOST:
         raise RefusalError(f"{path}: taken and tried must be whole numbers with 1 <= taken <= tried <= {MOST}")
     return proof
-
-
-def _pairs(entries: Sequence[Mapping[str, Any]]) -> tuple[Pair, ...]:
-    return tuple(
-        Pair(letter, (_kind(entry["first"]), _kind(entry["second"])), tuple(entry["strokes"]))
-        for letter, entry in zip("abcdefghijklmnopqrstuvwxyz", entries, strict=False)
-    )
-
-
-def _kind(entry: Mapping[str, Any]) -> Kind:
-    return Kind(entry["name"], entry["port"], "the library's", (entry["size"],), signed=entry.get("signed", False))
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,6 @@ class First:
 
     @property
     def name(self) -> str:
-        """Give the name of the campaign."""
         return f"{self.pair.letter}{self.place:02d}"
 
     @property
@@ -122,15 +118,13 @@ def make_first(proof: Proof, first: First) -> tuple[dict[str, str], Entry]:
 
 
 def entry_of(first: First, drawn: Drawn) -> Entry:
-    """Give the truth of a campaign."""
-    gyro = drawn.gyro
     return {
         "class": "pair",
         "pair": list(first.pair.names),
         "place": first.place,
         "parameters": {name: getattr(drawn.arm, name) for name in ("p0", "k", "eta3", "n")},
         "effects": [planted_entry(each) for each in first.case().planted],
-        "noise": {"kind": "coloured" if gyro.noise_bandwidth_hz else "white", "rms_deg_s": gyro.noise_deg_s},
+        "noise": {"kind": "white", "rms_deg_s": drawn.gyro.noise_deg_s},
         "floor": {"train": None, "holdout": None},
         "declared_fit": None,
     }
@@ -212,8 +206,7 @@ def make_more(words: Sequence[str]) -> int:
 def _make_base(options: argparse.Namespace) -> str:
     proof = read_proof(options.suite)
     firsts = {each.name: each for each in _firsts(proof, options.seed)}
-    head = {"seed": options.seed}
-    write_campaigns(options.folder, firsts, partial(make_first, proof), head, options.processes)
+    write_campaigns(options, firsts, partial(make_first, proof))
     return f"{options.folder}: {len(firsts)} campaigns of few strokes, SYNTHETIC; key: {key_path(options.folder)}"
 
 
@@ -236,8 +229,6 @@ def _make_more(options: argparse.Namespace) -> str:
         for some in doubts.values() for first, asked in some[: proof.taken] for choice in CHOICES
     }  # fmt: skip
     counts = {letter: len(some) for letter, some in doubts.items()}
-    write_campaigns(
-        options.folder, named, partial(make_second, proof, counts), {"seed": options.seed}, options.processes
-    )
+    write_campaigns(options, named, partial(make_second, proof, counts))
     told = ", ".join(f"{' and '.join(p.names)} {counts[p.letter]} of {proof.tried}" for p in proof.pairs)
     return f"{options.folder}: {len(named)} campaigns with one record more, SYNTHETIC; in doubt were {told}"

@@ -43,7 +43,6 @@ class Settings:
     figure: str | None
 
     def __post_init__(self) -> None:
-        """Refuse settings that make no campaign."""
         names = [each.name for each in self.manoeuvres]
         if not NAME.fullmatch(self.name):
             raise RefusalError(f"the campaign name {self.name!r} must be letters, digits, '_', '-' or '.' (see --name)")
@@ -176,28 +175,25 @@ def truth_lines(settings: Settings, records: list[Record]) -> list[str]:
     ]
 
 
-def campaign_text(settings: Settings, records: list[Record]) -> str:
-    """Write campaign.toml: a comment that says synthetic and how made, then the records."""
-    said = ["SYNTHETIC: a simulated shell transfer arm. No machine was measured.", f"Made by: {settings.command()}"]
-    lines = [f"# {line}" for line in said + truth_lines(settings, records)]
-    lines += ["", f'name = "{settings.name}"', 'plant = "shell_transfer_arm"']
-    lines.append(f"gyro_range_deg_s = {short(settings.gyro.range_deg_s)}")
+def campaign_text(
+    said: list[str],
+    name: str,
+    gyro: Gyro,
+    records: list[Record],
+    window_s: tuple[float, float] | None = None,
+    constants: tuple[str, ...] = EXACT,
+) -> str:
+    """Write campaign.toml: comments, the records, and how well the constants are known."""
+    lines = [*(f"# {line}" for line in said), "", f'name = "{name}"', 'plant = "shell_transfer_arm"']
+    lines.append(f"gyro_range_deg_s = {short(gyro.range_deg_s)}")
     for record in records:
-        lines += ["", "[[records]]", *record_lines(record, settings.window_s)]
-    return "\n".join([*lines, *EXACT, ""])
-
-
-def record_lines(record: Record, window_s: tuple[float, float] | None = None) -> list[str]:
-    """Write the keys of a record as campaign.toml holds them."""
-    told = record.manoeuvre
-    lines = [f'file = "{record.file}"', f'role = "{record.role}"']
-    lines += [f"start_angle_deg = {float(told.start_deg)}", f"target_angle_deg = {float(told.target_deg)}"]
-    lines += [f"shell = {str(told.shell).lower()}", f"supply_V = {float(told.supply_volt)}"]
-    if window_s:
-        lines.append(f"window_s = [{window_s[0]}, {window_s[1]}]")
-    if record.repeat_of:
-        lines.append(f'repeat_of = "{record.repeat_of}"')
-    return lines
+        told = record.manoeuvre
+        lines += ["", "[[records]]", f'file = "{record.file}"', f'role = "{record.role}"']
+        lines += [f"start_angle_deg = {float(told.start_deg)}", f"target_angle_deg = {float(told.target_deg)}"]
+        lines += [f"shell = {str(told.shell).lower()}", f"supply_V = {float(told.supply_volt)}"]
+        lines += [f"window_s = [{window_s[0]}, {window_s[1]}]"] if window_s else []
+        lines += [f'repeat_of = "{record.repeat_of}"'] if record.repeat_of else []
+    return "\n".join([*lines, *constants, ""])
 
 
 def readme_text(settings: Settings, records: list[Record]) -> str:

@@ -20,6 +20,7 @@ from stand.campaign import (
     record_text,
     repeats_figure,
     replacing,
+    truth_lines,
 )
 from stand.effects import describe_effects, read_effects
 from stand.gyro import Gyro
@@ -52,7 +53,11 @@ def _make(options: argparse.Namespace) -> str:
     check_place(settings.folder, options.force)
     records = make_records(settings, np.random.default_rng(settings.seed))
     texts = {each.file: record_text(each, settings.gyro.decimals) for each in records}
-    texts |= {"campaign.toml": campaign_text(settings, records), "README.md": readme_text(settings, records)}
+    # the campaign says that it is synthetic and how it was made
+    said = ["SYNTHETIC: a simulated shell transfer arm. No machine was measured.", f"Made by: {settings.command()}"]
+    said += truth_lines(settings, records)
+    texts["campaign.toml"] = campaign_text(said, settings.name, settings.gyro, records, settings.window_s)
+    texts["README.md"] = readme_text(settings, records)
     # all of it in memory, so that nothing is written before all is there
     files = {name: text.encode() for name, text in texts.items()}
     if settings.figure:

@@ -128,7 +128,6 @@ class Effects:
     sway_phase_deg: float = _detail(0.0, "deg", "its phase at t = 0", "sway", signed=True)
 
     def __post_init__(self) -> None:
-        """Refuse a size without meaning."""
         for each in fields(self):
             value = getattr(self, each.name)
             if not math.isfinite(value):

@@ -200,8 +200,7 @@ def _make_families(options: argparse.Namespace) -> str:
     # In turn, so that a study that is cut short has seen all families alike.
     parts = [((index + 0.5) / count, family, index) for family, count in wanted for index in range(count)]
     named = {f"c{place:03d}": (family, index) for place, (_, family, index) in enumerate(sorted(parts))}
-    making = partial(make, read_suite(options.suite), options.seed)
-    write_campaigns(options.folder, named, making, {"seed": options.seed}, options.processes)
+    write_campaigns(options, named, partial(make, read_suite(options.suite), options.seed))
     return f"{options.folder}: {len(named)} campaigns, SYNTHETIC; key: {key_path(options.folder)}"
 
 

@@ -30,7 +30,6 @@ class Gyro:
     range_deg_s: float = 200.0
 
     def __post_init__(self) -> None:
-        """Refuse an instrument that cannot be."""
         for each in fields(self):
             value = getattr(self, each.name)
             if not (math.isfinite(value) and value >= 0.0):

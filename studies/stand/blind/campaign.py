@@ -17,7 +17,7 @@ from stand import RefusalError
 from stand.arm import Manoeuvre
 from stand.blind.draw import Drawn, brief, draw, rms, weigh, weigh_alone
 from stand.blind.suite import LARGEST, Case, Planted, Suite, cases_of, read_suite, shuffled
-from stand.campaign import EXACT, Record, record_lines, record_text, replacing, short
+from stand.campaign import EXACT, Record, campaign_text, record_text, replacing
 from stand.command import Parser, carry_out, split
 from stand.effects import Effects
 from stand.gyro import Gyro, measure, record_times
@@ -50,12 +50,8 @@ def measure_strokes(suite: Suite, drawn: Drawn, effects: Effects, rng: np.random
 
 def campaign_files(name: str, gyro: Gyro, records: list[Record], constants: tuple[str, ...] = EXACT) -> dict[str, str]:
     """Write records and campaign.toml without a word about the truth; `constants` tells how well they are known."""
-    lines = [f"# {SAID}", "", f'name = "{name}"', 'plant = "shell_transfer_arm"']
-    lines.append(f"gyro_range_deg_s = {short(gyro.range_deg_s)}")
-    for each in records:
-        lines += ["", "[[records]]", *record_lines(each)]
     files = {each.file: record_text(each, gyro.decimals) for each in records}
-    return files | {"campaign.toml": "\n".join([*lines, *constants, ""])}
+    return files | {"campaign.toml": campaign_text([SAID], name, gyro, records, constants=constants)}
 
 
 def _entry(suite: Suite, case: Case, drawn: Drawn, records: list[Record]) -> Entry:
@@ -96,7 +92,6 @@ def _entry(suite: Suite, case: Case, drawn: Drawn, records: list[Record]) -> Ent
 
 
 def planted_entry(planted: Planted) -> Entry:
-    """Tell what an effect is."""
     kind = planted.kind
     told = {name: getattr(kind, name) for name in ("name", "port", "form", "matching", "listed")}
     return {**told, "strength": planted.strength, "sizes": dict(planted.sizes)}
@@ -151,19 +146,18 @@ def check_suite_place(folder: Path, force: bool) -> None:
         raise RefusalError(f"{folder} holds {strangers[0]}, which is no blind campaign, so --force will not replace it")
 
 
-def write_campaigns(
-    folder: Path, named: Mapping[str, Any], make: Make, head: Mapping[str, Any], processes: int
-) -> None:
-    """Make every campaign, in `processes` processes, and put folder and key in place when all are there.
+def write_campaigns(options: argparse.Namespace, named: Mapping[str, Any], make: Make) -> None:
+    """Make every campaign, and put folder and key in place when all are there.
 
-    `named` is what `make` is given for each campaign, `head` what the key tells of all of them. What is written does
-    not depend on the number of processes. Raises RefusalError when the disk does not allow it.
+    `options` are those of `suite_parser`, `named` what `make` is given for each campaign. What is written does not
+    depend on the number of processes. Raises RefusalError when the disk does not allow it.
     """
-    with replacing(folder) as fresh, ProcessPoolExecutor(processes) as pool:
-        run = map if processes == 1 else pool.map
+    with replacing(options.folder) as fresh, ProcessPoolExecutor(options.processes) as pool:
+        run = map if options.processes == 1 else pool.map
         entries = dict(zip(named, run(partial(_write_campaign, fresh, make), named.items()), strict=True))
-        key = {"made_by": "studies/test_stand.py blind", "unit": "rad/s", **head, "campaigns": entries}
-        key_path(folder.resolve()).write_text(json.dumps(key, indent=1) + "\n")
+        head = {"made_by": "studies/test_stand.py blind", "unit": "rad/s", "seed": options.seed}
+        text = json.dumps({**head, "campaigns": entries}, indent=1) + "\n"
+        key_path(options.folder.resolve()).write_text(text)
 
 
 def _write_campaign(fresh: Path, make: Make, named: tuple[str, Any]) -> Entry:
@@ -216,8 +210,7 @@ def make_as_told(make: Callable[[argparse.Namespace], str], words: Sequence[str]
 def _make_suite(options: argparse.Namespace) -> str:
     suite = read_suite(options.suite)
     cases = shuffled(cases_of(suite, options.seed), options.seed, split(options.only))
-    making = partial(make_campaign, suite, options.seed)
     named = {name: (name, case) for name, case in cases.items()}
-    write_campaigns(options.folder, named, making, {"seed": options.seed}, options.processes)
+    write_campaigns(options, named, partial(make_campaign, suite, options.seed))
     counts = ", ".join(f"{count} {label}" for label, count in Counter(each.label for each in cases.values()).items())
     return f"{options.folder}: {len(cases)} blind campaigns ({counts}), SYNTHETIC; key: {key_path(options.folder)}"

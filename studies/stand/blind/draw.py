@@ -254,5 +254,4 @@ def rms(values: FloatArray) -> float:
 
 
 def brief(value: float | None) -> float | None:
-    """Round to 6 digits."""
     return None if value is None else float(f"{value:.6g}")

@@ -89,7 +89,6 @@ def made_of_table(path: Path, make: Callable[[Mapping[str, Any]], T], what: str)
 
 
 def make_suite(table: Mapping[str, Any]) -> Suite:
-    """Give the settings that a [suite] table holds."""
     return Suite(
         effects=tuple(_kind(each, True) for each in table.get("effects", [])),
         unlisted=tuple(_kind(each, False) for each in table.get("unlisted", [])),
@@ -134,11 +133,7 @@ class Case:
     coloured: bool
 
     def effects(self) -> Effects:
-        """Join the planted effects."""
-        sizes: dict[str, float] = {}
-        for each in self.planted:
-            sizes |= each.sizes
-        return Effects(**sizes)
+        return Effects(**{name: size for each in self.planted for name, size in each.sizes.items()})
 
     def chosen(self, words: Iterable[str]) -> bool:
         """Tell whether the class or an effect of the case is among some words."""
