@@ -21,8 +21,7 @@ LEFT_OUT = {"versions", "seconds", "wall_s", "cpu_s", "made_by", "duration_s"}
 ENGINE = """
 from pathlib import Path
 import armid
-from armid.registry import load_registry
-{importing}
+from armid.engine.generate import generate_module
 plant = armid.PLANTS["shell_transfer_arm"]
 for name in ("", "coulomb", "shell_rocking"):
     model = armid.Model(plant)
@@ -69,7 +68,7 @@ def jobs(tree: Path, folder: Path, data: Path | None) -> dict[str, list[list[str
     campaigns = tree / "studies" / "campaigns"
     loops = {name: str(campaigns / name) for name in CAMPAIGNS}
     done: dict[str, list[list[str]]] = {}
-    done["engine"] = [[sys.executable, "-c", engine_text(tree, folder)]]
+    done["engine"] = [[sys.executable, "-c", ENGINE.format(folder=str(folder))]]
     for name in IDENTIFIERS:
         fitness = "rmse" if "least_squares" in name else "similarity"
         words = ["--identifier", name, "--fitness", fitness, "--budget", "1500", "--seed", "3"]
@@ -97,13 +96,6 @@ def jobs(tree: Path, folder: Path, data: Path | None) -> dict[str, list[list[str
     return done
 
 
-def engine_text(tree: Path, folder: Path) -> str:
-    """Return a program that writes the generated modules of a few models."""
-    old = (tree / "src" / "armid" / "simulation" / "generate.py").exists()
-    home = "armid.simulation.generate" if old else "armid.engine.generate"
-    return ENGINE.format(importing=f"from {home} import generate_module", folder=str(folder))
-
-
 def run(tree: Path, *command: str) -> int:
     """Run a command on the package of a tree."""
     environment = {**os.environ, "PYTHONPATH": str(tree / "src"), "COLUMNS": "120"}
@@ -122,7 +114,6 @@ def compare(before: Path, after: Path) -> int:
 
 
 def content(file: Path) -> Any:
-    """Return what is compared of a file."""
     if file.suffix != ".json":
         return file.read_bytes()
     return without(json.loads(file.read_text(encoding="utf-8")))
@@ -136,7 +127,6 @@ def without(value: Any) -> Any:
 
 
 def first_difference(before: Path, after: Path) -> list[str]:
-    """Return the first line that differs."""
     if not after.exists():
         return ["is missing"]
     texts = [json.dumps(content(f), indent=1, sort_keys=True).splitlines() if f.suffix == ".json"

@@ -68,6 +68,7 @@ COMMANDS = (
     Command("study table1_short, cold", ("study", "{studies}/table1_short.toml", "--out", "{out}"), 61.0, True),
 )  # fmt: skip
 COLUMNS = ("what", "cpu_s", "before_cpu_s", "target_cpu_s", "of_reference", "ratio", "target_ratio", "met")
+MET = {True: "yes", False: "no"}
 EFFECT = '''"""Friction in proportion to the speed."""
 
 from armid import Effect, Parameter
@@ -125,7 +126,7 @@ def measure(commands: Sequence[Command], folder: Path, before: Path | None = Non
                 times.append(cpu_seconds([*ARMID, *given], own | {"ARMID_CACHE": str(cache)}))
             best[tree] = min(times[1:] or times)
         yield {"what": command.what, "target_cpu_s": number(command.target),
-               "of_reference": number(best["cpu_s"] / reference), "met": met(best["cpu_s"] <= command.target),
+               "of_reference": number(best["cpu_s"] / reference), "met": MET[best["cpu_s"] <= command.target],
                **{tree: number(seconds) for tree, seconds in best.items()}}  # fmt: skip
 
 
@@ -136,16 +137,12 @@ def needed(command: Command, times: Sequence[float]) -> int:
     return 2 if times and max(times) >= 20.0 else 4
 
 
-def met(is_met: bool) -> str:
-    return "yes" if is_met else "no"
-
-
 def measure_engine() -> Iterator[dict[str, str]]:
     """Yield a row for each ratio of the engine: to scipy, to a plain loop, of two threads to one."""
     rows = [*(row for row in engine_rows() if row.ratio is not None), threads_row()]
     for row, target in zip(rows, (4500.0, 30.0, 1.87), strict=True):
         yield {"what": f"engine: {row.what.removeprefix('engine, ')}", "ratio": number(row.ratio),
-               "target_ratio": number(target), "met": met(row.ratio >= target)}  # fmt: skip
+               "target_ratio": number(target), "met": MET[row.ratio >= target]}  # fmt: skip
 
 
 # Effects that the boom gets beside its own (friction of its load, a late speed signal, a supply that sags).

@@ -1,7 +1,6 @@
 """The engine against scipy and a plain compiled loop, with effects, on two threads; and the cost of a fitness."""
 
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,27 +18,20 @@ THREADED = 1280
 FRICTION = {"coulomb.level": (0.0, 100.0), "viscous.slope": (0.0, 50.0)}
 
 
-class Loosest(NamedTuple):
-    """Hold the loosest tolerance of scipy that keeps the allowed error, and its error [rad/s]."""
-
-    tolerance: float
-    error: float
-
-
 def scipy_outputs(task: Task, n_candidates: int, tolerance: float) -> Array:
     """Return what scipy makes of the first candidates [rad/s], (n_candidates, n_samples)."""
     times = task.manoeuvre.times()
     return np.array([solve_with_scipy(c, times, tolerance) for c in task.population[:n_candidates]])
 
 
-def loosest_tolerance(task: Task, reference: Array, n_candidates: int) -> Loosest:
-    """Return the loosest tolerance with which scipy stays within the engine's allowed error."""
+def loosest_tolerance(task: Task, reference: Array, n_candidates: int) -> tuple[float, float]:
+    """Return the loosest tolerance with which scipy stays within the engine's allowed error, and its error [rad/s]."""
     error = np.inf
     for tolerance in TOLERANCES:
         error = task.error(scipy_outputs(task, n_candidates, tolerance), reference)
         if error <= ALLOWED:
             break
-    return Loosest(tolerance, error)
+    return tolerance, error
 
 
 def engine_rows(rounds: int = 20, n_candidates: int = 80, n_scipy: int = 20) -> list[Row]:
@@ -49,8 +41,16 @@ def engine_rows(rounds: int = 20, n_candidates: int = 80, n_scipy: int = 20) -> 
     """
     task = arm_task(n_candidates)
     reference, plain = task.reference(), np.empty((n_candidates, task.manoeuvre.n_samples))
-    loosest = loosest_tolerance(task, reference, n_scipy)
-    seconds = contest(task, plain, loosest.tolerance, n_scipy, rounds)
+    tolerance, scipy_error = loosest_tolerance(task, reference, n_scipy)
+    works: dict[str | int, Work] = {
+        "engine": task.run,
+        "plain": partial(plain_loop, task.population, plain, task.manoeuvre.interval),
+    }
+    times = task.manoeuvre.times()
+    works |= {i: partial(solve_with_scipy, task.population[i], times, tolerance) for i in range(n_scipy)}
+    best = fastest(works, rounds)
+    seconds = {name: best[name] / n_candidates for name in ("engine", "plain")}
+    seconds["scipy"] = sum(best[i] for i in range(n_scipy)) / n_scipy
     tight = task.error(scipy_outputs(task, n_scipy, TIGHTEST), reference)
     return [
         contestant(
@@ -59,30 +59,11 @@ def engine_rows(rounds: int = 20, n_candidates: int = 80, n_scipy: int = 20) -> 
                  f"{TIGHTEST:g}",
         ),
         contestant(
-            f"scipy DOP853 with event, tolerance {loosest.tolerance:g}", "scipy", seconds, loosest.error, Bound(2000),
+            f"scipy DOP853 with event, tolerance {tolerance:g}", "scipy", seconds, scipy_error, Bound(2000),
             f"the loosest tolerance that keeps {ALLOWED:g} rad/s on {n_scipy} candidates",
         ),
         contestant("plain numba loop, RK4 1 ms", "plain", seconds, task.error(plain, reference), Bound(12)),
     ]  # fmt: skip
-
-
-def contest(task: Task, plain: Array, tolerance: float, n_scipy: int, rounds: int) -> dict[str, float]:
-    """Return the time of one simulation by engine, plain loop and scipy [s].
-
-    plain: where the plain loop writes, (n_candidates, n_samples).
-    """
-    times, population = task.manoeuvre.times(), task.population
-    works: dict[str | int, Work] = {
-        "engine": task.run,
-        "plain": partial(plain_loop, population, plain, task.manoeuvre.interval),
-    }
-    works |= {i: partial(solve_with_scipy, population[i], times, tolerance) for i in range(n_scipy)}
-    best = fastest(works, rounds)
-    return {
-        "engine": best["engine"] / len(population),
-        "plain": best["plain"] / len(population),
-        "scipy": sum(best[i] for i in range(n_scipy)) / n_scipy,
-    }
 
 
 def contestant(

@@ -50,7 +50,6 @@ class Watched:
         return getattr(self._thing, name)
 
     def runs(self, candidates: NDArray[np.float64]) -> Any:
-        """Simulate, as a replay does."""
         return self._watch.timed(self._thing.runs, candidates)
 
     def __call__(self, *arguments: Any) -> Any:

@@ -30,11 +30,9 @@ class Bound:
 
     @property
     def text(self) -> str:
-        """The bound in words."""
         return f"{'at least' if self.at_least else 'at most'} {self.number:,g}"
 
     def holds(self, ratio: float) -> bool:
-        """Tell whether a ratio is within the bound."""
         return ratio >= self.number if self.at_least else ratio <= self.number
 
 
@@ -109,20 +107,16 @@ def bench_table(rows: Sequence[Row]) -> str:
     """Return every row as one line of a table, then what falls short, the notes and the system, as plain text."""
     table = [HEADER, *(cells(row) for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = [aligned(line, widths) for line in table]
+    lines = []
+    for line in table:
+        padded = (f"{c:<{w}}" if left else f"{c:>{w}}" for c, w, left in zip(line, widths, LEFT, strict=True))
+        lines.append("  ".join(padded).rstrip())
     lines.insert(1, "-" * (sum(widths) + 2 * (len(widths) - 1)))
     notes = [f"{row.what}: {row.note}." for row in rows if row.note]
     return "\n".join([*lines, "", *verdict(rows), *notes, system_text()])
 
 
-def aligned(line: Sequence[str], widths: Sequence[int]) -> str:
-    """Return one line of the table."""
-    padded = (f"{c:<{w}}" if left else f"{c:>{w}}" for c, w, left in zip(line, widths, LEFT, strict=True))
-    return "  ".join(padded).rstrip()
-
-
 def cells(row: Row) -> tuple[str, ...]:
-    """Return the texts of a row, in the order of the header."""
     return (
         row.what,
         "not known" if row.measured is None else f"{number(row.measured)} {row.unit}",

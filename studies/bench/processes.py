@@ -19,7 +19,22 @@ from bench.samples import N_SAMPLES, arm_task, child_environment, write_sample
 MEGABYTE = 2**20
 # The allocator of glibc then gives back what is freed at once; else that would hide what is taken next.
 PLAIN_ALLOCATOR = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
+UNKNOWN = "this system does not tell the peak memory of a process"
 MEMORY_CHILD = "from bench.processes import beyond_output; print(beyond_output({}, {}))"
+
+
+def run_apart(command: Sequence[str], failed: str = "", **environment: str) -> str:
+    """Run a command to its end and return what it printed.
+
+    Raises ArmidError with the last thing it said when it fails; failed: the words before that.
+    """
+    environment = child_environment() | environment
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if done.returncode:
+        said = done.stderr.strip().splitlines() or ["nothing"]
+        words = " ".join(command)
+        raise ArmidError(f"{failed or f'`{words}` failed and said:'} {said[-1]}")
+    return done.stdout
 
 
 def peak_memory() -> int | None:
@@ -61,9 +76,7 @@ def beyond_output(n_candidates: int, n_samples: int) -> int:
 def measured_apart(n_candidates: int, n_samples: int) -> int:
     """Return `beyond_output` of a fresh process [byte]."""
     command = [sys.executable, "-c", MEMORY_CHILD.format(n_candidates, n_samples)]
-    environment = child_environment() | PLAIN_ALLOCATOR
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-    return int(done.stdout)
+    return int(run_apart(command, **PLAIN_ALLOCATOR))
 
 
 def memory_rows(n_candidates: int = 800, n_samples: int = 701) -> list[Row]:
@@ -80,7 +93,7 @@ def memory_rows(n_candidates: int = 800, n_samples: int = 701) -> list[Row]:
 def grown(what: str, small: int, large: int, n_values: int) -> Row:
     """Return the row of two measurements [byte], of which the second has ten times the values in its output."""
     if small < 0 or large < 0:
-        return Row(what, None, "MB", note="this system does not tell the peak memory of a process")
+        return Row(what, None, "MB", note=UNKNOWN)
     growth = 9 * 8 * n_values
     return Row(
         what, large / MEGABYTE, "MB", "the output's growth",
@@ -110,10 +123,7 @@ def peak_apart(folder: Path) -> int:
     Raises ArmidError when it fails.
     """
     command = [sys.executable, "-c", IDENTIFY_CHILD.format(folder=str(folder), budget=BUDGET)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=child_environment())
-    if done.returncode:
-        raise ArmidError(f"the identification of a large campaign failed: {done.stderr.strip().splitlines()[-1]}")
-    return int(done.stdout.split()[-1])
+    return int(run_apart(command, "the identification of a large campaign failed:").split()[-1])
 
 
 def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
@@ -130,7 +140,7 @@ def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
 def scale_row(what: str, peak: int, n_values: int) -> Row:
     """Return the row of one peak [byte], beside what the signals of a population take."""
     if peak < 0:
-        return Row(what, None, "MB", note="this system does not tell the peak memory of a process")
+        return Row(what, None, "MB", note=UNKNOWN)
     signals = POPULATION * n_values * 8
     note = f"peak of the whole process, {BUDGET} simulations in populations of {POPULATION}"
     return Row(what, peak / MEGABYTE, "MB", "a population's signals", peak / signals, note=note)
@@ -138,17 +148,6 @@ def scale_row(what: str, peak: int, n_values: int) -> Row:
 
 ARMID = (sys.executable, "-m", "armid")
 IMPORTS = (sys.executable, "-c", "import numpy, scipy, pandas")
-
-
-def run_apart(command: Sequence[str]) -> None:
-    """Run a command to its end.
-
-    Raises ArmidError with the last thing it said when it fails.
-    """
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=child_environment())
-    if done.returncode:
-        said = done.stderr.strip().splitlines() or ["nothing"]
-        raise ArmidError(f"`{' '.join(command)}` failed and said: {said[-1]}")
 
 
 def compiled_files() -> set[tuple[str, int]]:

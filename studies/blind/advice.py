@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 from blind.tables import Table, wilson
 from stand import RefusalError
 from stand.score.judge import Claim, read_claim
-from stand.score.targets import Target
+from stand.score.targets import Target, aim, without_report
 
 CHOICES = ADVISED, RANDOM = ("advised", "random")
 TOLD_APART, TOGETHER, WRONG, NONE, NO_REPORT = "told apart", "still together", "wrong one", "neither", "missing"
@@ -93,13 +93,12 @@ def rates(rows: DataFrame) -> DataFrame:
 def targets_of(rows: DataFrame, found: DataFrame) -> list[Target]:
     """Return what is asked of the advice; found: `rates` of the rows."""
     missing = int((rows["answer"] == NO_REPORT).sum())
-    lines = [Target("campaigns without a report", missing, len(rows), "= 0", missing == 0)]
+    lines = [without_report(missing, len(rows))]
     for line in found.to_dict("records"):
         pair, n, share = line["pair"], int(line["n"]), float(line[ADVISED])
         lead = share - float(line[RANDOM])
-        told = f"{pair}: told apart by the advised record"
-        lines.append(Target(told, share, n, f">= {LIMIT:g}", share >= LIMIT, is_share=True))
-        lines.append(Target(f"{pair}: lead over a random record", lead, n, "> 0", lead > 0.0))
+        lines.append(aim(f"{pair}: told apart by the advised record", share, n, f">= {LIMIT:g}", is_share=True))
+        lines.append(aim(f"{pair}: lead over a random record", lead, n, "> 0"))
     return lines
 
 

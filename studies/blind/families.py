@@ -12,7 +12,7 @@ from pandas import DataFrame
 
 from blind import tables
 from stand.score.judge import LARGEST_GROUP, PARAMETERS
-from stand.score.targets import Target, least, most, share
+from stand.score.targets import Target, aim, least, most, share, without_report
 
 Row = dict[str, Any]
 Show = dict[str, str | tuple[str, str]]
@@ -98,23 +98,20 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
     faults, one, controls = (family.get(name, []) for name in ("fault", "constant", "control"))
     constants = [*one, *family.get("constants", [])]
     moved = [r for r in faults if r["moves"] > MOVES]
+    held = [r[f"holds_{name}"] for r in faults for name in PARAMETERS]
+    trusted, as_declared = values(constants, "off", "trusted"), "inside their interval with the constants as declared"
     of_record = f"one faulty record, moved by more than {MOVES:g} times its noise"
     found = [
-        Target("campaigns without a report", missing, len(rows) + missing, "= 0", missing == 0),
+        without_report(missing, len(rows) + missing),
         least(f"{of_record}: record and kind are right", moved, lambda r: r["seen"], 0.90),
         most("one faulty record: a physical name is claimed", faults, lambda r: bool(r["wrong"]), 0.01),
-        least("one faulty record: parameters inside their interval", values(faults, "holds"), is_true, 0.93),
-        least(
-            "one faulty record: inside their interval with the constants as declared, which they are here",
-            values(faults, "given"),
-            is_true,
-            0.93,
-        ),
-        share("one faulty record: parameters with an interval that is said to hold", every(faults), is_held),
+        least("one faulty record: parameters inside their interval", values(faults, "holds"), bool, 0.93),
+        least(f"one faulty record: {as_declared}, which they are here", values(faults, "given"), bool, 0.93),
+        share("one faulty record: parameters with an interval that is said to hold", held, lambda v: v is not None),
         most("constants off: a wrong physical name alone", constants, lambda r: r["wrong_alone"], 0.01),
         share("constants off: a wrong physical name, alone or beside others", constants, lambda r: bool(r["wrong"])),
-        most("constants off: trusted parameters off by more than 1 %", trusted(constants), is_off, 0.01),
-        least("constants off: parameters inside their interval", values(constants, "holds"), is_true, 0.93),
+        most("constants off: trusted parameters off by more than 1 %", trusted, is_off, 0.01),
+        least("constants off: parameters inside their interval", values(constants, "holds"), bool, 0.93),
         least("one constant off: held-out error up to 1.1 of the noise", one, is_at_noise, 0.90),
     ]
     for word, limit in (("two", 0.95), ("three", 0.85)):
@@ -128,11 +125,11 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
         most("controls: unexplained", controls, lambda r: r["verdict"] == "unexplained", 0.02),
         most("controls: a record is accused", controls, lambda r: r["accused"], 0.02),
         share("controls: anything but `no_discrepancy`", controls, lambda r: r["verdict"] != "no_discrepancy"),
-        share("all: trusted parameters off by more than 1 %", trusted(rows), is_off),
+        share("all: trusted parameters off by more than 1 %", values(rows, "off", "trusted"), is_off),
         most("all: of these with an interval below 1 %", values(rows, "off", "narrow"), is_off, 0.01),
-        share("all: parameters inside their interval", values(rows, "holds"), is_true),
-        share("all but constants off: inside their interval with the constants as declared",
-              values([r for r in rows if not r["constants"]], "given"), is_true),
+        share("all: parameters inside their interval", values(rows, "holds"), bool),
+        share(f"all but constants off: {as_declared}",
+              values([r for r in rows if not r["constants"]], "given"), bool),
         most("all: additions withdrawn", rows, lambda r: r["withdrawn"], 0.02),
         most("all: held-out error of the model in force worse than of the declared", rows, lambda r: r["worse"], 0.0),
     ]  # fmt: skip
@@ -141,40 +138,23 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
         found += [
             share("a trend over records: told, of the right parameter", trends, lambda r: r["seen"]),
             most("a trend over records: a physical name is claimed", trends, lambda r: bool(r["wrong"]), 0.01),
-            share("a trend over records: parameters inside their interval", values(trends, "holds"), is_true),
+            share("a trend over records: parameters inside their interval", values(trends, "holds"), bool),
         ]
     seconds = [r["cpu_seconds"] for r in rows if r["cpu_seconds"] is not None]
     for word, limit, of in (("median", 6.0, median), ("worst", 60.0, max)):
         value = of(seconds) if seconds else None
-        met = None if value is None else value <= limit
-        found.append(Target(f"CPU time of a campaign, {word} [s]", value, len(seconds), f"<= {limit:g}", met))
+        found.append(aim(f"CPU time of a campaign, {word} [s]", value, len(seconds), f"<= {limit:g}"))
     return found
 
 
-def every(rows: Sequence[Row]) -> list[Row]:
-    return [{"value": r[f"holds_{name}"]} for r in rows for name in PARAMETERS]
-
-
-def values(rows: Sequence[Row], what: str, where: str = "") -> list[Row]:
+def values(rows: Sequence[Mapping[Any, Any]], what: str, where: str = "") -> list[Any]:
     """Return a column of every parameter, where it has a value; where: only those for which this column is true."""
-    return [{"value": r[f"{what}_{name}"]} for r in rows for name in PARAMETERS
+    return [r[f"{what}_{name}"] for r in rows for name in PARAMETERS
             if r[f"{what}_{name}"] is not None and (not where or r[f"{where}_{name}"])]  # fmt: skip
 
 
-def trusted(rows: Sequence[Row]) -> list[Row]:
-    return values(rows, "off", "trusted")
-
-
-def is_true(value: Row) -> bool:
-    return bool(value["value"])
-
-
-def is_held(value: Row) -> bool:
-    return value["value"] is not None
-
-
-def is_off(value: Row) -> bool:
-    return abs(value["value"]) > OFF
+def is_off(error: float) -> bool:
+    return abs(error) > OFF
 
 
 def is_at_noise(row: Mapping[Any, Any]) -> bool:
@@ -185,7 +165,7 @@ def by_kind(frame: DataFrame) -> tables.Table:
     lines = []
     for kind, part in frame[frame["fault"] != ""].groupby("fault"):
         rows = part.to_dict("records")
-        held = [bool(v["value"]) for v in values(rows, "given")]
+        held = values(rows, "given")
         lines.append({"kind": kind, "n": len(part), "moves": part["moves"].median(),
                       "large": (part["moves"] > MOVES).sum(), "seen": part["seen"].mean(),
                       "wrong": (part["wrong"] != "").mean(),

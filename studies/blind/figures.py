@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -17,11 +16,6 @@ SETTINGS = {"axes.spines.top": False, "axes.spines.right": False, "font.size": 1
 BEFORE, AFTER = "0.55", BLUE
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure; its bytes depend on what is drawn alone."""
-    figure.savefig(path, dpi=120, metadata={"Software": None})
-
-
 def new(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Any]]:
     """Return a figure [inch] and its axes."""
     with mpl.rc_context(SETTINGS):
@@ -31,13 +25,6 @@ def new(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[F
 
 def legend_below(figure: Figure, axis: Any, columns: int = 3) -> None:
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=columns, frameon=False)
-
-
-def plain_ticks(axis: Any) -> None:
-    """Write the numbers of a logarithmic axis as plain ones."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def counts_figure(counts: Mapping[str, DataFrame]) -> Figure:
@@ -78,7 +65,9 @@ def held_out_figure(parts: Mapping[str, DataFrame], limit: float) -> Figure:
         axis.set(yscale="log", ylim=(0.9, max(3.0, 1.2 * highest)), ylabel="held-out error / noise")
         axis.set(xlim=(0.0, len(part) + 1.0), xticks=[], xlabel=f"{len(part)} campaigns, by their error before")
         axis.set_title(label, fontsize="small")
-        plain_ticks(axis.yaxis)
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.yaxis.set_minor_formatter(NullFormatter())
     for axis in axes[len(parts) :]:
         axis.set_axis_off()
     legend_below(figure, axes[0])

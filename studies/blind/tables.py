@@ -55,7 +55,7 @@ def cell(value: Any, form: str) -> str:
 
 def rows_of(judgements: Sequence[Row]) -> DataFrame:
     """Return the stand's judgements with the answer in words that readers tell apart at a glance."""
-    rows = DataFrame(judgements).drop(columns=["port", "expected_over_floor"])
+    rows = DataFrame(judgements)
     rows["truth"] = rows["truth"].replace("", NOTHING)
     numbers = ["floor", "before", "after", "before_over_floor", "after_over_floor", "cut", "excess_cut"]
     for name in numbers:
@@ -82,11 +82,6 @@ def wilson(found: int, n: int) -> tuple[float, float]:
 
 def of_class(rows: DataFrame, label: str) -> DataFrame:
     return rows[rows["class"] == label]
-
-
-def matching_rows(rows: DataFrame, matching: bool = True) -> DataFrame:
-    """Return campaigns of listed effects, one or two, in a form that a library would fit, or in another."""
-    return rows[rows["class"].isin(["single", "two"]) & (rows["matching"] == matching)]
 
 
 def parts(rows: DataFrame) -> dict[str, DataFrame]:
@@ -187,7 +182,6 @@ def false_alarms(rows: DataFrame) -> Table:
 
 
 def campaign_lines(rows: DataFrame, label: str, title: str, words: str) -> Table:
-    """Return one line a campaign of a class."""
     frame = of_class(rows, label).sort_values(["truth", "campaign"], ignore_index=True)
     show = {"campaign": "campaign", "truth": "truth", "strength": "strength", "noise": "noise", "verdict": "verdict",
             "named": "said", "judgement": "judgement", "before_over_floor": ("error/noise before", ".3g"),
@@ -228,17 +222,17 @@ def held_out(rows: DataFrame) -> Table:
     return Table("held_out", "Error on records held out", words, DataFrame(lines), show)
 
 
-def bias(rows: DataFrame, when: str, names: Sequence[str]) -> "Series[float]":
-    """Return the size of the relative errors of some parameters in all campaigns."""
-    return Series(np.abs(rows[[f"bias_{when}_{name}" for name in names]].to_numpy(float)).ravel())
-
-
 def parameter_bias(rows: DataFrame) -> Table:
-    lines = []
+    """Return the size of the relative errors, of all and of each, by whether the form is the library's."""
+    lines, listed = [], rows[rows["class"].isin(["single", "two"])]
     for form, matching in (("matching", True), ("other", False)):
-        part = matching_rows(rows, matching)
+        part = listed[listed["matching"] == matching]
         for name in ("all", *PARAMETERS) if len(part) else ():
-            before, after = (bias(part, when, PARAMETERS if name == "all" else (name,)) for when in ("before", "after"))
+            names = PARAMETERS if name == "all" else (name,)
+            before, after = (
+                Series(np.abs(part[[f"bias_{when}_{n}" for n in names]].to_numpy(float)).ravel())
+                for when in ("before", "after")
+            )
             lines.append({
                 "form": form, "parameter": name, "n": len(after),
                 "before": before.median(), "before_most": before.max(),

@@ -173,7 +173,6 @@ def errors(run: Callable[[Part], Array], parts: Sequence[Part], machine: Machine
 
 
 def rows(folder: Path) -> Iterator[str]:
-    """Yield the lines of one campaign."""
     machine = MACHINES[tomllib.loads((folder / "campaign.toml").read_text())["name"]]
     parts = parts_of(folder)
     train = [p for p in parts if p.role == "train"]

@@ -13,7 +13,7 @@ import resource
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,7 +86,6 @@ def spent() -> float:
 
 
 def row(case: Case, report: Report, cpu: float, roles: Mapping[str, str]) -> str:
-    """Return one line of the table."""
     shown = [" ".join(f"{value * case.factor:.3g}" for value in errors_of(report, case, when, roles)) for when in
              ("before", "after")]  # fmt: skip
     named = [
@@ -109,22 +108,17 @@ def errors_of(report: Report, case: Case, when: str, roles: Mapping[str, str]) -
             yield from (each["rmse"] for each in of_record.get("outputs", {"": of_record}).values())
 
 
-def roles_of(campaign: Path) -> dict[str, str]:
-    """Return file -> role of a campaign."""
-    sheet = tomllib.loads((campaign / "campaign.toml").read_text(encoding="utf-8"))
-    return {entry["file"]: entry["role"] for entry in sheet["records"]}
-
-
-def table(data: Path, out: Path, only: Sequence[str], told: Callable[[str], None]) -> list[str]:
+def table(data: Path, out: Path, only: Sequence[str]) -> list[str]:
     """Return the lines of the table, as far as the data is there; only: names of lines, none for all."""
     lines = list(HEADING)
     for case in (c for c in CASES if not only or c.name in only):
         if not (data / case.machine).is_dir():
-            told(f"{case.name}: {data / case.machine} is not there, left out")
+            print(f"{case.name}: {data / case.machine} is not there, left out", file=sys.stderr, flush=True)
             continue
-        told(f"{case.name}: closing the loop")
+        print(f"{case.name}: closing the loop", file=sys.stderr, flush=True)
         report, cpu = closed(case, data, out)
-        lines.append(row(case, report, cpu, roles_of(out / "campaigns" / case.name)))
+        sheet = tomllib.loads((out / "campaigns" / case.name / "campaign.toml").read_text(encoding="utf-8"))
+        lines.append(row(case, report, cpu, {entry["file"]: entry["role"] for entry in sheet["records"]}))
     return lines
 
 
@@ -135,7 +129,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="campaigns, reports, table.md")
     parser.add_argument("--only", nargs="+", default=(), choices=[c.name for c in CASES], help="lines of the table")
     options = parser.parse_args()
-    lines = table(options.data, options.out, options.only, lambda said: print(said, file=sys.stderr, flush=True))
+    lines = table(options.data, options.out, options.only)
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "table.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
     print("\n".join(lines))

@@ -1,11 +1,11 @@
 """The proof of advice: few strokes that leave two effects in doubt, then one record more, advised or random."""
 
 import argparse
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -13,18 +13,19 @@ import numpy as np
 from stand import RefusalError
 from stand.arm import TRAVEL_DEG, Manoeuvre
 from stand.blind.campaign import (
-    Measured,
-    campaign_text,
+    Entry,
+    campaign_files,
     key_path,
     make_as_told,
-    measure_stroke,
+    manoeuvre_entry,
+    measure_strokes,
+    planted_entry,
     suite_parser,
     write_campaigns,
 )
-from stand.blind.draw import FASTEST, TOLERANCE, Drawn, Strokes, draw, six_strokes
-from stand.blind.suite import Case, Kind, Planted, Suite, made_of_table, make_suite
-from stand.campaign import record_text
-from stand.motion import SAMPLES_PER_SECOND, Motion, Trajectory, simulate
+from stand.blind.draw import Drawn, draw, run, six_strokes
+from stand.blind.suite import Case, Kind, Suite, made_of_table, make_suite
+from stand.motion import Motion
 from stand.score.judge import read_json
 
 MOST = 99
@@ -43,7 +44,6 @@ class Pair:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Give the names of both."""
         return (self.kinds[0].name, self.kinds[1].name)
 
 
@@ -56,35 +56,25 @@ class Proof:
     tried: int
     taken: int
 
-    def pair(self, campaign: str) -> Pair:
-        """Give the pair of a campaign."""
-        return next(each for each in self.pairs if campaign.startswith(each.letter))
-
 
 def read_proof(path: Path) -> Proof:
     """Read the [suite] table of a proof. Raises RefusalError with one sentence when that is none."""
 
+    def kind(entry: Mapping[str, Any]) -> Kind:
+        form, signed = "the library's", entry.get("signed", False)
+        return Kind(entry["name"], entry["port"], form, (entry["size"],), signed=signed)
+
     def make(table: Mapping[str, Any]) -> Proof:
-        return Proof(make_suite(table), _pairs(table["pairs"]), int(table["tried"]), int(table["taken"]))
+        pairs = tuple(
+            Pair(letter, (kind(entry["first"]), kind(entry["second"])), tuple(entry["strokes"]))
+            for letter, entry in zip(ascii_lowercase, table["pairs"], strict=False)
+        )
+        return Proof(make_suite(table), pairs, int(table["tried"]), int(table["taken"]))
 
     proof = made_of_table(path, make, "proof of advice")
     if not 1 <= proof.taken <= proof.tried <= MOST:
         raise RefusalError(f"{path}: taken and tried must be whole numbers with 1 <= taken <= tried <= {MOST}")
     return proof
-
-
-def _pairs(entries: Sequence[Mapping[str, Any]]) -> tuple[Pair, ...]:
-    return tuple(
-        Pair(letter, (_kind(entry["first"]), _kind(entry["second"])), tuple(entry["strokes"]))
-        for letter, entry in zip("abcdefghijklmnopqrstuvwxyz", entries, strict=False)
-    )
-
-
-def _kind(entry: Mapping[str, Any]) -> Kind:
-    return Kind(entry["name"], entry["port"], "the library's", (entry["size"],), signed=entry.get("signed", False))
-
-
-Entry = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -97,7 +87,6 @@ class First:
 
     @property
     def name(self) -> str:
-        """Give the name of the campaign."""
         return f"{self.pair.letter}{self.place:02d}"
 
     @property
@@ -113,161 +102,87 @@ class First:
 
 
 def drawn_of(proof: Proof, first: First) -> Drawn:
-    """Draw arm, manoeuvres and noise of a campaign, the same ones each time."""
-    return draw(proof.suite, first.case(), np.random.default_rng([*first.key, 1]), _chosen(first.pair))
-
-
-def _chosen(pair: Pair) -> Strokes:
-    """Give what draws the strokes of a pair, all of them to train on."""
+    """Draw arm, manoeuvres and noise of a campaign, the same ones each time; all of its strokes are to train on."""
 
     def strokes(rng: np.random.Generator) -> Any:
-        return tuple((manoeuvre, "train") for manoeuvre, _ in six_strokes(rng) if manoeuvre.name in pair.strokes)
+        return tuple((manoeuvre, "train") for manoeuvre, _ in six_strokes(rng) if manoeuvre.name in first.pair.strokes)
 
-    return strokes
+    return draw(proof.suite, first.case(), np.random.default_rng([*first.key, 1]), strokes)
 
 
-def make_first(proof: Proof, first: First) -> tuple[dict[str, bytes], Entry]:
+def make_first(proof: Proof, first: First) -> tuple[dict[str, str], Entry]:
     """Make the files of a campaign, which tell nothing of its truth, and its entry in the key."""
     drawn, rng = drawn_of(proof, first), np.random.default_rng([*first.key, 2])
-    rest = round(proof.suite.rest_s * SAMPLES_PER_SECOND)
-    effects = first.case().effects()
-    measured = [measure_stroke(drawn, place, effects, rest, rng) for place in range(len(drawn.strokes))]
-    return files_of(first.name, drawn, measured), entry_of(first, drawn)
-
-
-def files_of(name: str, drawn: Drawn, measured: list[Measured]) -> dict[str, bytes]:
-    """Write the records of a campaign and its campaign.toml."""
-    texts = {each.record.file: record_text(each.record, drawn.gyro.decimals) for each in measured}
-    texts["campaign.toml"] = campaign_text(name, drawn, measured)
-    return {file: text.encode() for file, text in texts.items()}
+    records = measure_strokes(proof.suite, drawn, first.case().effects(), rng)
+    return campaign_files(first.name, drawn.gyro, records), entry_of(first, drawn)
 
 
 def entry_of(first: First, drawn: Drawn) -> Entry:
-    """Give the truth of a campaign."""
-    (planted,), gyro = first.case().planted, drawn.gyro
     return {
         "class": "pair",
         "pair": list(first.pair.names),
         "place": first.place,
         "parameters": {name: getattr(drawn.arm, name) for name in ("p0", "k", "eta3", "n")},
-        "effects": [_planted_entry(planted)],
-        "noise": {"kind": "coloured" if gyro.noise_bandwidth_hz else "white", "rms_deg_s": gyro.noise_deg_s},
+        "effects": [planted_entry(each) for each in first.case().planted],
+        "noise": {"kind": "white", "rms_deg_s": drawn.gyro.noise_deg_s},
         "floor": {"train": None, "holdout": None},
         "declared_fit": None,
-    }
-
-
-def _planted_entry(planted: Planted) -> Entry:
-    kind = planted.kind
-    return {
-        "name": kind.name,
-        "port": kind.port,
-        "form": kind.form,
-        "matching": True,
-        "listed": True,
-        "strength": 1,
-        "sizes": dict(planted.sizes),
     }
 
 
 CHOICES = ("advised", "random")
 TRIES = 200
 APART_DEG, SUPPLY = 15.0, (24.0, 28.0)
+Advice = Sequence[Mapping[str, Any]]
+"""What a report advises, the best first, each with its manoeuvre and the power that is promised."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """Hold what was advised: manoeuvres, the best first, each with the power that was promised."""
-
-    manoeuvres: Sequence[Mapping[str, Any]]
-    powers: Sequence[float]
-
-
-def asked_in(report: Mapping[str, Any], pair: Sequence[str]) -> Asked | None:
-    """Give what a report advises to tell a pair apart; None where it is not in doubt about it."""
-    advice = [each for each in report["advice"] if set(pair) <= set(each["separates"])]
-    if report["verdict"] != "cannot_tell_apart" or not advice:
-        return None
-    return Asked([each["manoeuvre"] for each in advice], [each["power"] for each in advice])
+def asked_in(report: Mapping[str, Any], pair: Sequence[str]) -> Advice:
+    """Give what a report advises to tell a pair apart; nothing where it is not in doubt about it."""
+    if report["verdict"] != "cannot_tell_apart":
+        return []
+    return [each for each in report["advice"] if set(pair) <= set(each["separates"])]
 
 
-def make_second(proof: Proof, first: First, asked: Asked, choice: str) -> tuple[dict[str, bytes], Entry]:
+def make_second(
+    proof: Proof, counts: Mapping[str, int], named: tuple[First, Advice, str]
+) -> tuple[dict[str, str], Entry]:
     """Make a campaign with one record more, and its entry in the key; the noise of both choices is the same.
 
-    `rank` tells which advice the arm could make, counted from 1, and is None where it could make none of them: then
-    the campaign is the first one again.
+    `counts` are the campaigns in doubt, by the letter of their pair. `rank` tells which of the manoeuvres the arm could
+    make, counted from 1, and is None where it could make none of them: then the campaign is the first one again.
     """
-    drawn, effects = drawn_of(proof, first), first.case().effects()
-    found = _advised(drawn, first, asked) if choice == "advised" else _random(drawn, first)
-    longer = _with(drawn, found) if found else drawn
-    rest = round(proof.suite.rest_s * SAMPLES_PER_SECOND)
-    streams = [np.random.default_rng([*first.key, 2]), np.random.default_rng([*first.key, 3])]
-    measured = [
-        measure_stroke(longer, place, effects, rest, streams[place >= len(drawn.strokes)])
-        for place in range(len(longer.strokes))
-    ]
-    name = f"{first.name}_{choice}"
-    told = {"choice": choice, "base": first.name, "rank": found.rank if found else None, "power": asked.powers[0]}
-    return files_of(name, longer, measured), entry_of(first, drawn) | told | {"next": found.told if found else None}
-
-
-@dataclass(frozen=True)
-class _Found:
-    """Hold a manoeuvre that the arm can make, its trajectory, and which of those it was that were looked at."""
-
-    manoeuvre: Manoeuvre
-    trajectory: Trajectory
-    rank: int
-
-    @property
-    def told(self) -> Entry:
-        told = self.manoeuvre
-        return {
-            "start_angle_deg": told.start_deg,
-            "target_angle_deg": told.target_deg,
-            "shell": told.shell,
-            "supply_V": told.supply_volt,
-        }
-
-
-def _advised(drawn: Drawn, first: First, asked: Asked) -> _Found | None:
-    for rank, keys in enumerate(asked.manoeuvres, 1):
-        told = (float(keys["start_angle_deg"]), float(keys["target_angle_deg"]), bool(keys["shell"]))
-        manoeuvre = Manoeuvre("next", *told, float(keys["supply_V"]))
-        trajectory = _made(drawn, first, manoeuvre)
+    first, asked, choice = named
+    drawn, effects, found = drawn_of(proof, first), first.case().effects(), None
+    records = measure_strokes(proof.suite, drawn, effects, np.random.default_rng([*first.key, 2]))
+    for rank, manoeuvre in _advised(asked) if choice == "advised" else _random(first):
+        trajectory = run(Motion(drawn.arm, manoeuvre, effects), drawn.duration_s, must_close=False)
         if trajectory:
-            return _Found(manoeuvre, trajectory, rank)
-    return None
+            found = {"rank": rank, "next": manoeuvre_entry(manoeuvre)}
+            more = replace(drawn, strokes=((manoeuvre, "train"),), trajectories=(trajectory,))
+            records += measure_strokes(proof.suite, more, effects, np.random.default_rng([*first.key, 3]))
+            break
+    told = {"choice": choice, "base": first.name, "rank": found["rank"] if found else None}
+    told |= {"power": asked[0]["power"], "next": found["next"] if found else None}
+    told |= {"tried": proof.tried, "in_doubt": counts[first.pair.letter]}
+    return campaign_files(f"{first.name}_{choice}", drawn.gyro, records), entry_of(first, drawn) | told
 
 
-def _random(drawn: Drawn, first: First) -> _Found | None:
-    """Draw manoeuvres over the travel, both loads and the supply until the arm can make one."""
+def _advised(asked: Advice) -> Iterator[tuple[int, Manoeuvre]]:
+    for rank, each in enumerate(asked, 1):
+        keys = each["manoeuvre"]
+        told = (float(keys["start_angle_deg"]), float(keys["target_angle_deg"]), bool(keys["shell"]))
+        yield rank, Manoeuvre("next", *told, float(keys["supply_V"]))
+
+
+def _random(first: First) -> Iterator[tuple[int, Manoeuvre]]:
+    """Draw manoeuvres over the travel, both loads and the supply."""
     rng = np.random.default_rng([*first.key, 4])
     for rank in range(1, 1 + TRIES):
         start, target = (round(float(angle), 1) for angle in rng.uniform(*TRAVEL_DEG, 2))
         shell, supply = bool(rng.random() < 0.5), round(float(rng.uniform(*SUPPLY)), 1)
-        if abs(target - start) < APART_DEG:
-            continue
-        manoeuvre = Manoeuvre("next", start, target, shell, supply)
-        trajectory = _made(drawn, first, manoeuvre)
-        if trajectory:
-            return _Found(manoeuvre, trajectory, rank)
-    return None
-
-
-def _made(drawn: Drawn, first: First, manoeuvre: Manoeuvre) -> Trajectory | None:
-    """Simulate a stroke; None where the arm would leave its travel or outrun the gyro."""
-    try:
-        found = simulate(Motion(drawn.arm, manoeuvre, first.case().effects()), drawn.duration_s, TOLERANCE)
-    except RefusalError:
-        return None
-    return found if float(np.abs(found.gyro).max()) < FASTEST else None
-
-
-def _with(drawn: Drawn, found: _Found) -> Drawn:
-    """Add a stroke to train on."""
-    strokes = (*drawn.strokes, (found.manoeuvre, "train"))
-    return replace(drawn, strokes=strokes, trajectories=(*drawn.trajectories, found.trajectory))
+        if abs(target - start) >= APART_DEG:
+            yield rank, Manoeuvre("next", start, target, shell, supply)
 
 
 PROOF = Path(__file__).parents[1] / "advice.toml"
@@ -291,8 +206,7 @@ def make_more(words: Sequence[str]) -> int:
 def _make_base(options: argparse.Namespace) -> str:
     proof = read_proof(options.suite)
     firsts = {each.name: each for each in _firsts(proof, options.seed)}
-    head = {"seed": options.seed}
-    write_campaigns(options.folder, firsts, partial(make_first, proof), head, options.processes)
+    write_campaigns(options, firsts, partial(make_first, proof))
     return f"{options.folder}: {len(firsts)} campaigns of few strokes, SYNTHETIC; key: {key_path(options.folder)}"
 
 
@@ -305,33 +219,16 @@ def _make_more(options: argparse.Namespace) -> str:
     key = read_json(key_path(options.base))
     if key["seed"] != options.seed:
         raise RefusalError(f"{options.base} was made with seed {key['seed']}, not {options.seed}")
-    doubts = _in_doubt(proof, options.seed, options.reports)
-    taken = _taken(proof, doubts)
-    named = {f"{first.name}_{choice}": (first, asked, choice) for first, asked in taken for choice in CHOICES}
-    counts = Counter(first.pair.letter for first, _ in doubts)
-    of = {pair.letter: {"tried": proof.tried, "in_doubt": counts[pair.letter]} for pair in proof.pairs}
-    write_campaigns(options.folder, named, partial(_second, proof, of), {"seed": options.seed}, options.processes)
+    doubts: dict[str, list[tuple[First, Advice]]] = {pair.letter: [] for pair in proof.pairs}
+    for first in _firsts(proof, options.seed):
+        asked = asked_in(read_json(options.reports / first.name / "report.json"), first.pair.names)
+        if asked:
+            doubts[first.pair.letter].append((first, asked))
+    named = {
+        f"{first.name}_{choice}": (first, asked, choice)
+        for some in doubts.values() for first, asked in some[: proof.taken] for choice in CHOICES
+    }  # fmt: skip
+    counts = {letter: len(some) for letter, some in doubts.items()}
+    write_campaigns(options, named, partial(make_second, proof, counts))
     told = ", ".join(f"{' and '.join(p.names)} {counts[p.letter]} of {proof.tried}" for p in proof.pairs)
     return f"{options.folder}: {len(named)} campaigns with one record more, SYNTHETIC; in doubt were {told}"
-
-
-def _second(proof: Proof, of: Mapping[str, Any], named: tuple[First, Asked, str]) -> Any:
-    first, asked, choice = named
-    files, entry = make_second(proof, first, asked, choice)
-    return files, entry | of[first.pair.letter]
-
-
-def _in_doubt(proof: Proof, seed: int, reports: Path) -> list[tuple[First, Asked]]:
-    """Give the campaigns whose report leaves the pair in doubt, with what it advises."""
-    found = []
-    for first in _firsts(proof, seed):
-        asked = asked_in(read_json(reports / first.name / "report.json"), first.pair.names)
-        if asked:
-            found.append((first, asked))
-    return found
-
-
-def _taken(proof: Proof, doubts: list[tuple[First, Asked]]) -> list[tuple[First, Asked]]:
-    """Keep the first so many of each pair."""
-    letters = [first.pair.letter for first, _ in doubts]
-    return [each for place, each in enumerate(doubts) if letters[:place].count(letters[place]) < proof.taken]

@@ -58,7 +58,6 @@ class Arm:
     switch_distance: float = math.radians(25.0)
 
     def __post_init__(self) -> None:
-        """Refuse a truth that describes no machine."""
         for name in ("p0", "k", "eta3", "n"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
@@ -67,7 +66,6 @@ class Arm:
             raise RefusalError(f"eta3 is an efficiency and cannot exceed 1, but is {self.eta3}")
 
     def load(self, shell: bool) -> Load:
-        """Give the load with or without the shell."""
         return self.loaded if shell else self.empty
 
     def inertia(self, shell: bool) -> float:
@@ -108,7 +106,6 @@ class Manoeuvre:
     supply_volt: float = 28.0
 
     def __post_init__(self) -> None:
-        """Refuse a stroke that the arm cannot make."""
         if not NAME.fullmatch(self.name):
             raise RefusalError(f"the manoeuvre name {self.name!r} must be letters, digits, '_', '-' or '.'")
         for word, angle in (("start", self.start_deg), ("target", self.target_deg)):
@@ -145,11 +142,15 @@ KNOWN = {
 
 
 def read_manoeuvre(text: str) -> Manoeuvre:
-    """Read a manoeuvre written as NAME=START:TARGET:shell|empty:SUPPLY (deg, deg, load, V).
+    """Look a manoeuvre up by its name, or read it as NAME=START:TARGET:shell|empty:SUPPLY (deg, deg, load, V).
 
     Raises RefusalError when the text is no such manoeuvre.
     """
-    name, _, stroke = text.partition("=")
+    name, written, stroke = text.partition("=")
+    if not written and name in KNOWN:
+        return KNOWN[name]
+    if not written:
+        raise RefusalError(f"there is no manoeuvre {name!r}; the known ones are {', '.join(KNOWN)}")
     parts = stroke.split(":")
     if len(parts) != 4 or parts[2] not in ("shell", "empty"):
         raise RefusalError(

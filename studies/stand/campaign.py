@@ -4,11 +4,11 @@ import math
 import os
 import shlex
 import shutil
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -30,20 +30,19 @@ class Settings:
 
     folder: Path
     name: str
-    arm: Arm = field(default_factory=Arm)
-    effects: Effects = field(default_factory=Effects)
-    gyro: Gyro = field(default_factory=Gyro)
-    manoeuvres: tuple[Manoeuvre, ...] = (KNOWN["lower"], KNOWN["raise"], KNOWN["short"], KNOWN["empty"])
-    holdout: tuple[str, ...] = ("empty",)
-    repeats: int = 3
-    duration_s: float = 1.2
-    rest_s: float = REST_SAMPLES / SAMPLES_PER_SECOND
-    window_s: tuple[float, float] | None = None
-    seed: int = 1
-    figure: str | None = None
+    arm: Arm
+    effects: Effects
+    gyro: Gyro
+    manoeuvres: tuple[Manoeuvre, ...]
+    holdout: tuple[str, ...]
+    repeats: int
+    duration_s: float
+    rest_s: float
+    window_s: tuple[float, float] | None
+    seed: int
+    figure: str | None
 
     def __post_init__(self) -> None:
-        """Refuse settings that make no campaign."""
         names = [each.name for each in self.manoeuvres]
         if not NAME.fullmatch(self.name):
             raise RefusalError(f"the campaign name {self.name!r} must be letters, digits, '_', '-' or '.' (see --name)")
@@ -112,9 +111,6 @@ def short(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 FloatArray = npt.NDArray[np.float64]
 
 # The simulated arm has the declared constants to the last digit.
@@ -123,7 +119,10 @@ EXACT = ("", "[tolerances]", "default = 0.0")
 
 @dataclass(frozen=True)
 class Record:
-    """Hold one record: file name, manoeuvre, role, times [s], speeds [deg/s], and the file it repeats."""
+    """Hold one record: file name, manoeuvre, role, times [s], speeds [deg/s], and the file it repeats.
+
+    `noise` is the rms of its noise from t = 0 on [rad/s], where that was reckoned.
+    """
 
     file: str
     manoeuvre: Manoeuvre
@@ -131,6 +130,7 @@ class Record:
     time_s: FloatArray
     speed_deg_s: FloatArray
     repeat_of: str | None = None
+    noise: float = math.nan
 
 
 def make_records(settings: Settings, rng: np.random.Generator) -> list[Record]:
@@ -148,16 +148,12 @@ def make_records(settings: Settings, rng: np.random.Generator) -> list[Record]:
     return records
 
 
-def record_text(record: Record, decimals: int) -> str:
-    """Write a record as CSV: time to the millisecond, speed with the decimals of its quantisation."""
-    pairs = zip(record.time_s.tolist(), record.speed_deg_s.tolist(), strict=True)
-    lines = [f"{time:.3f},{_plain(speed, decimals)}" for time, speed in pairs]
+def record_text(record: Record, decimals: int, time_decimals: int = 3) -> str:
+    """Write a record as CSV: time to the millisecond unless told, speed with the decimals of its quantisation."""
+    # a rounded -0 is written as 0
+    speeds = [round(speed, decimals) + 0.0 for speed in record.speed_deg_s.tolist()]
+    lines = [f"{t:.{time_decimals}f},{v:.{decimals}f}" for t, v in zip(record.time_s, speeds, strict=True)]
     return "\n".join(["time_s,angular_velocity_deg_s", *lines, ""])
-
-
-def _plain(value: float, decimals: int) -> str:
-    """Write a number, a rounded -0 as 0."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 def truth_lines(settings: Settings, records: list[Record]) -> list[str]:
@@ -179,33 +175,34 @@ def truth_lines(settings: Settings, records: list[Record]) -> list[str]:
     ]
 
 
-def campaign_text(settings: Settings, records: list[Record]) -> str:
-    """Write campaign.toml: a comment that says synthetic and how made, then the records."""
-    said = ["SYNTHETIC: a simulated shell transfer arm. No machine was measured.", f"Made by: {settings.command()}"]
-    lines = [f"# {line}" for line in said + truth_lines(settings, records)]
-    lines += ["", f'name = "{settings.name}"', 'plant = "shell_transfer_arm"']
-    lines.append(f"gyro_range_deg_s = {short(settings.gyro.range_deg_s)}")
+def campaign_text(
+    said: list[str],
+    name: str,
+    gyro: Gyro,
+    records: list[Record],
+    window_s: tuple[float, float] | None = None,
+    constants: tuple[str, ...] = EXACT,
+) -> str:
+    """Write campaign.toml: comments, the records, and how well the constants are known."""
+    lines = [*(f"# {line}" for line in said), "", f'name = "{name}"', 'plant = "shell_transfer_arm"']
+    lines.append(f"gyro_range_deg_s = {short(gyro.range_deg_s)}")
     for record in records:
-        lines += ["", "[[records]]", *record_lines(record, settings.window_s)]
-    return "\n".join([*lines, *EXACT, ""])
-
-
-def record_lines(record: Record, window_s: tuple[float, float] | None = None) -> list[str]:
-    """Write the keys of a record as campaign.toml holds them."""
-    told = record.manoeuvre
-    lines = [f'file = "{record.file}"', f'role = "{record.role}"']
-    lines += [f"start_angle_deg = {float(told.start_deg)}", f"target_angle_deg = {float(told.target_deg)}"]
-    lines += [f"shell = {str(told.shell).lower()}", f"supply_V = {float(told.supply_volt)}"]
-    if window_s:
-        lines.append(f"window_s = [{window_s[0]}, {window_s[1]}]")
-    if record.repeat_of:
-        lines.append(f'repeat_of = "{record.repeat_of}"')
-    return lines
+        told = record.manoeuvre
+        lines += ["", "[[records]]", f'file = "{record.file}"', f'role = "{record.role}"']
+        lines += [f"start_angle_deg = {float(told.start_deg)}", f"target_angle_deg = {float(told.target_deg)}"]
+        lines += [f"shell = {str(told.shell).lower()}", f"supply_V = {float(told.supply_volt)}"]
+        lines += [f"window_s = [{window_s[0]}, {window_s[1]}]"] if window_s else []
+        lines += [f'repeat_of = "{record.repeat_of}"'] if record.repeat_of else []
+    return "\n".join([*lines, *constants, ""])
 
 
 def readme_text(settings: Settings, records: list[Record]) -> str:
     """Write the campaign's README: synthetic, the truth, the records, the command that makes it again."""
-    rows = [f"| {each.file} | {each.role} | {_told(each)} | {each.repeat_of or ''} |" for each in records]
+    rows = []
+    for each in records:
+        told, load = each.manoeuvre, "with the shell" if each.manoeuvre.shell else "without the shell"
+        stroke = f"{short(told.start_deg)} to {short(told.target_deg)} deg, {load}, {short(told.supply_volt)} V"
+        rows.append(f"| {each.file} | {each.role} | {stroke} | {each.repeat_of or ''} |")
     lines = [
         f"# {settings.name}: SYNTHETIC records of the shell transfer arm",
         "",
@@ -226,12 +223,6 @@ def readme_text(settings: Settings, records: list[Record]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _told(record: Record) -> str:
-    told = record.manoeuvre
-    load = "with the shell" if told.shell else "without the shell"
-    return f"{short(told.start_deg)} to {short(told.target_deg)} deg, {load}, {short(told.supply_volt)} V"
-
-
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 """Okabe and Ito's palette, told apart by colour-blind eyes."""
 
@@ -244,53 +235,32 @@ def repeats_figure(records: list[Record], suffix: str) -> bytes:
     from matplotlib.figure import Figure  # noqa: PLC0415 - slow to load and needed for nothing else
 
     repeats = [each for each in records if records[0].file in (each.file, each.repeat_of)]
-    count = len(repeats)
+    count, mean = len(repeats), np.mean([each.speed_deg_s for each in repeats], axis=0)
+    largest = max(float(np.abs(each.speed_deg_s - mean).max()) for each in repeats)
     figure = Figure(figsize=(7.0, 4.4 + 0.9 * count), dpi=100, layout="constrained")
-    axes = figure.subplots(1 + count, 1, sharex=True, height_ratios=(4.4, *[0.9] * count))
-    _draw_speeds(axes[0], repeats)
-    _draw_departures(axes[1:], repeats)
-    axes[0].set_title(f"SYNTHETIC records: {count} repeats of the manoeuvre '{repeats[0].manoeuvre.name}'")
-    axes[-1].set_xlabel("Time since the brake opened [s]")
+    above, *below = figure.subplots(1 + count, 1, sharex=True, height_ratios=(4.4, *[0.9] * count))
+    for index, (axes, record) in enumerate(zip(below, repeats, strict=True)):
+        colour, departure = COLOURS[index % len(COLOURS)], record.speed_deg_s - mean
+        # each repeat over the one before in a thinner line, so that all are seen where they agree
+        width = 0.8 + 3.2 * (1.0 - (index + 1) / count)
+        above.plot(record.time_s, record.speed_deg_s, color=colour, linewidth=width, label=record.file)
+        axes.plot(record.time_s, departure, color=colour, linewidth=0.6)
+        axes.set(ylim=(-1.1 * largest - 1e-3, 1.1 * largest + 1e-3), ylabel="[deg/s]")
+        words = f"{record.file} minus the mean of all repeats: rms {np.sqrt(np.mean(departure**2)):.2f} deg/s"
+        axes.set_title(words, loc="left", fontsize="small")
+    for axes in (above, *below):
+        axes.grid(color="0.9", linewidth=0.8)
+        axes.axvline(0.0, color="0.5", linewidth=0.8, linestyle=":")
+        axes.margins(x=0.01)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    above.set_ylabel("Angular velocity\nof the arm [deg/s]")
+    above.legend(frameon=False)
+    above.set_title(f"SYNTHETIC records: {count} repeats of the manoeuvre '{repeats[0].manoeuvre.name}'")
+    below[-1].set_xlabel("Time since the brake opened [s]")
     buffer = BytesIO()
     figure.savefig(buffer, format=suffix.removeprefix("."))
     return buffer.getvalue()
-
-
-def _draw_speeds(axes: "Axes", repeats: list[Record]) -> None:
-    """Draw each repeat over the one before in a thinner line, so that all are seen where they agree."""
-    for index, record in enumerate(repeats):
-        width = 0.8 + 3.2 * (1.0 - (index + 1) / len(repeats))
-        axes.plot(record.time_s, record.speed_deg_s, color=_colour(index), linewidth=width, label=record.file)
-    axes.set_ylabel("Angular velocity\nof the arm [deg/s]")
-    axes.legend(frameon=False)
-    _clean(axes)
-
-
-def _draw_departures(rows: Iterable["Axes"], repeats: list[Record]) -> None:
-    """Draw what each repeat departs from the mean of all, one row each on one scale."""
-    mean = np.mean([record.speed_deg_s for record in repeats], axis=0)
-    largest = max(float(np.abs(record.speed_deg_s - mean).max()) for record in repeats)
-    for index, (axes, record) in enumerate(zip(rows, repeats, strict=True)):
-        departure = record.speed_deg_s - mean
-        axes.plot(record.time_s, departure, color=_colour(index), linewidth=0.6)
-        axes.set_ylim(-1.1 * largest - 1e-3, 1.1 * largest + 1e-3)
-        axes.set_ylabel("[deg/s]")
-        words = f"{record.file} minus the mean of all repeats: rms {np.sqrt(np.mean(departure**2)):.2f} deg/s"
-        axes.set_title(words, loc="left", fontsize="small")
-        _clean(axes)
-
-
-def _colour(index: int) -> str:
-    return COLOURS[index % len(COLOURS)]
-
-
-def _clean(axes: "Axes") -> None:
-    """Leave a light grid, the zero of time, and no box."""
-    axes.grid(color="0.9", linewidth=0.8)
-    axes.axvline(0.0, color="0.5", linewidth=0.8, linestyle=":")
-    axes.margins(x=0.01)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def check_place(folder: Path, force: bool) -> None:
@@ -308,8 +278,9 @@ def check_place(folder: Path, force: bool) -> None:
         raise RefusalError(f"{folder} holds no campaign.toml, so --force will not replace what is in it")
 
 
-def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write the files into a folder beside, then move it into place; an earlier folder goes only when that is done.
+@contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """Give a new folder beside, and move it into place in the end; an earlier folder goes only when that is done.
 
     Raises RefusalError when the disk or the rights do not allow it, and leaves then what was there before.
     """
@@ -317,23 +288,14 @@ def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
     fresh, old = (place.with_name(f".{place.name}.{word}-{os.getpid()}") for word in ("new", "old"))
     try:
         fresh.mkdir(parents=True)
-        for name, content in files.items():
-            (fresh / name).write_bytes(content)
-        _exchange(place, fresh, old)
+        yield fresh
+        if place.exists():
+            place.rename(old)
+        fresh.rename(place)
+        shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         raise RefusalError(f"{folder} cannot be written: {error.strerror or error}") from error
     finally:
-        shutil.rmtree(fresh, ignore_errors=True)
-
-
-def _exchange(place: Path, fresh: Path, old: Path) -> None:
-    """Move the fresh folder to its place and drop the one that stood there, which comes back if that fails."""
-    if place.exists():
-        place.rename(old)
-    try:
-        fresh.rename(place)
-    except OSError:
-        if old.exists():
+        if old.exists() and not place.exists():
             old.rename(place)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
+        shutil.rmtree(fresh, ignore_errors=True)

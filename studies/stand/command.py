@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import NoReturn
@@ -10,7 +10,7 @@ from typing import NoReturn
 import numpy as np
 
 from stand import RefusalError
-from stand.arm import KNOWN, Arm, Manoeuvre, read_manoeuvre
+from stand.arm import KNOWN, Arm, read_manoeuvre
 from stand.campaign import (
     Settings,
     campaign_text,
@@ -19,7 +19,8 @@ from stand.campaign import (
     readme_text,
     record_text,
     repeats_figure,
-    write_folder,
+    replacing,
+    truth_lines,
 )
 from stand.effects import describe_effects, read_effects
 from stand.gyro import Gyro
@@ -32,37 +33,46 @@ class Parser(argparse.ArgumentParser):
         raise RefusalError(message)
 
 
-def main(words: Sequence[str]) -> int:
-    """Make a campaign as the command line says; give the exit code, 2 with a sentence on stderr when refused."""
+def carry_out(make: Callable[[argparse.Namespace], str], words: Sequence[str], parser: Parser) -> int:
+    """Do as the command line says and print what was made; give the exit code, 2 with a sentence when refused."""
     try:
-        options = _parser().parse_args(words)
-        settings = read_settings(options)
-        check_place(settings.folder, options.force)
-        files = make_files(settings, np.random.default_rng(settings.seed))
-        write_folder(settings.folder, files)
+        print(make(parser.parse_args(words)))
     except RefusalError as refusal:
-        print(f"test_stand: {refusal}", file=sys.stderr)
+        print(f"{parser.prog.partition('.')[0]}: {refusal}", file=sys.stderr)
         return 2
-    print(f"{settings.folder}: {len(files)} files, {sum(map(len, files.values())) / 1000:.0f} kB, SYNTHETIC")
     return 0
 
 
-def make_files(settings: Settings, rng: np.random.Generator) -> dict[str, bytes]:
-    """Make every file of a campaign in memory, so that nothing is written before all of it is there."""
-    records = make_records(settings, rng)
+def main(words: Sequence[str]) -> int:
+    """Make a campaign as the command line says; give the exit code."""
+    return carry_out(_make, words, _parser())
+
+
+def _make(options: argparse.Namespace) -> str:
+    settings = read_settings(options)
+    check_place(settings.folder, options.force)
+    records = make_records(settings, np.random.default_rng(settings.seed))
     texts = {each.file: record_text(each, settings.gyro.decimals) for each in records}
-    texts |= {"campaign.toml": campaign_text(settings, records), "README.md": readme_text(settings, records)}
+    # the campaign says that it is synthetic and how it was made
+    said = ["SYNTHETIC: a simulated shell transfer arm. No machine was measured.", f"Made by: {settings.command()}"]
+    said += truth_lines(settings, records)
+    texts["campaign.toml"] = campaign_text(said, settings.name, settings.gyro, records, settings.window_s)
+    texts["README.md"] = readme_text(settings, records)
+    # all of it in memory, so that nothing is written before all is there
     files = {name: text.encode() for name, text in texts.items()}
     if settings.figure:
         files[settings.figure] = repeats_figure(records, Path(settings.figure).suffix)
-    return files
+    with replacing(settings.folder) as fresh:
+        for name, content in files.items():
+            (fresh / name).write_bytes(content)
+    return f"{settings.folder}: {len(files)} files, {sum(map(len, files.values())) / 1000:.0f} kB, SYNTHETIC"
 
 
 def read_settings(options: argparse.Namespace) -> Settings:
     """Turn parsed options into settings. Raises RefusalError when they make no campaign."""
-    manoeuvres = tuple(_manoeuvre(word) for word in _words(options.manoeuvres))
+    manoeuvres = tuple(map(read_manoeuvre, split(options.manoeuvres)))
     names = {each.name for each in manoeuvres}
-    holdout = _words(options.holdout) if options.holdout is not None else tuple({"empty"} & names)
+    holdout = split(options.holdout) if options.holdout is not None else tuple({"empty"} & names)
     folder: Path = options.folder
     gyro = {each.name: getattr(options, each.name.replace("range", "gyro_range")) for each in fields(Gyro)}
     return Settings(
@@ -82,20 +92,12 @@ def read_settings(options: argparse.Namespace) -> Settings:
     )
 
 
-def _words(text: str) -> tuple[str, ...]:
+def split(text: str) -> tuple[str, ...]:
+    """Give the words of a list with commas."""
     return tuple(word.strip() for word in text.split(",") if word.strip())
 
 
-def _manoeuvre(word: str) -> Manoeuvre:
-    """Look a manoeuvre up by its name, or read it when it is written out."""
-    if "=" in word:
-        return read_manoeuvre(word)
-    if word not in KNOWN:
-        raise RefusalError(f"there is no manoeuvre {word!r}; the known ones are {', '.join(KNOWN)}")
-    return KNOWN[word]
-
-
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> Parser:
     parser = Parser(
         prog="test_stand.py",
         description="Make a campaign of SYNTHETIC records of the shell transfer arm.",
@@ -107,13 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--name", help="name of the campaign (default: the folder's)")
     parser.add_argument("--force", action="store_true", help="replace a campaign folder and all that is in it")
     parser.add_argument("--figure", metavar="FILE", help="draw the repeats together into this file of the campaign")
-    _add_truth(parser)
-    _add_measurement(parser)
-    return parser
-
-
-def _add_truth(parser: argparse.ArgumentParser) -> None:
-    arm = Arm()
+    arm, gyro = Arm(), Gyro()
     group = parser.add_argument_group("truth")
     group.add_argument("--p0", type=float, default=arm.p0, help="initial pressure of the accumulator, Pa")
     group.add_argument("--k", type=float, default=arm.k, help="relative sensitivity of the tachometer")
@@ -128,10 +124,6 @@ def _add_truth(parser: argparse.ArgumentParser) -> None:
         help=f"of {known}, or written out as NAME=START:TARGET:shell|empty:SUPPLY in deg, deg and V",
     )
     group.add_argument("--holdout", metavar="A,B", help="manoeuvres kept from training (default: empty, where made)")
-
-
-def _add_measurement(parser: argparse.ArgumentParser) -> None:
-    gyro = Gyro()
     group = parser.add_argument_group("measurement")
     group.add_argument("--repeats", type=int, default=3, help="records of the first manoeuvre (default 3)")
     group.add_argument("--noise-deg-s", type=float, default=gyro.noise_deg_s, help="rms of the noise (default 0.25)")
@@ -143,3 +135,4 @@ def _add_measurement(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--rest", type=float, default=0.1, help="seconds of rest before it (default 0.1)")
     group.add_argument("--window-s", type=float, nargs=2, metavar=("START", "END"), help="window asked of each record")
     group.add_argument("--seed", type=int, default=1, help="seed of the noise (default 1)")
+    return parser

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from stand import RefusalError
@@ -128,7 +128,6 @@ class Effects:
     sway_phase_deg: float = _detail(0.0, "deg", "its phase at t = 0", "sway", signed=True)
 
     def __post_init__(self) -> None:
-        """Refuse a size without meaning."""
         for each in fields(self):
             value = getattr(self, each.name)
             if not math.isfinite(value):
@@ -139,14 +138,11 @@ class Effects:
                 raise RefusalError(f"the effect {each.name} must be below {each.metadata['limit']}, but is {value}")
             if each.name.endswith(POSITIVE) and each.metadata.get("of") and value == 0.0:
                 raise RefusalError(f"the effect {each.name} must be above 0")
-            self._refuse_lonely(each)
+            owner = each.metadata.get("of")
+            if owner and value != each.default and not getattr(self, owner):
+                raise RefusalError(f"the effect {each.name} does nothing without {owner}")
         if self.controller_delay and self.controller_period:
             raise RefusalError("the effects controller_delay and controller_period exclude each other")
-
-    def _refuse_lonely(self, each: "Field[Any]") -> None:
-        owner = each.metadata.get("of")
-        if owner and getattr(self, each.name) != each.default and not getattr(self, owner):
-            raise RefusalError(f"the effect {each.name} does nothing without {owner}")
 
     def switched_on(self) -> dict[str, float]:
         """Give the effects that are on, with the details of each."""
@@ -239,7 +235,8 @@ def worm_efficiency(arm: Arm, effects: Effects, now: State) -> float:
     """Give eta3 as the torque meets it: less where the worm brakes, and less where it slides slowly.
 
     Braking, eta3 loses the share `worm_loss` and goes toward 2 - 1/eta3, but not below 0: the efficiency of the same
-    friction with the wheel driving the worm.
+    friction with the wheel driving the worm. Of the loss at standstill exp(-abs(omega)/omega_f) is left at speed, or
+    where no omega_f is given the ratio of frictions after AGMA at i3 omega r.
     """
     eta3, forward = arm.eta3, now["speed"] * math.copysign(1.0, now["current"])
     if effects.worm_loss:
@@ -248,18 +245,10 @@ def worm_efficiency(arm: Arm, effects: Effects, now: State) -> float:
         braking = 0.5 * (1.0 - math.tanh(forward / effects.braking_width))
         eta3 += effects.worm_braking * braking * (max(0.0, 2.0 - 1.0 / arm.eta3) - arm.eta3)
     if effects.worm_speed:
-        eta3 *= 1.0 - effects.worm_speed * _slow(arm, effects, now["speed"])
+        speed, fade = now["speed"], effects.worm_fade
+        left = math.exp(-abs(speed) / fade) if fade else relative_friction(arm.ratio_worm * speed * effects.worm_radius)
+        eta3 *= 1.0 - effects.worm_speed * left
     return eta3
-
-
-def _slow(arm: Arm, effects: Effects, speed: float) -> float:
-    """Give the share of a worm's loss at standstill that is left at a speed of the arm [rad/s].
-
-    exp(-abs(omega)/omega_f), or where no omega_f is given the ratio of frictions after AGMA at i3 omega r.
-    """
-    if effects.worm_fade:
-        return math.exp(-abs(speed) / effects.worm_fade)
-    return relative_friction(arm.ratio_worm * speed * effects.worm_radius)
 
 
 def relative_friction(sliding: float) -> float:
@@ -279,28 +268,26 @@ def smooth_sign(value: float, width: float, tanh: float = 0.0) -> float:
 def friction(arm: Arm, effects: Effects, now: State) -> float:
     """Give all friction [N m], positive against a positive speed.
 
-    T_c sgn + T_s f sgn + b omega + c omega abs(omega) + F l sgn + T_a (1 + a sgn) sgn
+    T_c sgn + T_s f sgn + b omega + c omega abs(omega) + F l sgn + T_a (1 + a sgn) sgn; Dahl, LuGre, Bouc and Wen, each
+    with its force or deflection as a state. f = exp(-(abs(omega)/omega_s)^d), or 1/(1 + (omega/omega_s)^2) (Hess and
+    Soom 1990).
     """
     speed = now["speed"]
     coulomb = effects.coulomb * smooth_sign(speed, effects.coulomb_width, effects.coulomb_tanh)
+    ratio = abs(speed) / effects.stribeck_speed
+    left = 1.0 / (1.0 + ratio**2) if effects.stribeck_rational else math.exp(-(ratio**effects.stribeck_exponent))
     sign = smooth_sign(speed, effects.stribeck_width, effects.stribeck_tanh)
-    stribeck = effects.stribeck * _left(effects, speed) * sign
-    total = coulomb + stribeck + effects.viscous * speed + effects.drag * speed * abs(speed)
+    total = coulomb + effects.stribeck * left * sign + effects.viscous * speed + effects.drag * speed * abs(speed)
     if effects.seal_friction:
         total += effects.seal_friction * arm.piston_lever * math.tanh(speed / effects.seal_width)
     if effects.asymmetric_friction:
         sign = math.tanh(speed / effects.seal_width)
         total += effects.asymmetric_friction * (1.0 + effects.asymmetric_share * sign) * sign
-    return total + hysteresis(effects, now)
-
-
-def hysteresis(effects: Effects, now: State) -> float:
-    """Give the friction of Dahl, of LuGre and of Bouc and Wen [N m]; each has its force or deflection as a state."""
-    total = now.get("dahl", 0.0) + effects.bouc_wen * now.get("bouc_wen", 0.0)
+    of_states = now.get("dahl", 0.0) + effects.bouc_wen * now.get("bouc_wen", 0.0)
     if "bristle" in now:
-        total += effects.lugre_stiffness * now["bristle"]
-        total += effects.lugre_damping * hysteresis_rates(effects, now)["bristle"]
-    return total
+        of_states += effects.lugre_stiffness * now["bristle"]
+        of_states += effects.lugre_damping * hysteresis_rates(effects, now)["bristle"]
+    return total + of_states
 
 
 def hysteresis_rates(effects: Effects, now: State) -> State:
@@ -325,15 +312,6 @@ def hysteresis_rates(effects: Effects, now: State) -> State:
     return rates
 
 
-def _left(effects: Effects, speed: float) -> float:
-    """Give the share f of Stribeck's excess that is left at a speed [rad/s].
-
-    exp(-(abs(omega)/omega_s)^d), or 1/(1 + (omega/omega_s)^2) (Hess and Soom 1990).
-    """
-    ratio = abs(speed) / effects.stribeck_speed
-    return 1.0 / (1.0 + ratio**2) if effects.stribeck_rational else math.exp(-(ratio**effects.stribeck_exponent))
-
-
 STICTION_WIDTH = 0.002
 """Speed over which the signs of these frictions are smoothed [rad/s]."""
 
@@ -355,15 +333,10 @@ def unlisted_torque(arm: Arm, effects: Effects, now: State, start: float, balanc
     if effects.cable_spring:
         total -= effects.cable_spring * max(0.0, angle - math.radians(effects.cable_angle_deg))
     if "clock" in now:
-        total += _in_time(arm, effects, now)
+        turn = 2.0 * math.pi * now["clock"]
+        ripple = effects.slipping_ripple * math.sin(arm.ratio_worm * angle + effects.slip_hz * turn)
+        total += ripple + effects.sway * math.sin(effects.sway_hz * turn + math.radians(effects.sway_phase_deg))
     return total
-
-
-def _in_time(arm: Arm, effects: Effects, now: State) -> float:
-    """Give the torques that depend on the time since the brake opened [N m]."""
-    turn = 2.0 * math.pi * now["clock"]
-    ripple = effects.slipping_ripple * math.sin(arm.ratio_worm * now["angle"] + effects.slip_hz * turn)
-    return ripple + effects.sway * math.sin(effects.sway_hz * turn + math.radians(effects.sway_phase_deg))
 
 
 def base_rate(effects: Effects, now: State, reaction: float) -> float:

@@ -24,18 +24,18 @@ from stand.arm import Arm
 from stand.blind.campaign import (
     SUITE,
     Entry,
-    _pooled,
-    _record,
-    _told,
-    campaign_text,
+    campaign_files,
     key_path,
     make_as_told,
-    measure_stroke,
+    measure_strokes,
+    noise_floor,
+    planted_entry,
+    record_entry,
     suite_parser,
     write_campaigns,
 )
-from stand.blind.draw import Drawn, _arm, _run, six_strokes
-from stand.blind.suite import Case, Suite, _signed, read_suite
+from stand.blind.draw import Drawn, draw_arm, rms, run, six_strokes
+from stand.blind.suite import Case, Suite, read_suite, signed
 from stand.campaign import record_text
 from stand.gyro import Gyro
 from stand.motion import Motion
@@ -54,17 +54,17 @@ FAMILIES = ("control", "fault", "constant", "constants", "two", "three", "trend"
 TRENDS, TREND = ("p0", "k", "eta3", "n"), (0.02, 0.08)
 
 
-def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, bytes], Entry]:
+def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str], Entry]:
     """Make the files of one campaign of a family, and its entry in the key."""
     family, index = case
     rng = np.random.default_rng([seed, FAMILIES.index(family), index])
     sets = {"two": suite.pairs, "three": THREE}.get(family, ((),))
-    planted = tuple(_signed(suite.kind(name), len(suite.kind(name).sizes), rng) for name in sets[index % len(sets)])
+    planted = tuple(signed(suite.kind(name), len(suite.kind(name).sizes), rng) for name in sets[index % len(sets)])
     truth = Case(index, family, planted, bool(index % 2))
     gyro = Gyro(round(float(rng.uniform(*suite.noise_deg_s)), 4), 0.001, suite.bandwidth_hz if index % 2 else 0.0)
     fault = {"kind": FAULTS[index // 2 % len(FAULTS)]} if family == "fault" else {}
     while True:
-        arm, off = off_constants(_arm(suite, rng), family, rng)
+        arm, off = off_constants(draw_arm(suite, rng), family, rng)
         strokes, duration = six_strokes(rng), round(float(rng.uniform(*suite.duration_s)), 2)
         place = int(rng.integers(len(strokes)))
         moved = [differing(m, fault, rng) if i == place else m for i, (m, _) in enumerate(strokes)]
@@ -74,43 +74,43 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, byte
         trained = [m for m, role in strokes if role == "train"]
         arms = [at_its_place(arm, trend, trained.index(m) / (len(trained) - 1)) if m in trained else arm
                 for m, _ in strokes]  # fmt: skip
-        found = [_run(Motion(a, m, truth.effects()), duration) for a, m in zip(arms, moved, strict=True)]
-        told = _run(Motion(arm, strokes[place][0], truth.effects()), duration)
+        found = [run(Motion(a, m, truth.effects()), duration) for a, m in zip(arms, moved, strict=True)]
+        told = run(Motion(arm, strokes[place][0], truth.effects()), duration)
         if told is not None and all(found):
             break
     drawn = Drawn(arm, strokes, duration, gyro, tuple(f for f in found if f is not None))
-    rest = round(suite.rest_s * 1000)
-    measured = [measure_stroke(drawn, i, truth.effects(), rest, rng) for i in range(len(strokes))]
+    records = measure_strokes(suite, drawn, truth.effects(), rng)
     dirt = DIRT[index // 2 % len(DIRT)] if family == "control" else "none"
-    files = {"campaign.toml": campaign_text(f"{family} {index}", drawn, measured, ())}
-    for i, each in enumerate(measured):
-        table = np.column_stack([each.record.time_s, each.record.speed_deg_s])
+    for i, each in enumerate(records):
+        table = np.column_stack([each.time_s, each.speed_deg_s])
         if i == place and fault:
-            fault |= {"record": each.record.file, "role": each.record.role}
+            fault |= {"record": each.file, "role": each.role}
             shown, real = (np.degrees(t.gyro) for t in (told, drawn.trajectories[i]))
+            rest = len(table) - len(real)
             clean = np.concatenate([np.zeros(rest), real])
             there = broken(np.column_stack([table[:, 0], clean]), clean, dict(fault), deepcopy(rng))
             change = np.interp(table[rest:, 0], *there.T) - shown
             table = broken(table, clean, fault, rng)
-            fault["moves"] = float(np.sqrt(np.mean(change**2))) / gyro.noise_deg_s
+            fault["moves"] = rms(change) / gyro.noise_deg_s
         if dirt != "none":
             table = dirtied(table, dirt, rng)
-        record = replace(each.record, time_s=table[:, 0], speed_deg_s=table[:, 1])
-        text = record_text(record, gyro.decimals)
-        files[each.record.file] = text if dirt != "jitter" else jittered(table)
+        records[i] = replace(each, time_s=table[:, 0], speed_deg_s=table[:, 1])
+    files = campaign_files(f"{family} {index}", gyro, records, ())
+    if dirt == "jitter":
+        files |= {each.file: record_text(each, gyro.decimals, 6) for each in records}
     if trend:
-        sound = [_run(Motion(arm, m, truth.effects()), duration) for m in moved]
+        sound = [run(Motion(arm, m, truth.effects()), duration) for m in moved]
         changes = [a.gyro - b.gyro for a, b in zip(drawn.trajectories, sound, strict=True) if b is not None]
-        moves = max(float(np.sqrt(np.mean(np.degrees(c) ** 2))) for c in changes) / gyro.noise_deg_s
+        moves = max(rms(np.degrees(change)) for change in changes) / gyro.noise_deg_s
         fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves}
-    floor = {role: _pooled([m.noise for m in measured if m.record.role == role]) for role in ("train", "holdout")}
     entry = {
         "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
-        "effects": [_told(p, None, None) for p in planted], "noise": {"kind": "coloured" if index % 2 else "white"},
-        "floor": floor, "records": [_record(m, 0.0) for m in measured], "declared_fit": None, "fault": fault,
+        "effects": [planted_entry(p) | {"alone": None} for p in planted],
+        "noise": {"kind": "coloured" if index % 2 else "white"}, "floor": noise_floor(records),
+        "records": [record_entry(each, 0.0) for each in records], "declared_fit": None, "fault": fault,
         "constants": off, "dirt": dirt,
     }  # fmt: skip
-    return {file: text.encode() for file, text in files.items()}, entry
+    return files, entry
 
 
 def at_its_place(arm: Arm, trend: dict[str, Any], place: float) -> Arm:
@@ -188,11 +188,6 @@ def dirtied(table: Any, dirt: str, rng: np.random.Generator) -> Any:
     return np.column_stack([time + (rng.normal(0.0, 2e-5, len(time)) if dirt == "jitter" else 0.0), speed])
 
 
-def jittered(table: Any) -> str:
-    lines = [f"{t:.6f},{v:.3f}" for t, v in table]
-    return "\n".join(["time_s,angular_velocity_deg_s", *lines, ""])
-
-
 def main(words: Sequence[str]) -> int:
     """Make the campaigns of some families as the command line says; give the exit code, 2 when refused."""
     parser = suite_parser("families.py", "Make campaigns as real ones are.", SUITE)
@@ -205,8 +200,7 @@ def _make_families(options: argparse.Namespace) -> str:
     # In turn, so that a study that is cut short has seen all families alike.
     parts = [((index + 0.5) / count, family, index) for family, count in wanted for index in range(count)]
     named = {f"c{place:03d}": (family, index) for place, (_, family, index) in enumerate(sorted(parts))}
-    making = partial(make, read_suite(options.suite), options.seed)
-    write_campaigns(options.folder, named, making, {"seed": options.seed}, options.processes)
+    write_campaigns(options, named, partial(make, read_suite(options.suite), options.seed))
     return f"{options.folder}: {len(named)} campaigns, SYNTHETIC; key: {key_path(options.folder)}"
 
 

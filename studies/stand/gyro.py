@@ -30,7 +30,6 @@ class Gyro:
     range_deg_s: float = 200.0
 
     def __post_init__(self) -> None:
-        """Refuse an instrument that cannot be."""
         for each in fields(self):
             value = getattr(self, each.name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -58,8 +57,13 @@ def measure(
 ) -> FloatArray:
     """Give one record of a trajectory [deg/s], rest included: speed plus noise, rounded to steps, kept in range."""
     rest = np.full(rest_samples, bias_deg_s)
-    shown = np.concatenate((rest, np.degrees(trajectory.gyro)))
-    return _quantise(shown + noise(shown.size, gyro, rng), gyro)
+    shown, step = np.concatenate((rest, np.degrees(trajectory.gyro))), gyro.quantisation_deg_s
+    speed = shown + noise(shown.size, gyro, rng)
+    if not step:
+        return np.clip(speed, -gyro.range_deg_s, gyro.range_deg_s)
+    most = math.floor(gyro.range_deg_s / step + 1e-9)
+    # adding 0 turns a written -0 into 0
+    return np.clip(np.round(speed / step), -most, most) * step + 0.0
 
 
 def noise(size: int, gyro: Gyro, rng: np.random.Generator) -> FloatArray:
@@ -76,12 +80,3 @@ def noise(size: int, gyro: Gyro, rng: np.random.Generator) -> FloatArray:
     response = np.exp(-NOISE_DAMPING * natural * time) * ringing
     white = rng.standard_normal(size + memory - 1)
     return gyro.noise_deg_s * np.convolve(white, response / np.linalg.norm(response), mode="valid")
-
-
-def _quantise(speed: FloatArray, gyro: Gyro) -> FloatArray:
-    """Round to whole steps inside the range; adding 0 turns a written -0 into 0."""
-    step = gyro.quantisation_deg_s
-    if not step:
-        return np.clip(speed, -gyro.range_deg_s, gyro.range_deg_s)
-    most = math.floor(gyro.range_deg_s / step + 1e-9)
-    return np.clip(np.round(speed / step), -most, most) * step + 0.0

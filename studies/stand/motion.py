@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -15,6 +14,7 @@ from stand import RefusalError
 from stand.arm import GRAVITY, SHELL_INERTIA, Arm, Manoeuvre
 from stand.effects import (
     Effects,
+    State,
     base_rate,
     command,
     coupling,
@@ -27,7 +27,6 @@ from stand.effects import (
 )
 
 FloatArray = npt.NDArray[np.float64]
-State = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -62,20 +61,13 @@ class Motion:
     def start(self) -> State:
         """Give the state at t = 0, when the brake opens: all at rest, the gas on its polytrope."""
         angle, effects = self.manoeuvre.start, self.effects
-        state = {"angle": angle, "speed": 0.0, "current": 0.0}
-        if effects.gas_heat_loss:
-            state["pressure"] = self.arm.pressure(angle)
-        if effects.tachometer_lag:
-            state["tachometer"] = 0.0
-        if effects.drive_compliance:
-            state |= {"drive_angle": angle, "drive_speed": 0.0}
-        if self.rocks:
-            state |= {"shell_angle": angle, "shell_speed": 0.0}
-        if effects.base_compliance:
-            state |= {"base": 0.0, "base_speed": 0.0}
-        if effects.gyro_bandwidth_hz:
-            state |= {"gyro": 0.0, "gyro_rate": 0.0}
-        counters = {
+        sizes = {
+            "pressure": effects.gas_heat_loss,
+            "tachometer": effects.tachometer_lag,
+            **dict.fromkeys(("drive_angle", "drive_speed"), effects.drive_compliance),
+            **dict.fromkeys(("shell_angle", "shell_speed"), self.rocks),
+            **dict.fromkeys(("base", "base_speed"), effects.base_compliance),
+            **dict.fromkeys(("gyro", "gyro_rate"), effects.gyro_bandwidth_hz),
             "heat": effects.winding_heating,
             "charge": effects.motor_fade,
             "clock": effects.sway or effects.slipping_ripple,
@@ -84,7 +76,9 @@ class Motion:
             "bouc_wen": effects.bouc_wen,
             "drive_torque": effects.actuator_lag,
         }
-        return state | {name: 0.0 for name, size in counters.items() if size}
+        begins = {"angle": angle, "drive_angle": angle, "shell_angle": angle, "pressure": self.arm.pressure(angle)}
+        on = ("angle", "speed", "current", *(name for name, size in sizes.items() if size))
+        return {name: begins.get(name, 0.0) for name in on}
 
     def rates(self, values: FloatArray, closed_loop: bool, seen: FloatArray | None = None) -> list[float]:
         """Give d(state)/dt in the order of `start`, in the open-loop or the closed-loop stage.
@@ -161,124 +155,82 @@ class Motion:
 
     def _added_rates(self, now: State, torque: float) -> State:
         """Give the rates of the states that effects appended."""
+        arm, effects = self.arm, self.effects
         rate: State = {}
         if "pressure" in now:
-            rate["pressure"] = self._pressure_rate(now)
+            # n p S l omega / V - (p - p0 V0/V) / tau [Pa/s]: compression, and heat lost toward the isotherm
+            volume = arm.volume(now["angle"])
+            squeeze = arm.n * now["pressure"] * arm.piston_area * arm.piston_lever * now["speed"] / volume
+            rate["pressure"] = squeeze - (now["pressure"] - arm.p0 * arm.gas_volume / volume) / effects.gas_heat_loss
         if "tachometer" in now:
             turning = now.get("drive_speed", now["speed"])
-            rate["tachometer"] = (turning - now["tachometer"]) / self.effects.tachometer_lag
+            rate["tachometer"] = (turning - now["tachometer"]) / effects.tachometer_lag
         if "shell_speed" in now:
             rate |= {"shell_angle": now["shell_speed"], "shell_speed": self._tray(now) / SHELL_INERTIA}
         if "base" in now:
-            rate |= {"base": now["base_speed"], "base_speed": base_rate(self.effects, now, -torque)}
+            rate |= {"base": now["base_speed"], "base_speed": base_rate(effects, now, -torque)}
         if "gyro" in now:
-            rate |= {"gyro": now["gyro_rate"], "gyro_rate": self._gyro_pull(now)}
+            # y'' = w^2 (omega - y) - 2 z w y', w = 2 pi f, of the gyro's own mass [rad/s3]
+            natural = 2.0 * math.pi * effects.gyro_bandwidth_hz
+            pull = natural * (now["speed"] - now["gyro"]) - 2.0 * effects.gyro_damping * now["gyro_rate"]
+            rate |= {"gyro": now["gyro_rate"], "gyro_rate": natural * pull}
         if "drive_angle" in now:
-            left = self._drive(now) - coupling(self.effects, now)
+            left = self._drive(now) - coupling(effects, now)
             rate |= {"drive_angle": now["drive_speed"], "drive_speed": left / self.drive_inertia}
         if "drive_torque" in now:
-            wanted = drive(self.arm, self.effects, now)
-            rate["drive_torque"] = (wanted - now["drive_torque"]) / self.effects.actuator_lag
-        rate |= hysteresis_rates(self.effects, now)
+            wanted = drive(arm, effects, now)
+            rate["drive_torque"] = (wanted - now["drive_torque"]) / effects.actuator_lag
+        rate |= hysteresis_rates(effects, now)
         if "heat" in now:
-            rate["heat"] = now["current"] ** 2 - self.effects.winding_cooling * now["heat"]
+            rate["heat"] = now["current"] ** 2 - effects.winding_cooling * now["heat"]
         return rate | {"charge": abs(now["current"]), "clock": 1.0}
 
-    def _pressure_rate(self, now: State) -> float:
-        """dp/dt = n p S l omega / V - (p - p0 V0/V) / tau [Pa/s]: compression, and heat lost toward the isotherm."""
-        arm, volume = self.arm, self.arm.volume(now["angle"])
-        squeeze = arm.n * now["pressure"] * arm.piston_area * arm.piston_lever * now["speed"] / volume
-        return squeeze - (now["pressure"] - arm.p0 * arm.gas_volume / volume) / self.effects.gas_heat_loss
 
-    def _gyro_pull(self, now: State) -> float:
-        """Second-order lag y'' = w^2 (omega - y) - 2 z w y', w = 2 pi f, of the gyro's own mass [rad/s3]."""
-        natural = 2.0 * math.pi * self.effects.gyro_bandwidth_hz
-        return natural * (natural * (now["speed"] - now["gyro"]) - 2.0 * self.effects.gyro_damping * now["gyro_rate"])
-
-
-Signal = Callable[[float], FloatArray]
 MOST_RATES = 300_000
 """Evaluations of the equations that a stage may take; a usual one takes some 10,000."""
+SAMPLES_PER_SECOND = 1000
+TOLERANCE = 1e-11
 
 
-def open_stage(motion: Motion, state: FloatArray, samples: FloatArray, tolerance: float) -> Any:
-    """Integrate from t = 0 under full supply until the switch E, which is the first event, or the last sample."""
-    span = (0.0, float(samples[-1]))
-    return _integrate(motion, state, span, tolerance, _ending(_to_switch(motion), True), t_eval=samples)
-
-
-def open_piece(motion: Motion, state: FloatArray, span: tuple[float, float], tolerance: float) -> Any:
-    """Integrate a span [s] under full supply past the switch E, with a solution at any time of it."""
-    return _integrate(motion, state, span, tolerance, _ending(_to_switch(motion), False), dense_output=True)
-
-
-def closed_stage(motion: Motion, state: FloatArray, begin: float, samples: FloatArray, tolerance: float) -> Any:
-    """Integrate in closed loop from `begin` [s] to the last sample."""
-    span = (begin, float(samples[-1]))
-    never = _ending(_to_switch(motion), False)
-    return _integrate(motion, state, span, tolerance, never, closed_loop=True, t_eval=samples)
-
-
-def closed_piece(motion: Motion, state: FloatArray, span: tuple[float, float], tolerance: float, seen: Signal) -> Any:
-    """Integrate a span [s] in closed loop with a controller that knows the state `seen` at each time."""
-    never = _ending(_to_switch(motion), False)
-    return _integrate(motion, state, span, tolerance, never, closed_loop=True, seen=seen, dense_output=True)
-
-
-def _integrate(
+def integrate(
     motion: Motion,
     state: FloatArray,
     span: tuple[float, float],
     tolerance: float,
-    switch: Any,
-    closed_loop: bool = False,
-    seen: Signal | None = None,
+    closed_loop: bool = True,
+    to_switch: bool = False,
+    seen: Any = None,
     **wanted: Any,
 ) -> Any:
-    """Integrate by DOP853; the first event is the switch E, the second the end of the travel, which is refused."""
-    count = itertools.count()
+    """Integrate a span [s] by DOP853, to the switch E where that is asked for; `wanted` are options of `solve_ivp`.
+
+    `seen` is the state that the controller holds, or the solution that it sees late; None for the present state.
+    Raises RefusalError when the arm leaves its travel, or when the equations are too stiff or fail.
+    """
+    count, arm, target = itertools.count(), motion.arm, motion.manoeuvre.target
 
     def rates(time: float, values: FloatArray) -> list[float]:
         if next(count) > MOST_RATES:
             raise RefusalError(f"{motion.manoeuvre.name} is too stiff to integrate: an effect is too fast or too large")
-        return motion.rates(values, closed_loop, seen(time) if seen else None)
+        known = seen(time - motion.effects.controller_delay) if callable(seen) else seen
+        return motion.rates(values, closed_loop, known)
 
-    events = [switch, _ending(_to_stops(motion), True)]
+    def distance_to_stops(_time: float, values: FloatArray) -> float:
+        return min(float(values[0]) - arm.travel[0], arm.travel[1] - float(values[0]))
+
+    def distance_to_switch(_time: float, values: FloatArray) -> float:
+        return abs(target - float(values[0])) - arm.switch_distance
+
+    events: list[Any] = [distance_to_stops, *([distance_to_switch] if to_switch else [])]
+    for event in events:
+        event.terminal, event.direction = True, -1.0
     found: Any = solve_ivp(rates, span, state, method="DOP853", events=events, rtol=tolerance, atol=tolerance, **wanted)
-    if found.t_events[1].size:
-        where = f"at {found.t_events[1][0]:.3f} s, and the stand has no end stops"
+    if found.t_events[0].size:
+        where = f"at {found.t_events[0][0]:.3f} s, and the stand has no end stops"
         raise RefusalError(f"{motion.manoeuvre.name} would leave the travel of -55 to 45 deg {where}")
     if not found.success or not np.isfinite(found.y).all():
         raise RefusalError(f"{motion.manoeuvre.name} cannot be integrated with these values: {found.message}")
     return found
-
-
-def _to_switch(motion: Motion) -> Callable[[FloatArray], float]:
-    """Give the distance to E [rad]: abs(theta_D - theta) - delta_E."""
-    target, distance = motion.manoeuvre.target, motion.arm.switch_distance
-    return lambda values: abs(target - float(values[0])) - distance
-
-
-def _to_stops(motion: Motion) -> Callable[[FloatArray], float]:
-    """Give the distance to the nearer end of the travel [rad]."""
-    low, high = motion.arm.travel
-    return lambda values: min(float(values[0]) - low, high - float(values[0]))
-
-
-def _ending(distance: Callable[[FloatArray], float], terminal: bool) -> Any:
-    """Make an event of scipy where a distance falls to 0."""
-
-    def event(_time: float, values: FloatArray) -> float:
-        return distance(values)
-
-    event.terminal = terminal  # type: ignore[attr-defined]
-    event.direction = -1.0  # type: ignore[attr-defined]
-    return event
-
-
-def is_late(motion: Motion) -> bool:
-    """Tell whether the controller acts on an earlier state than the present one."""
-    return bool(motion.effects.controller_delay or motion.effects.controller_period)
 
 
 def notice(motion: Motion, switch: float) -> float:
@@ -287,7 +239,7 @@ def notice(motion: Motion, switch: float) -> float:
     return math.ceil(switch / period) * period if period else switch + motion.effects.controller_delay
 
 
-def late_stage(
+def after_switch(
     motion: Motion, state: FloatArray, switch: float | None, samples: FloatArray, tolerance: float
 ) -> FloatArray:
     """Integrate from the switch E [s] to the last sample, each sample a column; None starts in closed loop at t = 0.
@@ -295,54 +247,24 @@ def late_stage(
     The delay is that of a delay line and not an approximation: by the method of steps each piece is no longer than
     the delay, so that all the controller sees in it lies in the piece before, and every kink falls between pieces.
     """
-    pieces = _Pieces(samples)
-    begin, seen = 0.0, _held(state)
-    if switch is not None:
-        begin = min(notice(motion, switch), float(samples[-1]))
-        if begin > switch:
-            found = open_piece(motion, state, (switch, begin), tolerance)
-            state, seen = pieces.add(found), found.sol
-    length = motion.effects.controller_delay or motion.effects.controller_period
-    count = 0
-    while pieces.missing:
-        span = (begin + count * length, min(begin + (count + 1) * length, float(samples[-1])))
-        known = _held(state) if motion.effects.controller_period else _delayed(seen, length)
-        found = closed_piece(motion, state, span, tolerance, known)
-        state, seen, count = pieces.add(found), found.sol, count + 1
-    return np.hstack(pieces.columns)
-
-
-def _held(state: FloatArray) -> Signal:
-    return lambda _time: state
-
-
-def _delayed(seen: Callable[[float], FloatArray], delay: float) -> Signal:
-    return lambda time: seen(time - delay)
-
-
-class _Pieces:
-    """Collect the samples of one piece after the other."""
-
-    def __init__(self, samples: FloatArray) -> None:
-        self.samples, self.count = samples, 0
-        self.columns: list[FloatArray] = []
-
-    @property
-    def missing(self) -> bool:
-        """Tell whether samples are still to come."""
-        return self.count < self.samples.size
-
-    def add(self, found: Any) -> FloatArray:
-        """Take the samples that a piece reaches and give its last state."""
-        reached = int(np.searchsorted(self.samples, found.t[-1], side="right"))
-        if reached > self.count:
-            self.columns.append(found.sol(self.samples[self.count : reached]))
-            self.count = reached
-        return np.asarray(found.y[:, -1])
-
-
-SAMPLES_PER_SECOND = 1000
-TOLERANCE = 1e-11
+    end, effects = float(samples[-1]), motion.effects
+    length = effects.controller_delay or effects.controller_period
+    if not length:
+        return np.asarray(integrate(motion, state, (switch or 0.0, end), tolerance, t_eval=samples).y)
+    begin = 0.0 if switch is None else min(notice(motion, switch), end)
+    open_loop = [(switch, begin)] if switch is not None and switch < begin else []
+    pieces = ((begin + i * length, min(begin + (i + 1) * length, end)) for i in itertools.count())
+    columns, seen, reached = [], state, 0
+    for span in itertools.chain(open_loop, pieces):
+        found = integrate(motion, state, span, tolerance, span[0] >= begin, seen=seen, dense_output=True)
+        state = found.y[:, -1]
+        seen = found.sol if effects.controller_delay else state
+        first, reached = reached, int(np.searchsorted(samples, span[1], side="right"))
+        if reached > first:
+            columns.append(found.sol(samples[first:reached]))
+        if reached == samples.size:
+            break
+    return np.hstack(columns)
 
 
 @dataclass(frozen=True)
@@ -366,34 +288,19 @@ def simulate(motion: Motion, duration_s: float, tolerance: float = TOLERANCE) ->
     Raises RefusalError when the arm leaves its travel, or when the equations are too stiff or fail.
     """
     time = np.arange(round(duration_s * SAMPLES_PER_SECOND) + 1) / SAMPLES_PER_SECOND
-    start = np.array(list(motion.start.values()))
+    start, begins = np.array(list(motion.start.values())), None
     if abs(motion.manoeuvre.target - motion.manoeuvre.start) <= motion.arm.switch_distance:
-        return _trajectory(motion, time, _closed_loop(motion, start, None, time, tolerance), 0.0)
-    before = open_stage(motion, start, time, tolerance)
-    if not before.t_events[0].size:
-        return _trajectory(motion, time, before.y, None)
-    switch, state = float(before.t_events[0][0]), before.y_events[0][0]
-    begins = notice(motion, switch) if is_late(motion) else switch
-    rest = time[before.y.shape[1] :]
-    if not rest.size:
-        return _trajectory(motion, time, before.y, begins)
-    after = _closed_loop(motion, state, switch, rest, tolerance)
-    return _trajectory(motion, time, np.hstack((before.y, after)), begins)
-
-
-def _closed_loop(
-    motion: Motion, state: FloatArray, switch: float | None, samples: FloatArray, tolerance: float
-) -> FloatArray:
-    """Integrate from the switch E, or from t = 0 where there is none, to the last sample."""
-    if is_late(motion):
-        return late_stage(motion, state, switch, samples, tolerance)
-    return np.asarray(closed_stage(motion, state, switch or 0.0, samples, tolerance).y)
-
-
-def _trajectory(motion: Motion, time: FloatArray, values: FloatArray, switch_s: float | None) -> Trajectory:
-    """Name the states and read the gyro: its lagged speed, times 1 + scale error, plus bias."""
-    states = dict(zip(motion.start, values, strict=True))
-    effects = motion.effects
+        values, begins = after_switch(motion, start, None, time, tolerance), 0.0
+    else:
+        before = integrate(motion, start, (0.0, float(time[-1])), tolerance, False, True, t_eval=time)
+        values, rest = before.y, time[before.y.shape[1] :]
+        if before.t_events[1].size:
+            switch = float(before.t_events[1][0])
+            begins = notice(motion, switch)
+            if rest.size:
+                after = after_switch(motion, before.y_events[1][0], switch, rest, tolerance)
+                values = np.hstack((values, after))
+    states, effects = dict(zip(motion.start, values, strict=True)), motion.effects
     seen = states.get("gyro", states["speed"])
     gyro = seen * (1.0 + effects.gyro_scale) + math.radians(effects.gyro_bias_deg_s)
-    return Trajectory(time, states, gyro, switch_s)
+    return Trajectory(time, states, gyro, begins)

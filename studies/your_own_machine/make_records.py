@@ -113,7 +113,6 @@ def record(run: Run, rng: np.random.Generator) -> dict[str, Array]:
 
 
 def campaign_text() -> str:
-    """Return campaign.toml."""
     text = "# SYNTHETIC: made by studies/your_own_machine/make_records.py; no machine was measured.\n"
     text += f"# Truth: {', '.join(f'{k} = {v:g}' for k, v in TRUTH.items())}.\n"
     text += f"# Undeclared: friction of {FRICTION:g} times the load of the gear, a speed signal {LAG_S:g} s late.\n"

@@ -14,7 +14,7 @@ from input_texts import SUITE_HEAD
 from stand import RefusalError, families
 from stand.arm import KNOWN, Arm
 from stand.blind.campaign import SUITE, key_path, main
-from stand.blind.draw import Shown, declared_speeds, fit_declared
+from stand.blind.draw import declared_speeds, fit_declared
 from stand.blind.suite import cases_of, read_suite, shuffled
 from stand.effects import Effects
 from stand.motion import Motion, simulate
@@ -173,9 +173,9 @@ def test_lanes_agree_with_the_stand(name: str) -> None:
 def test_the_fit_finds_an_arm_that_lacks_nothing() -> None:
     truth = Arm(3.2e6, 0.9, 0.6, 1.2)
     strokes = [KNOWN[name] for name in ("lower", "raise", "empty")]
-    shown = Shown(strokes, declared_speeds([(truth, stroke) for stroke in strokes], 801))
+    speeds = declared_speeds([(truth, stroke) for stroke in strokes], 801)
     ranges = read_suite(SUITE).ranges
-    found = fit_declared(shown, Arm(), ranges)
+    found = fit_declared(strokes, speeds, Arm(), ranges)
     for name in ranges:
         assert getattr(found, name) == pytest.approx(getattr(truth, name), rel=1e-3)
 

@@ -41,15 +41,11 @@ def columns(speed: np.ndarray, acceleration: np.ndarray, form: str) -> np.ndarra
     return np.column_stack([acceleration, speed * forward, 1.0 * forward, speed * back, -1.0 * back])
 
 
-def thinned(values: np.ndarray) -> np.ndarray:
-    """Return signals filtered and thinned, so that no disturbance above the motion's band is fitted."""
-    return decimate(values, THINNED, axis=0, zero_phase=True)
-
-
-def problem(folder: Path, name: str, form: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return columns and force of one record."""
+def problem(folder: Path, name: str, form: str) -> tuple[np.ndarray, ...]:
+    """Return columns and force of one record, filtered and thinned to the band of the motion."""
     speed, acceleration, force = motion(pd.read_csv(folder / f"{name}.csv"))
-    return thinned(columns(speed, acceleration, form)), thinned(force)
+    both = (columns(speed, acceleration, form), force)
+    return tuple(decimate(values, THINNED, axis=0, zero_phase=True) for values in both)
 
 
 def error(W: np.ndarray, force: np.ndarray, beta: np.ndarray) -> float:

@@ -46,17 +46,17 @@ def draw(suite: Suite, case: Case, rng: np.random.Generator, strokes_of: Strokes
     usual = _one_stroke if case.label == "one_stroke" else six_strokes
     gyro = Gyro(noise, 0.001, suite.bandwidth_hz if case.coloured else 0.0)
     for _ in range(TRIES):
-        arm = _arm(suite, rng)
+        arm = draw_arm(suite, rng)
         duration = round(float(rng.uniform(*suite.duration_s)), 2)
         strokes = strokes_of(rng) if strokes_of else usual(rng)
-        found = [_run(Motion(arm, manoeuvre, case.effects()), duration) for manoeuvre, _ in strokes]
+        found = [run(Motion(arm, manoeuvre, case.effects()), duration) for manoeuvre, _ in strokes]
         trajectories = tuple(each for each in found if each is not None)
         if len(trajectories) == len(strokes):
             return Drawn(arm, strokes, duration, gyro, trajectories)
     raise RefusalError(f"no arm and manoeuvres for case {case.index} ({case.label}) were found in {TRIES} draws")
 
 
-def _arm(suite: Suite, rng: np.random.Generator) -> Arm:
+def draw_arm(suite: Suite, rng: np.random.Generator) -> Arm:
     """Draw the four unknown parameters, away from the edges of their search ranges."""
     drawn: dict[str, Any] = {}
     for name, (low, high) in suite.ranges.items():
@@ -90,104 +90,74 @@ def _one_stroke(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
     return ((PAPERS, "train"), *(repeat if rng.random() < 0.5 else ()))
 
 
-def _run(motion: Motion, duration: float) -> Trajectory | None:
-    """Simulate a stroke; None when it leaves the travel, is too fast for the gyro, or does not get to the closed loop.
+def run(motion: Motion, duration: float, must_close: bool = True) -> Trajectory | None:
+    """Simulate a stroke; None when it leaves the travel or is too fast for the gyro.
 
-    The closed loop must last for 0.2 s of the record.
+    None as well, when it must close its loop, and closed loop does not last for 0.2 s of the record.
     """
     try:
         found = simulate(motion, duration, TOLERANCE)
     except RefusalError:
         return None
-    reached = found.switch_s is not None and found.switch_s < duration - 0.2
-    return found if reached and float(np.abs(found.gyro).max()) < FASTEST else None
+    closes = found.switch_s is not None and found.switch_s < duration - 0.2
+    return found if float(np.abs(found.gyro).max()) < FASTEST and (closes or not must_close) else None
 
 
 FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-STEP = 1.0 / SAMPLES_PER_SECOND
-
-
-@dataclass(frozen=True)
-class Lanes:
-    """Hold pairs of an arm and a manoeuvre, one lane each; every array is (n_lanes,), `arm` gives what all share."""
-
-    arm: Arm
-    p0: FloatArray
-    damping: FloatArray
-    n: FloatArray
-    inertia: FloatArray
-    drive: FloatArray
-    moment: FloatArray
-    start: FloatArray
-    target: FloatArray
-    supply: FloatArray
-
-    def rates(self, state: FloatArray, closed: BoolArray) -> FloatArray:
-        """Give d(angle, speed, current)/dt, (3, n_lanes), by paper Eqs 1-7; `closed` tells which lanes are past E."""
-        arm, (angle, speed, current) = self.arm, state
-        squeezed = arm.piston_area * arm.piston_lever * (angle - arm.travel[0]) / arm.gas_volume
-        pressure = self.p0 * np.maximum(1.0 - squeezed, 1e-3) ** -self.n
-        torque = self.drive * np.abs(current) * current - arm.piston_lever * arm.piston_area * pressure
-        torque += self.moment * np.cos(angle + arm.gravity_angle)
-        demand = arm.position_gain * (self.target - angle) - self.damping * speed
-        asked = np.clip(np.abs(demand) - arm.threshold, 0.0, self.supply) * np.sign(demand)
-        voltage = np.where(closed, asked, self.supply * np.sign(self.target - self.start))
-        emf = arm.emf_constant * arm.excitation * arm.ratio_motor * np.abs(current) * speed
-        return np.array((speed, torque / self.inertia, (voltage - arm.resistance * current - emf) / arm.inductance))
-
-    def step(self, state: FloatArray, closed: BoolArray, length: FloatArray) -> FloatArray:
-        """Take a step of Runge and Kutta's fourth order, of its own length [s] in each lane."""
-        first = self.rates(state, closed)
-        second = self.rates(state + 0.5 * length * first, closed)
-        third = self.rates(state + 0.5 * length * second, closed)
-        fourth = self.rates(state + length * third, closed)
-        return np.asarray(state + length / 6.0 * (first + 2.0 * (second + third) + fourth))
-
-    def distance(self, state: FloatArray) -> FloatArray:
-        """Give the distance to the switch E [rad]."""
-        return np.asarray(np.abs(self.target - state[0]) - self.arm.switch_distance)
-
-
-def make_lanes(pairs: Sequence[tuple[Arm, Manoeuvre]]) -> Lanes:
-    """Put pairs of an arm and a manoeuvre side by side; the arms may differ in p0, k, eta3 and n alone."""
-    arms, strokes = zip(*pairs, strict=True)
-    loads = [arm.load(stroke.shell) for arm, stroke in pairs]
-    ratio = [2.0 * a.torque_constant * a.excitation * a.ratio_motor * a.eta1 * a.eta2 * a.eta3 for a in arms]
-    return Lanes(
-        arm=arms[0],
-        p0=np.array([arm.p0 for arm in arms]),
-        damping=np.array([arm.speed_gain * arm.k for arm in arms]),
-        n=np.array([arm.n for arm in arms]),
-        inertia=np.array([arm.inertia(stroke.shell) for arm, stroke in pairs]),
-        drive=np.array(ratio),
-        moment=np.array([load.mass * GRAVITY * load.lever for load in loads]),
-        start=np.array([stroke.start for stroke in strokes]),
-        target=np.array([stroke.target for stroke in strokes]),
-        supply=np.array([stroke.supply_volt for stroke in strokes]),
-    )
 
 
 def declared_speeds(pairs: Sequence[tuple[Arm, Manoeuvre]], n_samples: int) -> FloatArray:
     """Simulate the declared arm, with no stops at the ends of its travel; speeds at 1 kHz, (n_lanes, n_samples).
 
-    Steps of 1 ms, of which the one over the switch E is taken in two; good to 5e-4 rad/s at the worst sample and
-    3e-5 rad/s rms, a hundredth of the noise.
+    Each pair of an arm and a manoeuvre is a lane; the arms may differ in p0, k, eta3 and n alone. Steps of Runge and
+    Kutta's fourth order, 1 ms long, of which the one over the switch E is taken in two; good to 5e-4 rad/s at the
+    worst sample and 3e-5 rad/s rms, a hundredth of the noise.
     """
-    lanes = make_lanes(pairs)
-    state = np.array((lanes.start, np.zeros_like(lanes.start), np.zeros_like(lanes.start)))
-    closed = lanes.distance(state) <= 0.0
-    whole = np.full_like(lanes.start, STEP)
-    speeds = np.zeros((n_samples, lanes.start.size))
+    arms, strokes = zip(*pairs, strict=True)
+    arm, loads = arms[0], [arm.load(stroke.shell) for arm, stroke in pairs]
+    p0, n = (np.array([getattr(a, name) for a in arms]) for name in ("p0", "n"))
+    told = np.array([(stroke.start, stroke.target, stroke.supply_volt) for stroke in strokes])
+    start, target, supply = np.ascontiguousarray(told.T)
+    damping = np.array([a.speed_gain * a.k for a in arms])
+    inertia = np.array([a.inertia(stroke.shell) for a, stroke in pairs])
+    moment = np.array([load.mass * GRAVITY * load.lever for load in loads])
+    drive = np.array([2.0 * a.torque_constant * a.excitation * a.ratio_motor * a.eta1 * a.eta2 * a.eta3 for a in arms])
+
+    def rates(state: FloatArray, closed: FloatArray) -> FloatArray:
+        """Give d(angle, speed, current)/dt, (3, n_lanes), by paper Eqs 1-7; `closed` tells which lanes are past E."""
+        angle, speed, current = state
+        squeezed = arm.piston_area * arm.piston_lever * (angle - arm.travel[0]) / arm.gas_volume
+        pressure = p0 * np.maximum(1.0 - squeezed, 1e-3) ** -n
+        torque = drive * np.abs(current) * current - arm.piston_lever * arm.piston_area * pressure
+        torque += moment * np.cos(angle + arm.gravity_angle)
+        demand = arm.position_gain * (target - angle) - damping * speed
+        asked = np.clip(np.abs(demand) - arm.threshold, 0.0, supply) * np.sign(demand)
+        voltage = np.where(closed, asked, supply * np.sign(target - start))
+        emf = arm.emf_constant * arm.excitation * arm.ratio_motor * np.abs(current) * speed
+        return np.array((speed, torque / inertia, (voltage - arm.resistance * current - emf) / arm.inductance))
+
+    def step(state: FloatArray, closed: FloatArray, length: FloatArray) -> FloatArray:
+        first = rates(state, closed)
+        second = rates(state + 0.5 * length * first, closed)
+        third = rates(state + 0.5 * length * second, closed)
+        fourth = rates(state + length * third, closed)
+        return state + length / 6.0 * (first + 2.0 * (second + third) + fourth)
+
+    def to_switch(state: FloatArray) -> FloatArray:
+        return np.abs(target - state[0]) - arm.switch_distance
+
+    state = np.array((start, np.zeros_like(start), np.zeros_like(start)))
+    closed, whole = to_switch(state) <= 0.0, np.full_like(start, 1.0 / SAMPLES_PER_SECOND)
+    speeds = np.zeros((n_samples, start.size))
     for sample in range(1, n_samples):
-        after = lanes.step(state, closed, whole)
-        crossed = ~closed & (lanes.distance(after) <= 0.0)
+        after = step(state, closed, whole)
+        crossed = ~closed & (to_switch(after) <= 0.0)
         if crossed.any():
-            before = lanes.distance(state)
-            share = np.where(crossed, before / np.where(crossed, before - lanes.distance(after), 1.0), 1.0)
-            halfway = lanes.step(state, closed, share * whole)
+            before = to_switch(state)
+            share = np.where(crossed, before / np.where(crossed, before - to_switch(after), 1.0), 1.0)
+            halfway = step(state, closed, share * whole)
             closed = closed | crossed
-            after = lanes.step(halfway, closed, (1.0 - share) * whole)
+            after = step(halfway, closed, (1.0 - share) * whole)
         state = after
         speeds[sample] = state[1]
     return speeds.T
@@ -198,24 +168,16 @@ DIFFERENCE = 1e-4
 """Step of the derivatives, as a share of a parameter's search range."""
 
 
-@dataclass(frozen=True)
-class Shown:
-    """Hold what the gyro shows of strokes without noise: manoeuvres, and speeds [rad/s], (n_strokes, n_samples)."""
-
-    manoeuvres: Sequence[Manoeuvre]
-    speeds: FloatArray
-
-    def misses(self, arms: Sequence[Arm]) -> FloatArray:
-        """Give what declared arms depart from it [rad/s], (n_arms, n_strokes, n_samples)."""
-        pairs = [(arm, manoeuvre) for arm in arms for manoeuvre in self.manoeuvres]
-        found = declared_speeds(pairs, self.speeds.shape[1])
-        return found.reshape(len(arms), *self.speeds.shape) - self.speeds
+def misses(arms: Sequence[Arm], manoeuvres: Sequence[Manoeuvre], speeds: FloatArray) -> FloatArray:
+    """Give what declared arms depart from speeds [rad/s], (n_arms, n_strokes, n_samples)."""
+    found = declared_speeds([(arm, manoeuvre) for arm in arms for manoeuvre in manoeuvres], speeds.shape[1])
+    return found.reshape(len(arms), *speeds.shape) - speeds
 
 
-def fit_declared(train: Shown, truth: Arm, ranges: Ranges) -> Arm:
-    """Fit p0, k, eta3, n of the declared model by least squares, inside their ranges and from the truth on.
+def fit_declared(manoeuvres: Sequence[Manoeuvre], speeds: FloatArray, truth: Arm, ranges: Ranges) -> Arm:
+    """Fit p0, k, eta3, n of the declared model to speeds without noise [rad/s], (n_strokes, n_samples).
 
-    Each parameter runs from 0 to 1 over its search range.
+    Least squares from the truth on; each parameter runs from 0 to 1 over its search range.
     """
     low = np.array([edges[0] for edges in ranges.values()])
     width = np.array([edges[1] for edges in ranges.values()]) - low
@@ -227,18 +189,19 @@ def fit_declared(train: Shown, truth: Arm, ranges: Ranges) -> Arm:
     def tried(point: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
         """Give misses and their derivatives; both take one pass, since a pass costs little more with more lanes."""
         shifts = DIFFERENCE * np.vstack((np.zeros(width.size), np.eye(width.size), -np.eye(width.size)))
-        found = train.misses([arm_at(np.array(point) + shift) for shift in shifts]).reshape(len(shifts), -1)
+        arms = [arm_at(np.array(point) + shift) for shift in shifts]
+        found = misses(arms, manoeuvres, speeds).reshape(len(shifts), -1)
         forward, backward = found[1 : 1 + width.size], found[1 + width.size :]
         return found[0], (forward - backward).T / (2.0 * DIFFERENCE)
 
-    def misses(point: FloatArray) -> FloatArray:
+    def missed(point: FloatArray) -> FloatArray:
         return tried(tuple(point.tolist()))[0]
 
     def slopes(point: FloatArray) -> FloatArray:
         return tried(tuple(point.tolist()))[1]
 
     start = (np.array([getattr(truth, name) for name in ranges]) - low) / width
-    best = least_squares(misses, start, slopes, bounds=(0.0, 1.0), ftol=1e-4, xtol=1e-4, max_nfev=20)
+    best = least_squares(missed, start, slopes, bounds=(0.0, 1.0), ftol=1e-4, xtol=1e-4, max_nfev=20)
     return arm_at(best.x)
 
 
@@ -268,15 +231,12 @@ class Weight:
 
 def weigh(drawn: Drawn, speeds: FloatArray, ranges: Ranges) -> Weight:
     """Fit the declared model to true speeds [rad/s], (n_strokes, n_samples); the train strokes alone decide."""
-    roles = [role for _, role in drawn.strokes]
-    shown = {}
-    for wanted in ("train", "holdout"):
-        kept = [place for place, role in enumerate(roles) if role == wanted]
-        shown[wanted] = Shown([drawn.strokes[place][0] for place in kept], speeds[kept])
-    arm = fit_declared(shown["train"], drawn.arm, ranges)
-    left = {role: _rms(each.misses([arm])) if each.manoeuvres else None for role, each in shown.items()}
-    every = Shown([manoeuvre for manoeuvre, _ in drawn.strokes], speeds)
-    return Weight(arm, left, tuple(_rms(miss) for miss in every.misses([drawn.arm])[0]))
+    manoeuvres = [manoeuvre for manoeuvre, _ in drawn.strokes]
+    of = {role: [i for i, (_, each) in enumerate(drawn.strokes) if each == role] for role in ("train", "holdout")}
+    shown = {role: ([manoeuvres[i] for i in places], speeds[places]) for role, places in of.items()}
+    arm = fit_declared(*shown["train"], drawn.arm, ranges)
+    left = {role: rms(misses([arm], *some)) if some[0] else None for role, some in shown.items()}
+    return Weight(arm, left, tuple(rms(miss) for miss in misses([drawn.arm], manoeuvres, speeds)[0]))
 
 
 def weigh_alone(drawn: Drawn, effects: Effects, ranges: Ranges) -> Weight | None:
@@ -289,10 +249,9 @@ def weigh_alone(drawn: Drawn, effects: Effects, ranges: Ranges) -> Weight | None
     return weigh(drawn, np.array(speeds), ranges)
 
 
-def _rms(values: FloatArray) -> float:
+def rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
 def brief(value: float | None) -> float | None:
-    """Round to 6 digits."""
     return None if value is None else float(f"{value:.6g}")

@@ -89,7 +89,6 @@ def made_of_table(path: Path, make: Callable[[Mapping[str, Any]], T], what: str)
 
 
 def make_suite(table: Mapping[str, Any]) -> Suite:
-    """Give the settings that a [suite] table holds."""
     return Suite(
         effects=tuple(_kind(each, True) for each in table.get("effects", [])),
         unlisted=tuple(_kind(each, False) for each in table.get("unlisted", [])),
@@ -134,11 +133,7 @@ class Case:
     coloured: bool
 
     def effects(self) -> Effects:
-        """Join the planted effects."""
-        sizes: dict[str, float] = {}
-        for each in self.planted:
-            sizes |= each.sizes
-        return Effects(**sizes)
+        return Effects(**{name: size for each in self.planted for name, size in each.sizes.items()})
 
     def chosen(self, words: Iterable[str]) -> bool:
         """Tell whether the class or an effect of the case is among some words."""
@@ -152,20 +147,20 @@ def cases_of(suite: Suite, seed: int) -> list[Case]:
     told += [("control", (), bool(count % 2)) for count in range(suite.controls)]
     for kind in suite.effects:
         for strength in range(1, 1 + len(kind.sizes)):
-            told += [("single", (_signed(kind, strength, rng),), coloured) for coloured in (False, True)]
+            told += [("single", (signed(kind, strength, rng),), coloured) for coloured in (False, True)]
     for count, names in enumerate(suite.pairs):
         kinds = [suite.kind(name) for name in names]
-        told.append(("two", tuple(_signed(kind, len(kind.sizes), rng) for kind in kinds), bool(count % 2)))
+        told.append(("two", tuple(signed(kind, len(kind.sizes), rng) for kind in kinds), bool(count % 2)))
     unlisted = [(kind, strength) for kind in suite.unlisted for strength in range(1, 1 + len(kind.sizes))]
-    told += [("unlisted", (_signed(*each, rng),), bool(count % 2)) for count, each in enumerate(unlisted)]
+    told += [("unlisted", (signed(*each, rng),), bool(count % 2)) for count, each in enumerate(unlisted)]
     for count, name in enumerate(suite.one_stroke):
         kinds = [] if name == "none" else [suite.kind(name)]
-        middle = tuple(_signed(kind, math.ceil(len(kind.sizes) / 2), rng) for kind in kinds)
+        middle = tuple(signed(kind, math.ceil(len(kind.sizes) / 2), rng) for kind in kinds)
         told.append(("one_stroke", middle, bool(count % 2)))
     return [Case(index, *each) for index, each in enumerate(told)]
 
 
-def _signed(kind: Kind, strength: int, rng: np.random.Generator) -> Planted:
+def signed(kind: Kind, strength: int, rng: np.random.Generator) -> Planted:
     """Plant an effect; a sign is drawn for each, so that a change to one effect leaves the draws of the others."""
     return kind.planted(strength, float(rng.choice((-1.0, 1.0))))
 

@@ -33,14 +33,13 @@ class Claim:
 def read_claim(report: Entry) -> Claim:
     """Read the effects of a report in the end; one that was added and removed again does not count."""
     steps = {step["effect"]: step for step in report["steps"]}
-    empirical = tuple(name for name in report["effects"] if _is_empirical(name, steps))
+    empirical = tuple(
+        name for name in report["effects"]
+        if name.startswith(EMPIRICAL) or (name in steps and steps[name]["empirical"])
+    )  # fmt: skip
     named = [name for name in report["effects"] if name not in empirical]
     groups = {name: frozenset((name, *(steps[name]["alternatives"] if name in steps else ()))) for name in named}
     return Claim(groups, empirical, report["verdict"])
-
-
-def _is_empirical(name: str, steps: Mapping[str, Entry]) -> bool:
-    return name.startswith(EMPIRICAL) or bool(name in steps and steps[name]["empirical"])
 
 
 @dataclass(frozen=True)
@@ -74,10 +73,8 @@ def judgement(label: str, truths: Sequence[str], claim: Claim, matched: Matched)
     """
     if label == "unlisted":
         return _of_unlisted(claim)
-    return _of_listed(truths, claim, matched) if truths else _of_nothing(claim)
-
-
-def _of_nothing(claim: Claim) -> str:
+    if truths:
+        return _of_listed(truths, claim, matched)
     silent = not claim.groups and not claim.empirical
     return "right" if silent and claim.verdict == "no_discrepancy" else "false_alarm"
 
@@ -136,13 +133,12 @@ def judge_all(key: Mapping[str, Any], reports: Mapping[str, Any]) -> tuple[list[
         try:
             rows.append(judge(campaign, entry, reports[campaign]))
         except (KeyError, TypeError) as error:
-            told_of = f"the report of {campaign} is no report of a closed loop"
-            raise RefusalError(f"{told_of}: {error} is not as expected") from error
+            said = f"the report of {campaign} is no report of a closed loop: {error} is not as expected"
+            raise RefusalError(said) from error
     return rows, missing
 
 
 def read_json(file: Path) -> Any:
-    """Read a JSON file."""
     try:
         return json.loads(file.read_text())
     except OSError as error:
@@ -160,11 +156,9 @@ def told(campaign: str, entry: Entry) -> dict[str, Any]:
         "noise": entry["noise"]["kind"],
         "truth": "; ".join(each["name"] for each in effects),
         "form": "; ".join(each["form"] for each in effects),
-        "port": "; ".join(each["port"] for each in effects),
         "matching": all(each["matching"] for each in effects),
         "strength": "; ".join(str(each["strength"]) for each in effects),
         "matters": bool(fit and fit["matters"]),
-        "expected_over_floor": fit["holdout_ratio"] if fit else None,
         "floor": entry["floor"]["holdout"],
     }
 

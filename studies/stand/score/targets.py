@@ -1,15 +1,17 @@
 """Hold the judgements of a suite against the targets."""
 
+import operator
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from statistics import median
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from statistics import fmean, median
 from typing import Any
 
 from stand.score.judge import PARAMETERS
 
 Row = dict[str, Any]
 RIGHT = ("right", "group")
+SIGNS = {"<=": operator.le, ">=": operator.ge, "=": operator.eq, ">": operator.gt}
 
 
 @dataclass(frozen=True)
@@ -28,10 +30,22 @@ class Target:
     is_share: bool = False
 
 
+def aim(question: str, found: float | None, among: int, limit: str = "", is_share: bool = False) -> Target:
+    """Give a target; `limit` reads as "<= 0.02", and is neither met nor missed where nothing was found."""
+    sign, _, number = limit.partition(" ")
+    met = bool(SIGNS[sign](found, float(number))) if limit and found is not None else None
+    return Target(question, found, among, limit, met, is_share)
+
+
 def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
     """Reckon every target; `rows` are the judged campaigns, `missing` those without a report."""
-    first = Target("campaigns without a report", missing, len(rows) + missing, "= 0", missing == 0)
-    return [first, *_controls(rows), *_singles(rows), *_two(rows), *_fits(rows), *_unlisted(rows), *_one_stroke(rows)]
+    first = without_report(missing, len(rows) + missing)
+    two = least("two effects: both right", _of(rows, "two"), _is_right, 0.80)
+    return [first, *_controls(rows), *_singles(rows), two, *_fits(rows), *_unlisted(rows), *_one_stroke(rows)]
+
+
+def without_report(missing: int, among: int) -> Target:
+    return aim("campaigns without a report", missing, among, "= 0")
 
 
 def _controls(rows: Sequence[Row]) -> list[Target]:
@@ -57,48 +71,42 @@ def _singles(rows: Sequence[Row]) -> list[Target]:
     for matching in (True, False):
         some = [row for row in weighty if row["matching"] == matching]
         form = "matching" if matching else "non-matching"
+        after = _column(some, "after_over_floor")
         lines.append(share(f"{held}, {form} form: right name, or a group that holds it", some, _is_right))
-        lines.append(_middle(f"{held}, {form} form: held-out error over noise, median", some, "after_over_floor"))
+        lines.append(_summary(f"{held}, {form} form: held-out error over noise, median", after))
     sizes = [row["group_of_truth"] for row in weighty if row["group_of_truth"]]
-    mean = sum(sizes) / len(sizes) if sizes else None
-    return [*lines, Target(f"{held}: mean size of the group that holds the truth", mean, len(sizes))]
-
-
-def _two(rows: Sequence[Row]) -> list[Target]:
-    return [least("two effects: both right", _of(rows, "two"), _is_right, 0.80)]
+    return [*lines, _summary(f"{held}: mean size of the group that holds the truth", sizes, of=fmean)]
 
 
 def _fits(rows: Sequence[Row]) -> list[Target]:
     """Look at the held-out error and the bias for listed effects in a matching form."""
     listed = [row for row in (*_of(rows, "single"), *_of(rows, "two")) if row["matching"]]
     held = "listed effects in a matching form"
-    before, after = (_biases(listed, when) for when in ("before", "after"))
+    before, after = (
+        [abs(row[f"bias_{when}_{name}"]) for row in listed for name in PARAMETERS] for when in ("before", "after")
+    )
     errors = [row for row in listed if row["after_over_floor"] is not None]
     lines = [
-        _middle(f"{held}: held-out error over noise, median", listed, "after_over_floor", 1.10),
+        _summary(f"{held}: held-out error over noise, median", _column(listed, "after_over_floor"), "<= 1.1"),
         share(f"{held}: held-out error up to 1.10 of noise", errors, lambda row: row["after_over_floor"] <= 1.10),
-        _middle(f"{held}: held-out error over noise before, median", listed, "before_over_floor"),
-        _limited(f"{held}: bias of the four parameters, median", median(after) if after else None, len(after), 0.01),
-        Target(f"{held}: bias before, median", median(before) if before else None, len(before)),
-        Target(f"{held}: bias before, largest", max(before, default=None), len(before)),
-        Target(f"{held}: bias after, largest", max(after, default=None), len(after)),
+        _summary(f"{held}: held-out error over noise before, median", _column(listed, "before_over_floor")),
+        _summary(f"{held}: bias of the four parameters, median", after, "<= 0.01"),
+        _summary(f"{held}: bias before, median", before),
+        _summary(f"{held}: bias before, largest", before, of=max),
+        _summary(f"{held}: bias after, largest", after, of=max),
     ]
     for name in PARAMETERS:
         some = [abs(row[f"bias_after_{name}"]) for row in listed]
-        lines.append(Target(f"{held}: bias of {name}, median", median(some) if some else None, len(some)))
+        lines.append(_summary(f"{held}: bias of {name}, median", some))
     return lines
 
 
 def _unlisted(rows: Sequence[Row]) -> list[Target]:
     some, held = _of(rows, "unlisted"), "effects of no library"
-    cut = [row["cut"] for row in some if row["cut"] is not None]
-    excess = [row["excess_cut"] for row in some if row["excess_cut"] is not None]
-    middle = median(cut) if cut else None
-    met = None if middle is None else middle >= 0.60
     return [
         least(f"{held}: no library name said to explain all", some, lambda row: row["judgement"] != "claimed", 0.80),
-        Target(f"{held}: cut of the held-out error, median", middle, len(cut), ">= 0.6", met),
-        Target(f"{held}: cut of what is above noise, median", median(excess) if excess else None, len(excess)),
+        _summary(f"{held}: cut of the held-out error, median", _column(some, "cut"), ">= 0.6"),
+        _summary(f"{held}: cut of what is above noise, median", _column(some, "excess_cut")),
     ]
 
 
@@ -130,31 +138,22 @@ def _is_wrong_alone(row: Row) -> bool:
     return bool(row["judgement"] == "wrong" and row["wrong_alone"])
 
 
-def _biases(rows: Iterable[Row], when: str) -> list[float]:
-    return [abs(row[f"bias_{when}_{name}"]) for row in rows for name in PARAMETERS]
+def _column(rows: Sequence[Row], name: str) -> list[float]:
+    return [row[name] for row in rows if row[name] is not None]
 
 
-def share(question: str, rows: Sequence[Row], test: Callable[[Row], bool]) -> Target:
-    found = sum(map(test, rows)) / len(rows) if rows else None
-    return Target(question, found, len(rows), is_share=True)
+def share(question: str, rows: Sequence[Any], test: Callable[[Any], bool], limit: str = "") -> Target:
+    """Give the share of rows, or of values, that pass a test."""
+    return aim(question, sum(map(test, rows)) / len(rows) if rows else None, len(rows), limit, is_share=True)
 
 
-def least(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
-    line = share(question, rows, test)
-    met = None if line.found is None else line.found >= limit
-    return replace(line, limit=f">= {limit:g}", met=met)
+def least(question: str, rows: Sequence[Any], test: Callable[[Any], bool], limit: float) -> Target:
+    return share(question, rows, test, f">= {limit:g}")
 
 
-def most(question: str, rows: Sequence[Row], test: Callable[[Row], bool], limit: float) -> Target:
-    line = share(question, rows, test)
-    return replace(line, limit=f"<= {limit:g}", met=None if line.found is None else line.found <= limit)
+def most(question: str, rows: Sequence[Any], test: Callable[[Any], bool], limit: float) -> Target:
+    return share(question, rows, test, f"<= {limit:g}")
 
 
-def _middle(question: str, rows: Sequence[Row], column: str, limit: float | None = None) -> Target:
-    values = [row[column] for row in rows if row[column] is not None]
-    found = median(values) if values else None
-    return Target(question, found, len(values)) if limit is None else _limited(question, found, len(values), limit)
-
-
-def _limited(question: str, found: float | None, among: int, limit: float) -> Target:
-    return Target(question, found, among, f"<= {limit:g}", None if found is None else found <= limit)
+def _summary(question: str, values: Sequence[float], limit: str = "", of: Callable[[Any], float] = median) -> Target:
+    return aim(question, of(values) if values else None, len(values), limit)
