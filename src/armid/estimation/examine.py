@@ -17,6 +17,7 @@ from armid.estimation.information import (
     information_of,
     level_weights,
     levels_of,
+    normalised,
 )
 from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine, with_fitted_starts
 from armid.estimation.profile import Profile, profiles
@@ -81,13 +82,6 @@ def collinearity_index(fisher: Array) -> float:
     if len(scaled) < 2:
         return 1.0
     return float(1.0 / np.sqrt(max(float(np.linalg.eigvalsh(scaled)[0]), SINGULAR)))
-
-
-def normalised(fisher: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the information matrix of the parameters that are seen, its diagonal scaled to 1, and which they are."""
-    scale = np.sqrt(np.maximum(np.diag(fisher), 0.0))
-    seen = np.isfinite(scale) & (scale > 0.0)
-    return np.asarray(fisher[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])), seen
 
 
 def index_of(scaled: Array, members: Members) -> float:

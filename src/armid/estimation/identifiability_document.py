@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.estimation.design import Offer, identity
-from armid.estimation.examine import Examination, Group, collinearity_index, normalised
+from armid.estimation.examine import Examination, Group, collinearity_index
 from armid.estimation.identify import versions_of
-from armid.estimation.information import Level, level_weights, sensitivities
+from armid.estimation.information import Level, level_weights, normalised, sensitivities
 from armid.estimation.profile import THRESHOLD, Profile
 from armid.problem.space import Space
 from armid.report.document import (
@@ -107,8 +107,8 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
         rows.append((name, factor * p["value"], unit, profile_text(profile, factor),
                      ", ".join(word for word in (flag, bounded) if word),
                      deviation_of(result, name, p["deviation"]), curved))  # fmt: skip
-    columns = ["parameter", Column("value", "value", ".6g"), "unit", "95 % by profile", Column("remark", "remark"),
-               "deviation", "95 % by curvature"]  # fmt: skip
+    columns = ["parameter", Column("value", "value", ".6g"), "unit", "95 % by profile", "remark", "deviation",
+               "95 % by curvature"]  # fmt: skip
     note = "Remark: not above, not below: no bound on that side." if any(row[4] for row in rows) else ""
     return table("What the records say", columns, rows, note)
 

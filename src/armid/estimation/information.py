@@ -1,7 +1,7 @@
 """How well records pin down parameters: sensitivities, Fisher information, intervals, correlations."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.special import fdtrc
 
 from armid.engine import simulate
 from armid.errors import ArmidError
+from armid.estimation.constants import with_constants
 from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
 from armid.problem.problem import Replay
 from armid.problem.space import Space
@@ -57,9 +58,9 @@ class Information:
     names: tuple[str, ...]
     deviation: Array
     correlation: Array
-    levels: tuple[Level, ...] = ()
-    step: Array = field(default_factory=lambda: np.empty(0))
-    fisher: Array = field(default_factory=lambda: np.empty((0, 0)))
+    levels: tuple[Level, ...]
+    step: Array
+    fisher: Array
 
     @property
     def half_width(self) -> Array:
@@ -161,14 +162,12 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
         move = 1e-4 * replay.model.plant.scales.speed
         for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
-                runs = []
-                for sign in (1.0, -1.0):
-                    constants = dict(piece.manoeuvre.constants)
-                    constants[name] = constants.get(name, 0.0) + sign * move
-                    manoeuvre = replace(piece.manoeuvre, constants=constants)
-                    runs.append(simulate(replay.model, manoeuvre, candidate, calibration.schedule).outputs[:, 0])
+                start = piece.manoeuvre.constants.get(name, 0.0)
+                either = (with_constants(piece, {name: start + side}).manoeuvre for side in (move, -move))
+                above, below = (simulate(replay.model, m, candidate, calibration.schedule).outputs[:, 0]
+                                for m in either)  # fmt: skip
                 changes = [np.zeros(r.record.n_samples) for r in records.replays]
-                slopes = (runs[0] - runs[1])[:, piece.window] / (2.0 * move)
+                slopes = (above - below)[:, piece.window] / (2.0 * move)
                 for i in (i for i, r in enumerate(records.replays) if r in outputs):
                     slope = slopes[records.replays[i].place]
                     changes[i][row : row + piece.n_samples] = deviation * slope
@@ -177,22 +176,28 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
 
 
 def inverse(matrix: Array) -> Array:
-    scale = np.sqrt(np.diag(matrix))
-    seen = np.isfinite(scale) & (scale > 0.0)
+    scaled, seen = normalised(matrix)
     result = np.full(matrix.shape, np.nan)
     np.fill_diagonal(result, np.inf)
     if not seen.any():
         return result
-    scaled = matrix[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])
     values, vectors = np.linalg.eigh(scaled)
     good = values > SINGULAR * values.max()
     part = (vectors[:, good] / values[good]) @ vectors[:, good].T
     lost = (vectors[:, ~good] ** 2).sum(axis=1) > 1e-6
-    part /= np.outer(scale[seen], scale[seen])
+    scale = np.sqrt(np.diag(matrix)[seen])
+    part /= np.outer(scale, scale)
     part[lost, :], part[:, lost] = np.nan, np.nan
     part[lost, lost] = np.inf
     result[np.ix_(seen, seen)] = part
     return result
+
+
+def normalised(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the information matrix of the parameters that are seen, its diagonal scaled to 1, and which they are."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    seen = np.isfinite(scale) & (scale > 0.0)
+    return np.asarray(matrix[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])), seen
 
 
 def collinear(information: Information, above: float = 0.95) -> list[tuple[str, str, float]]:

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.estimation.constants import of_pieces, with_constants
 from armid.model import Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record
 from armid.record.start import Track, state_shown
@@ -163,16 +163,6 @@ def multiplied(constants: Mapping[str, float], names: Iterable[str], factor: flo
     return {name: factor * constants[name] for name in names}
 
 
-def of_pieces(undo: Callable[..., Piece], **told: Any) -> Callable[[Record], Record]:
-    """Return what undoes something in each piece of each output of a file."""
-
-    def undone(record: Record) -> Record:
-        others = tuple(map(undone, record.others))
-        return replace(record, pieces=tuple(undo(p, **told) for p in record.pieces), others=others)
-
-    return undone
-
-
 def scaled(record: Record, plant: Plant, output: str, factor: float) -> Record:
     return with_measured(record, plant, {n: factor * x for n, x in measured_of(record).items() if n == output}, factor)
 
@@ -230,11 +220,6 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
     given = {n: v for n, v in old.items() if n not in piece.start_deviation}
     tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.each}
     return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index)[0]
-
-
-def with_constants(piece: Piece, constants: Mapping[str, float]) -> Piece:
-    manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
-    return replace(piece, manoeuvre=manoeuvre)
 
 
 def with_keys_changed(

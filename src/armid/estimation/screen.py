@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
+from armid.estimation.constants import of_pieces, with_constants
 from armid.estimation.least_squares import WeightedRecords, descend
-from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, of_pieces, rms, with_constants
+from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, rms
 from armid.model import Manoeuvre, Model, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.problem.space import Space, space_of
