@@ -345,7 +345,10 @@ def close_loop(
     left_out = effects_of(without, known, "--without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
     values = {**(fixed or {}), **there.fixed}
-    return run(there.model, there.campaign, kept, rng, there.bounds, values, threads, told, curve, progress)
+    found: ClosedLoop = run(
+        there.model, there.campaign, kept, rng, there.bounds, values, threads, told, curve, progress
+    )
+    return found
 
 
 def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[str, Effect]:

@@ -86,11 +86,11 @@ def test_chances_of_linear_models_are_those_of_brute_force(seed, apart, monkeypa
     told = brute_force(rivals, old, new, seen, rng)
     a, b = (Prediction(n @ r.z, n @ r.root) for n, r in zip(new, rivals))
     ahead = rivals[1].criterion - rivals[0].criterion
-    forecast, _ = chance(a, b, ahead, normal_draws(7, 512), THRESHOLD)
+    forecast, _ = chance(a, b, ahead, normal_draws(7, 512))
     assert forecast == pytest.approx(told, abs=0.05)
     designs = dict(zip("AB", new))
     monkeypatch.setattr("armid.estimation.advice.whitened_signals", lambda rival, *_: _[-1] @ designs[rival.name].T)
-    won, apart = simulate_refits(rivals, 0, None, None, normal_draws(3, 60), THRESHOLD)
+    won, apart = simulate_refits(rivals, 0, None, None, normal_draws(3, 60))
     assert won[0] == 1.0
     assert won[1] == pytest.approx(told, abs=0.08)
     assert apart[0] == 0.0 < apart[1]

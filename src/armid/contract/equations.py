@@ -80,33 +80,28 @@ def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS, strict: b
 
     strict: a function without a docstring fails; otherwise that is only said.
     """
-    for form in effect.every_form:
-        models, refusals = composed(form, plants)
-        points = chain(declared(form, models, refusals, strict), *(check_on(form, m, m) for m in models))
-        yield from (of_form(point, form) for point in points)
+    yield from (point for _, point in check_effects([effect], plants, strict))
 
 
 def check_effects(
     effects: Sequence[Effect], plants: Mapping[str, Plant] = PLANTS, strict: bool = False
-) -> list[list[ContractPoint]]:
-    """Try several effects as `check_effect` does each, with as little to compile as possible.
+) -> Iterator[tuple[str, ContractPoint]]:
+    """Try several effects as `check_effect` does each, with as little to compile as possible; yield name and point.
 
     All effects that a plant takes stand in one model, which is compiled once; all but the one that is tried are at
     their nulls, where they add exactly nothing. Further forms of effects share a model in the same way.
     """
-    found: list[list[ContractPoint]] = [[] for _ in effects]
     for k in range(max((len(effect.every_form) for effect in effects), default=0)):
-        forms = {i: effect.every_form[k] for i, effect in enumerate(effects) if k < len(effect.every_form)}
-        fits = {i: composed(form, plants) for i, form in forms.items()}
-        here = {i: declared(form, *fits[i], strict) for i, form in forms.items()}
+        forms = {effect.name: effect.every_form[k] for effect in effects if k < len(effect.every_form)}
+        fits: dict[str, list[Model]] = {}
+        for name, form in forms.items():
+            fits[name], refusals = composed(form, plants)
+            yield from ((name, of_form(p, form)) for p in declared(form, fits[name], refusals, strict))
         for plant in siblings(plants):
-            models = {i: model for i, (several, _) in fits.items() for model in several if model.plant is plant}
-            joint = joint_model(plant, [forms[i] for i in models])
-            for i, model in models.items():
-                here[i] += check_on(forms[i], model, joint or model)
-        for i, form in forms.items():
-            found[i] += [of_form(point, form) for point in here[i]]
-    return found
+            models = {name: model for name, several in fits.items() for model in several if model.plant is plant}
+            joint = joint_model(plant, [forms[name] for name in models])
+            for name, model in models.items():
+                yield from ((name, of_form(p, forms[name])) for p in check_on(forms[name], model, joint or model))
 
 
 def of_form(point: ContractPoint, form: Effect) -> ContractPoint:

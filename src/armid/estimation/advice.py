@@ -94,7 +94,6 @@ def advise(
     white: Whitening | None = None,
     grid: Sequence[Feasible] | None = None,
     speed_limit: float | None = None,
-    threshold: float = THRESHOLD,
     threads: int = 1,
 ) -> tuple[Advice, ...]:
     """Rank feasible manoeuvres by how well one record of each would tell the rivals apart, the best first.
@@ -102,7 +101,7 @@ def advise(
     Only manoeuvres that were simulated are returned, ranked by the mean power over pairs, then by the mean distance.
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
     n_samples), into units of white noise, (n_signals, n), None: the mean weight of the records of one output. grid:
-    None: `manoeuvre_grid`. speed_limit: of the gyro. threshold: difference of the criterion at which a model is better.
+    None: `manoeuvre_grid`. speed_limit: of the gyro.
     Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
     """
     if len(rivals) < 2:
@@ -116,11 +115,11 @@ def advise(
     predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
     draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
     possible = [f for f in grid if all(f in known for known in predictions)]
-    ranks = {f: rank(predicted_powers(rivals, [p[f] for p in predictions], draws, threshold)) for f in possible}
+    ranks = {f: rank(predicted_powers(rivals, [p[f] for p in predictions], draws)) for f in possible}
     most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
     promising = sorted(possible, key=lambda f: ranks[f], reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
-    powers = side_by_side(lambda f: simulated_powers(rivals, f, white, draws, threshold), promising, threads)
+    powers = side_by_side(lambda f: simulated_powers(rivals, f, white, draws), promising, threads)
     ranked = sorted(zip(promising, powers, strict=True), key=lambda pair: rank(pair[1]), reverse=True)
     return tuple(advice_of(rivals, feasible, found) for feasible, found in ranked)
 
@@ -186,20 +185,18 @@ def spread_of(here: Array, above: Array, below: Array, upward: Array) -> Array:
     return np.asarray(((above - here).T * upward) + ((here - below).T * (1.0 - upward)))
 
 
-def predicted_powers(
-    rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array, threshold: float
-) -> Powers:
+def predicted_powers(rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array) -> Powers:
     found = {}
     for a, b in combinations(range(len(rivals)), 2):
         old = rivals[b].criterion - rivals[a].criterion
-        one = chance(predictions[a], predictions[b], old, draws, threshold)
-        other = chance(predictions[b], predictions[a], -old, draws, threshold)
+        one = chance(predictions[a], predictions[b], old, draws)
+        other = chance(predictions[b], predictions[a], -old, draws)
         found[a, b] = (0.5 * (one[0] + other[0]), float(np.sqrt(0.5 * (one[1] + other[1]))))
     return found
 
 
-def chance(right: Prediction, wrong: Prediction, old: float, draws: Array, threshold: float) -> tuple[float, float]:
-    """Return the chance that the right model wins by more than a threshold, and the squared distance delta^2.
+def chance(right: Prediction, wrong: Prediction, old: float, draws: Array) -> tuple[float, float]:
+    """Return the chance that the right model wins by more than the threshold, and the squared distance delta^2.
 
     After both are fitted again, the criterion of the wrong one less that of the right one is
     D = old + r_B^T V_B^-1 r_B - r_A^T V_A^-1 r_A, r the new record less the prediction, V = 1 + spread spread^T its
@@ -218,7 +215,7 @@ def chance(right: Prediction, wrong: Prediction, old: float, draws: Array, thres
     normal = draws[:, : len(reduced)]
     missed = normal @ factor.T + d[:, 0]
     gained = np.sum(missed @ weight * missed, axis=1) - np.sum(normal**2, axis=1)
-    return float(np.mean(old + gained > threshold)), float(d[:, 0] @ weight @ d[:, 0])
+    return float(np.mean(old + gained > THRESHOLD)), float(d[:, 0] @ weight @ d[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,10 +244,8 @@ def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Arra
     return np.asarray(white(run.outputs[places][..., feasible.window]))
 
 
-def simulated_powers(
-    rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array, threshold: float
-) -> Powers:
-    tried = [simulate_refits(rivals, i, feasible, white, draws, threshold) for i in range(len(rivals))]
+def simulated_powers(rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array) -> Powers:
+    tried = [simulate_refits(rivals, i, feasible, white, draws) for i in range(len(rivals))]
     chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
     return {
         (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
@@ -259,13 +254,13 @@ def simulated_powers(
 
 
 def simulate_refits(
-    rivals: Sequence[Rival], right: int, feasible: Feasible, white: Whitening, draws: Array, threshold: float
+    rivals: Sequence[Rival], right: int, feasible: Feasible, white: Whitening, draws: Array
 ) -> tuple[Array, Array]:
-    """Return the chance that each other rival loses to the right one by more than a threshold, and its distance.
+    """Return the chance that each other rival loses to the right one by more than the threshold, and its distance.
 
     The record is simulated without noise from the right model as it is known by now, once for each draw, and every
     rival is fitted again to old and new. Noise then scatters the difference D of the criteria by twice the distance of
-    the fitted predictions: the chance is Phi((D - threshold)/(2 distance)). draws: standard normal, (n_draws, at least
+    the fitted predictions: the chance is Phi((D - THRESHOLD)/(2 distance)). draws: standard normal, (n_draws, at least
     n_free). A draw whose simulation diverges says nothing.
     """
     true = rivals[right]
@@ -276,7 +271,7 @@ def simulate_refits(
             continue
         values, signals = zip(*(fitted_again(r, feasible, white, seen) for r in rivals), strict=True)
         apart = np.array([np.linalg.norm(s - signals[right]) for s in signals])
-        margin = np.array(values) - values[right] - threshold
+        margin = np.array(values) - values[right] - THRESHOLD
         won = ndtr(margin / np.maximum(2.0 * apart, 1e-9))
         won[right] = 1.0
         chances.append(won)

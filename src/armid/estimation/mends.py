@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.estimation.constants import of_pieces, with_constants
+from armid.estimation.design import range_of
 from armid.model import Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record
 from armid.record.start import Track, state_shown
@@ -147,7 +148,7 @@ def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
 
 
 def may_be_radians(key: ManoeuvreKey, value: float) -> bool:
-    low, high = (-np.inf if key.low is None else key.low), (np.inf if key.high is None else key.high)
+    low, high = range_of(key)
     return 0.0 < abs(value) <= 2.0 * np.pi and low <= DEGREES * value <= high
 
 
