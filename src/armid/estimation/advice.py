@@ -67,10 +67,7 @@ class Rival:
 
     @property
     def candidate(self) -> Array:
-        return np.asarray(self.whole(self.z[np.newaxis])[0])
-
-    def whole(self, Z: Array) -> Array:
-        return self.records.space.complete(self.records.values(Z))
+        return np.asarray(self.records.whole(self.z[np.newaxis])[0])
 
     @cached_property
     def precision(self) -> Array:
@@ -171,7 +168,7 @@ def predictions_of(
     """
     motions = Motions(rival.records.replays, rival.candidate, speed_limit)
     above, below = rival.z + rival.root.T, rival.z - rival.root.T
-    points = rival.whole(np.concatenate([rival.z[np.newaxis], above, below]))
+    points = rival.records.whole(np.concatenate([rival.z[np.newaxis], above, below]))
     n, found = len(rival.z), {}
     upward = np.where(outside(above) < outside(below), 1.0, np.where(outside(above) > outside(below), 0.0, 0.5))
     for feasible, signals in motions.signals(grid, points):
@@ -239,7 +236,7 @@ class OldAndNew(LeastSquaresProblem):
 
 def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Array) -> Array:
     records = rival.records
-    run = simulate(records.model, feasible.manoeuvre, rival.whole(Z), fine_schedule(records.replays))
+    run = simulate(records.model, feasible.manoeuvre, records.whole(Z), fine_schedule(records.replays))
     places = sorted({r.place for r in records.replays})
     return np.asarray(white(run.outputs[places][..., feasible.window]))
 

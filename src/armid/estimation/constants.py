@@ -88,7 +88,7 @@ def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[
 
     By central differences; a constant whose change makes the simulation diverge has a column of 0.
     """
-    candidate = records.space.complete(records.values(z)[np.newaxis])
+    candidate = records.whole(z[np.newaxis])
     found = []
     for name in names:
         sides = [records.weighted([moved_replay(r, {name: s}).signal(candidate)[0] for r in records.replays])

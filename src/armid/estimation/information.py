@@ -155,7 +155,7 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
 
 def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
     """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,)."""
-    candidate = records.space.complete(records.values(z)[np.newaxis])
+    candidate = records.whole(z[np.newaxis])
     for outputs in by_file(records.replays):
         replay, row = outputs[0], 0
         # a speed held for a second is the size of a position

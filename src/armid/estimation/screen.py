@@ -17,7 +17,7 @@ from armid.estimation.constants import of_pieces, with_constants
 from armid.estimation.least_squares import WeightedRecords, descend
 from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, rms
 from armid.model import Manoeuvre, Model, Plant
-from armid.problem.problem import Replay, signals_of
+from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
@@ -119,10 +119,9 @@ class Trial:
 
     def errors(self, records: Sequence[Record], Z: Array) -> Array:
         """Return the error of each record at candidates in shares, (n_candidates, n_records), inf where it diverges."""
-        problem, Z = self.problem(records), np.atleast_2d(Z)
-        signals = signals_of(problem.replays, self.space.complete(problem.values(Z)))
-        squares = [np.sum((w * (signal - r.measured)) ** 2, axis=1)
-                   for w, r, signal in zip(problem.weights, problem.replays, signals, strict=True)]  # fmt: skip
+        problem = self.problem(records)
+        of = zip(problem.weights, problem.replays, problem.simulated(np.atleast_2d(Z)), strict=True)
+        squares = [np.sum((w * (signal - r.measured)) ** 2, axis=1) for w, r, signal in of]
         counts = np.array([len(r.each) for r in records])
         means = np.add.reduceat(np.array(squares).T, np.cumsum(counts) - counts, axis=1) / counts
         return np.asarray(np.nan_to_num(np.sqrt(means), nan=np.inf))
@@ -151,8 +150,7 @@ class Trial:
         return record
 
     def signals(self, record: Record, Z: Array) -> list[Array]:
-        problem = self.problem([record])
-        return [np.nan_to_num(x) for x in signals_of(problem.replays, self.space.complete(problem.values(Z)))]
+        return [np.nan_to_num(x) for x in self.problem([record]).simulated(Z)]
 
     def likeness(self, record: Record) -> float:
         problem, Z = self.problem([record]), self.spread([record])
@@ -167,8 +165,7 @@ class Trial:
         """Return by how many samples the first piece comes too late, 0 where no shift makes it more alike."""
         piece = record.pieces[0]
         x, n = piece.measured[piece.window], piece.n_samples
-        problem = self.problem([replace(record, pieces=(piece,), others=())])
-        signals = np.nan_to_num(problem.replays[0].signal(self.space.complete(problem.values(Z))))
+        (signals,) = self.signals(replace(record, pieces=(piece,), others=()), Z)
         product = np.fft.irfft(np.fft.rfft(x, 2 * n) * np.conj(np.fft.rfft(signals, 2 * n)), axis=-1)
         shifts = np.arange(-int(MOST_SHIFT * n), int(MOST_SHIFT * n) + 1)
         # energy of both in the part that they then have in common
