@@ -17,7 +17,7 @@ from scipy.special import ndtr, ndtri
 from armid.engine import probes, simulate
 from armid.errors import ArmidError
 from armid.estimation.design import BOX, Feasible, Key, Motions, fine_schedule, manoeuvre_grid
-from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords, descend, side_by_side
+from armid.estimation.least_squares import LeastSquaresProblem, descend, side_by_side
 
 Array = NDArray[np.float64]
 Whitening = Callable[[Array], Array]
@@ -88,7 +88,7 @@ class Rival:
 
 def advise(
     rivals: Sequence[Rival],
-    white: Whitening | None = None,
+    white: Whitening,
     grid: Sequence[Feasible] | None = None,
     speed_limit: float | None = None,
     threads: int = 1,
@@ -97,17 +97,12 @@ def advise(
 
     Only manoeuvres that were simulated are returned, ranked by the mean power over pairs, then by the mean distance.
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
-    n_samples), into units of white noise, (n_signals, n), None: the mean weight of the records of one output. grid:
-    None: `manoeuvre_grid`. speed_limit: of the gyro.
+    n_samples), into units of white noise, (n_signals, n). grid: None: `manoeuvre_grid`. speed_limit: of the gyro.
     Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
     """
     if len(rivals) < 2:
         raise ArmidError(f"{len(rivals)} model was given to be told apart from others: at least two are expected")
     first = rivals[0].records
-    if white is None:
-        assert isinstance(first, WeightedRecords)
-        mean_weight = float(np.mean(np.square(1.0 / np.array(first.weights))) ** -0.5)
-        white = lambda signals: mean_weight * np.concatenate(signals, axis=-1)  # noqa: E731
     grid = grid or manoeuvre_grid(first.model, [r.record for r in first.replays])
     predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
     draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)

@@ -118,7 +118,9 @@ def convergence_figure(found: Identification) -> Any:
     evaluations, values = found.trace
     x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
     figure, axis = pyplot().subplots(figsize=(6.8, 4.2), layout="constrained")
-    si_unit = fitness_unit(found)
+    # the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs
+    units = {r.record.unit for r in judged_by(found.fitness, found.train_replays)}
+    si_unit = next(iter(units)) if found.fitness.unit == "signal" and len(units) == 1 else ""
     factor, unit = shown(1.0, si_unit) if si_unit else (1.0, "")
     height = 1.0 - y if similarity else y * factor
     axis.step(x, height, where="post", color=OKABE_ITO["blue"], lw=1.8)
@@ -133,12 +135,6 @@ def convergence_figure(found: Identification) -> Any:
     text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {height[-1]:.6g} {unit}"
     axis.set_title(text.rstrip(), fontsize="medium")
     return figure
-
-
-def fitness_unit(found: Identification) -> str:
-    """Return the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs."""
-    seen = {r.record.unit: r.record.output for r in judged_by(found.fitness, found.train_replays)}
-    return next(iter(seen)) if found.fitness.unit == "signal" and len(seen) == 1 else ""
 
 
 PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")

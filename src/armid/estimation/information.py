@@ -168,9 +168,9 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
                                 for m in either)  # fmt: skip
                 changes = [np.zeros(r.record.n_samples) for r in records.replays]
                 slopes = (above - below)[:, piece.window] / (2.0 * move)
-                for i in (i for i, r in enumerate(records.replays) if r in outputs):
-                    slope = slopes[records.replays[i].place]
-                    changes[i][row : row + piece.n_samples] = deviation * slope
+                for change, r in zip(changes, records.replays, strict=True):
+                    if r in outputs:
+                        change[row : row + piece.n_samples] = deviation * slopes[r.place]
                 yield records.weighted(changes)
             row += piece.n_samples
 
