@@ -5,8 +5,8 @@ record from each rival in turn, as uncertain as it is known by now, and all riva
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import combinations
 
 import numpy as np
@@ -84,6 +84,10 @@ class Rival:
         move = self.root @ draw[: len(self.z)]
         both = np.array([self.z + move, self.z - move])
         return np.asarray(both[int(np.argmin(outside(both)))])
+
+
+# Whitened signals of a new record that a rival gives at candidates in shares, (n_candidates, n).
+NewSignals = Callable[[Rival, Array], Array]
 
 
 def advise(
@@ -214,10 +218,9 @@ def chance(right: Prediction, wrong: Prediction, old: float, draws: Array) -> tu
 class OldAndNew(LeastSquaresProblem):
     """Pose the old records, as a parabola about their estimate, and one new record as one least-squares problem."""
 
-    rival: Rival = field(kw_only=True)
-    feasible: Feasible = field(kw_only=True)
-    white: Whitening = field(kw_only=True)
-    seen: Array = field(kw_only=True)
+    rival: Rival
+    new: NewSignals
+    seen: Array
 
     @cached_property
     def measured(self) -> Array:
@@ -225,11 +228,11 @@ class OldAndNew(LeastSquaresProblem):
 
     def signals(self, Z: Array) -> Array:
         """Return how far candidates are from the old estimate, in standard deviations, then their new signals."""
-        new = whitened_signals(self.rival, self.feasible, self.white, Z)
-        return np.concatenate([(Z - self.rival.z) @ self.rival.precision, new], axis=1)
+        old = (Z - self.rival.z) @ self.rival.precision
+        return np.concatenate([old, self.new(self.rival, Z)], axis=1)
 
 
-def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Array) -> Array:
+def whitened_signals(feasible: Feasible, white: Whitening, rival: Rival, Z: Array) -> Array:
     records = rival.records
     run = simulate(records.model, feasible.manoeuvre, records.whole(Z), fine_schedule(records.replays))
     places = sorted({r.place for r in records.replays})
@@ -237,7 +240,8 @@ def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Arra
 
 
 def simulated_powers(rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array) -> Powers:
-    tried = [simulate_refits(rivals, i, feasible, white, draws) for i in range(len(rivals))]
+    new = partial(whitened_signals, feasible, white)
+    tried = [simulate_refits(rivals, i, new, draws) for i in range(len(rivals))]
     chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
     return {
         (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
@@ -245,9 +249,7 @@ def simulated_powers(rivals: Sequence[Rival], feasible: Feasible, white: Whiteni
     }
 
 
-def simulate_refits(
-    rivals: Sequence[Rival], right: int, feasible: Feasible, white: Whitening, draws: Array
-) -> tuple[Array, Array]:
+def simulate_refits(rivals: Sequence[Rival], right: int, new: NewSignals, draws: Array) -> tuple[Array, Array]:
     """Return the chance that each other rival loses to the right one by more than the threshold, and its distance.
 
     The record is simulated without noise from the right model as it is known by now, once for each draw, and every
@@ -258,10 +260,10 @@ def simulate_refits(
     true = rivals[right]
     chances, distances = [], []
     for draw in draws:
-        seen = whitened_signals(true, feasible, white, true.drawn(draw)[np.newaxis])[0]
+        seen = new(true, true.drawn(draw)[np.newaxis])[0]
         if not np.isfinite(seen).all():
             continue
-        values, signals = zip(*(fitted_again(r, feasible, white, seen) for r in rivals), strict=True)
+        values, signals = zip(*(fitted_again(r, new, seen) for r in rivals), strict=True)
         apart = np.array([np.linalg.norm(s - signals[right]) for s in signals])
         margin = np.array(values) - values[right] - THRESHOLD
         won = ndtr(margin / np.maximum(2.0 * apart, 1e-9))
@@ -273,11 +275,11 @@ def simulate_refits(
     return np.mean(chances, axis=0), np.mean(distances, axis=0)
 
 
-def fitted_again(rival: Rival, feasible: Feasible, white: Whitening, seen: Array) -> tuple[float, Array]:
+def fitted_again(rival: Rival, new: NewSignals, seen: Array) -> tuple[float, Array]:
     """Return criterion and prediction of a rival after a fit to old and new; of one that diverges 0 throughout."""
-    both = OldAndNew((), rival.records.space, rival=rival, feasible=feasible, white=white, seen=seen)
+    both = OldAndNew((), rival.records.space, rival, new, seen)
     start = np.clip(rival.z, 0.0, 1.0)
     if not np.isfinite(both.chi2(start)[0]):
         return rival.criterion + float(seen @ seen), np.zeros_like(seen)
     z = descend(both, [start], TOLERANCE)
-    return rival.criterion + float(both.chi2(z)[0]), whitened_signals(rival, feasible, white, z[np.newaxis])[0]
+    return rival.criterion + float(both.chi2(z)[0]), new(rival, z[np.newaxis])[0]

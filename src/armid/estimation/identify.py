@@ -148,6 +148,7 @@ def identify(
     meter = Meter(budget, target)
     identifier.build(meter.budget)  # refuses bad options before anything is calibrated
     train = with_fitted_starts(replays(campaign.train, model, space, accuracy), space)
+    seen = judged_by(fitness, train)
     if space.free.any():
         stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
         if meter.best_x is None:
@@ -157,15 +158,12 @@ def identify(
         # what rounding alone keeps off a bound is held by it
         low, high = space.low[space.free], space.high[space.free]
         x = np.where(meter.best_x - low < ROUNDING * (high - low), low, meter.best_x)
-        x = np.where(high - x < ROUNDING * (high - low), high, x)
+        x, value = np.where(high - x < ROUNDING * (high - low), high, x), meter.best_f
     else:
         stopped, x = "no parameter is free", np.empty(0)
-    candidate, seen = space.complete(x[np.newaxis])[0], judged_by(fitness, train)
-    if len(x):
-        value = meter.best_f
-    else:  # nobody has asked for its fitness yet
-        signals, measured = signals_of(seen, candidate[np.newaxis]), [r.measured for r in seen]
+        signals, measured = signals_of(seen, space.complete(x[np.newaxis])), [r.measured for r in seen]
         value = float(fitness_of(fitness, seen, measured, signals, weights_of(fitness, seen), output_sizes(seen))[0])
+    candidate = space.complete(x[np.newaxis])[0]
     holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     errors = campaign_errors(train, candidate)
     assert errors is not None

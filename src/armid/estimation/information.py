@@ -27,6 +27,8 @@ SINGULAR = 1e-13
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
 # Chance below which a residual is no noise; independent samples in the blocks whose means are looked at.
 CHANCE, BLOCKS = 1e-3, (8, 32)
+# Parameters of a larger correlation than this cannot be told apart well.
+CORRELATED = 0.95
 # What is assumed for a record without noise, as a share of its rms speed.
 ASSUMED = 1e-3
 
@@ -200,14 +202,11 @@ def normalised(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
     return np.asarray(matrix[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])), seen
 
 
-def collinear(information: Information, above: float = 0.95) -> list[tuple[str, str, float]]:
+def collinear(information: Information) -> list[tuple[str, str, float]]:
     """Return the pairs of parameters that cannot be told apart well, strongest first: names and correlation."""
     names, correlation = information.names, information.correlation
-    pairs = [
-        (names[i], names[j], float(correlation[i, j]))
-        for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > above
-    ]  # fmt: skip
-    return sorted(pairs, key=lambda pair: -abs(pair[2]))
+    pairs = [(names[i], names[j], float(correlation[i, j])) for i in range(len(names)) for j in range(i)]
+    return sorted((pair for pair in pairs if abs(pair[2]) > CORRELATED), key=lambda pair: -abs(pair[2]))
 
 
 def level_of(replay: Replay, space: Space, x: Array) -> Level:

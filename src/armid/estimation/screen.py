@@ -5,6 +5,7 @@ the declared model is fitted roughly to the train records; where it misses more 
 of mistakes is undone in turn, and one is named only where that takes away most of the misfit.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -487,10 +488,8 @@ def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
     owner = np.concatenate([np.full(len(p), i) for i, p in enumerate(prints)])
     _, place, counts = np.unique(np.concatenate(prints), return_inverse=True, return_counts=True)
     shared = np.flatnonzero(counts[place] > 1)
-    pairs: dict[tuple[int, int], int] = {}
-    for group in np.split(owner[shared][np.argsort(place[shared], kind="stable")], np.cumsum(counts[counts > 1])[:-1]):
-        for pair in combinations(np.unique(group).tolist(), 2):
-            pairs[pair] = pairs.get(pair, 0) + 1
+    groups = np.split(owner[shared][np.argsort(place[shared], kind="stable")], np.cumsum(counts[counts > 1])[:-1])
+    pairs = Counter(pair for group in groups for pair in combinations(np.unique(group).tolist(), 2))
     for (i, j), n in sorted(pairs.items()):
         a, b = records[i], records[j]
         if (a.repeat_of or a.file) == (b.repeat_of or b.file):
