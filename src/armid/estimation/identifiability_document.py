@@ -249,13 +249,12 @@ def remarks(found: Examination) -> list[str]:
 
 def group_remark(found: Examination, group: Group) -> str:
     span = (found.space.high - found.space.low)[found.space.free]
-    moves: list[str] = []
     leader = int(np.argmax(np.abs(group.direction)))
+    moves = []
     for name, share in zip(group.names, group.direction, strict=True):
         i = found.space.free_names.index(name)
-        change = 0.01 * (1.0 if len(moves) == leader else float(share)) * float(span[i])
-        text = deviation_text(found, i, abs(change))
-        moves.append(f"{'+' if change >= 0.0 else '-'}{text} of {name}")
+        change = 0.01 * float(share) * float(span[i])
+        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(found, i, abs(change))} of {name}")
     followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
             f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
