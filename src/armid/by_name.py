@@ -160,7 +160,6 @@ def each_of(given: Any) -> Iterator[Any]:
 
 
 def effect_of(given: Any, effects: Mapping[str, Effect]) -> Effect:
-    """Return an effect by its name, which may have a form, or the Effect itself."""
     if isinstance(given, Effect):
         return given
     name, _, form = str(given).strip().partition(":")

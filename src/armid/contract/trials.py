@@ -30,7 +30,6 @@ class ContractPoint:
 
 
 def check_parameters(parameters: Iterable[Parameter]) -> list[ContractPoint]:
-    """Tell whether bounds are finite, other values lie between them, and units are named."""
     given = list(parameters)
     outside = [
         p.name for p in given if not all(p.low <= v <= p.high for v in (p.null, p.fixed, p.nominal) if v is not None)

@@ -226,7 +226,6 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
 def with_keys_changed(
     piece: Piece, defaults: Mapping[str, float], change: Callable[[Mapping[str, float]], dict[str, float]]
 ) -> Piece:
-    """Return a piece with what some keys of its own manoeuvre set changed."""
     return with_constants(piece, change({**defaults, **piece.manoeuvre.constants}))
 
 
