@@ -6,7 +6,7 @@ Identifier, an algorithm of pymoo. The commands and `armid` itself call these fu
 
 import tomllib
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from inspect import signature
@@ -88,8 +88,7 @@ def opened(
         for name in read.effects:
             chosen(name, {**sensor_effects(read.declared), **effects_known}, "effect")
         model = read.model(registry.effects)
-    given = [effects] if isinstance(effects, str | Effect) else effects
-    for effect in (e for text in given for e in (text.split(",") if isinstance(text, str) else [text])):
+    for effect in each_of(effects):
         model = model + effect_of(effect, effects_known)
     warn_of_far(fix or {}, bounds or {}, model)
     return Opened(registry, read, model, dict(bounds or {}), dict(fix or {}))
@@ -154,8 +153,13 @@ def toml(value: Any) -> str:
     return text
 
 
+def each_of(given: Any) -> Iterator[Any]:
+    """Yield the names and Effects of one or several; a text may hold names between commas."""
+    for one in [given] if isinstance(given, str | Effect) else given:
+        yield from one.split(",") if isinstance(one, str) else [one]
+
+
 def effect_of(given: Any, effects: Mapping[str, Effect]) -> Effect:
-    """Return an effect by its name, which may have a form, or the Effect itself."""
     if isinstance(given, Effect):
         return given
     name, _, form = str(given).strip().partition(":")
@@ -199,11 +203,16 @@ def identify(
     identifier : name, Identifier, pymoo algorithm or function
         Who searches; by default "pso+least_squares", and "cmaes" for a fitness that is no sum of squares.
     budget : int
-        Simulations; by default 3,000, and 12,000 (the paper's) for an identifier that is named.
-    seed, target, accuracy, progress
-        As of `armid.estimation.identify.identify`.
-    options
-        Of the identifier.
+        Simulations, one candidate through all train records counting as one; by default 3,000, and 12,000 (the paper's)
+        for an identifier that is named.
+    seed, options
+        Of the identifier: that of its random numbers, and name -> value.
+    target : float
+        Fitness at which to stop (the paper's step 7).
+    accuracy : {"standard", "fine"}
+        Of the engine; None: as the noise of each record asks for.
+    progress : callable
+        Called with the meter after each generation.
     paper : bool
         The paper's swarm, similarity degree, budget and window, where nothing else is given.
     **given
@@ -334,17 +343,9 @@ def close_loop(
     wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "--candidates")
     left_out = effects_of(without, known, "--without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
+    values = {**(fixed or {}), **there.fixed}
     found: ClosedLoop = run(
-        there.model,
-        there.campaign,
-        kept,
-        rng,
-        there.bounds,
-        {**(fixed or {}), **there.fixed},
-        threads,
-        told,
-        curve,
-        progress,
+        there.model, there.campaign, kept, rng, there.bounds, values, threads, told, curve, progress
     )
     return found
 
@@ -353,12 +354,8 @@ def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[s
     """Return name -> Effect of names or Effects, None: all that are known; where: named in a refusal."""
     if given is None:
         return known
-    each = [given] if isinstance(given, str | Effect) else given
-    found = {}
-    for one in (e for text in each for e in (text.split(",") if isinstance(text, str) else [text])):
-        effect = one if isinstance(one, Effect) else chosen(one.strip(), known, f"{where}: effect")
-        found[effect.name] = effect
-    return found
+    found = (e if isinstance(e, Effect) else chosen(e.strip(), known, f"{where}: effect") for e in each_of(given))
+    return {effect.name: effect for effect in found}
 
 
 def simulate(

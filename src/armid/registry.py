@@ -36,10 +36,6 @@ ACCEPTS: dict[str, Callable[[Any], bool]] = {
     "identifiers": is_identifier,
 }
 KINDS = tuple(ACCEPTS)
-EXPECTED = (
-    "a Plant, an Effect, a fitness function (measured, simulated), an analysis (runs) or an algorithm of pymoo is "
-    "expected"
-)
 
 
 @dataclass
@@ -174,7 +170,8 @@ def kind_of(thing: Any, where: str) -> str:
     for kind, accepts in ACCEPTS.items():
         if accepts(thing):
             return kind
-    raise ArmidError(f"{where} is of type {type(thing).__name__}: {EXPECTED}")
+    raise ArmidError(f"{where} is of type {type(thing).__name__}: a Plant, an Effect, a fitness function (measured, "
+                     "simulated), an analysis (runs) or an algorithm of pymoo is expected")  # fmt: skip
 
 
 def place_in_plugin(error: BaseException) -> str | None:

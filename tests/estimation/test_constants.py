@@ -18,14 +18,14 @@ class Linear:
     """A problem whose signal is linear in two parameters."""
 
     replays = ()
-    space = SimpleNamespace(free_names=("a", "b"), complete=lambda x: x)
+    space = SimpleNamespace(free_names=("a", "b"))
     span = np.array([2.0, 4.0])
 
     def __init__(self, jacobian):
         self.jacobian = jacobian
 
-    def values(self, z):
-        return z
+    def whole(self, Z):
+        return Z
 
     def residual_and_slopes(self, z):
         return np.zeros(len(self.jacobian)), self.jacobian

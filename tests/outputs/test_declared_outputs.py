@@ -87,7 +87,7 @@ def test_a_sensor_has_effects_at_the_port_of_its_output() -> None:
     np.testing.assert_allclose(moved, 1.1 * still + 0.05, atol=1e-12)
     assert Model(two_inertias) + EFFECTS["gyro_bias"]
     points = check_effects([*found.values(), EFFECTS["coulomb"]], {"two_inertias": two_inertias})
-    assert [p for several in points for p in several if not p.passed] == []
+    assert [p for _, p in points if not p.passed] == []
     assert [p for p in check_plant(two_inertias) if not p.passed] == []
 
 

@@ -1,6 +1,7 @@
 """The entrance to all contracts; those of a campaign and of a fitness."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,12 +43,12 @@ def check_analysis(name: str, function: Callable[..., Any]) -> list[ContractPoin
         text = str(error) if isinstance(error, ArmidError) else f"{type(error).__name__}: {error}"
         return [ContractPoint("tables and figures", False, text)]
     unchanged, same = runs.equals(synthetic_runs()), content(parts) == content(again)
+    text = "the runs are as they were" if unchanged else "the runs that it was given have changed"
     return [
         ContractPoint("tables and figures", True, f"{len(parts)}: {', '.join(parts)}"),
-        ContractPoint("leaves its argument alone", unchanged,
-                "the runs are as they were" if unchanged else "the runs that it was given have changed"),
+        ContractPoint("leaves its argument alone", unchanged, text),
         ContractPoint("deterministic", same, "a second call is compared with the first"),
-    ]  # fmt: skip
+    ]
 
 
 def parts_of(name: str, found: Any) -> dict[str, Any]:
@@ -115,26 +116,22 @@ def synthetic_runs() -> "DataFrame":
     pyplot()
     rng = np.random.default_rng(1)
     rows: list[dict[str, Any]] = []
-    for case in TRUTHS["k"]:
-        for identifier, scale in (("pso", 1e-3), ("de", 1e-5)):
-            for noise, setting in ((0.0, "noise-free"), (0.3, "0.3 deg/s")):
-                for seed in SEEDS:
-                    errors = {name: scale * float(rng.lognormal()) for name in TRUTHS}
-                    row = {
-                        "study": "made_up", "run": f"r{len(rows)}", "case": case, "identifier": identifier,
-                        "fitness": "rmse", "noise_deg_s": noise, "window": "whole", "seed": seed, "variant": identifier,
-                        "setting": setting, "status": "done", "error": "", "stopped": "budget used", "budget": 3000,
-                        "used": 3000 - seed, "n_failed": seed, "value": scale, "train_rmse": 0.01,
-                        "holdout_rmse": 0.02, "train_s": 0.99, "train_s1": 0.99, "train_s2": 1.0, "seconds": 1.0,
-                        "largest_error": max(errors.values()),
-                    }  # fmt: skip
-                    for name, truth in TRUTHS.items():
-                        row |= {
-                            name: truth[case] * (1.0 + errors[name]), f"{name}_truth": truth[case],
-                            f"{name}_error": errors[name], f"{name}_deviation": 1e-3 * truth[case],
-                            f"{name}_at_bound": False,
-                        }  # fmt: skip
-                    rows.append(row)
+    searches, settings = (("pso", 1e-3), ("de", 1e-5)), ((0.0, "noise-free"), (0.3, "0.3 deg/s"))
+    for case, (identifier, scale), (noise, setting), seed in product(TRUTHS["k"], searches, settings, SEEDS):
+        errors = {name: scale * float(rng.lognormal()) for name in TRUTHS}
+        row = {
+            "study": "made_up", "run": f"r{len(rows)}", "case": case, "identifier": identifier, "fitness": "rmse",
+            "noise_deg_s": noise, "window": "whole", "seed": seed, "variant": identifier, "setting": setting,
+            "status": "done", "error": "", "stopped": "budget used", "budget": 3000, "used": 3000 - seed,
+            "n_failed": seed, "value": scale, "train_rmse": 0.01, "holdout_rmse": 0.02, "train_s": 0.99,
+            "train_s1": 0.99, "train_s2": 1.0, "seconds": 1.0, "largest_error": max(errors.values()),
+        }  # fmt: skip
+        for name, truth in TRUTHS.items():
+            row |= {
+                name: truth[case] * (1.0 + errors[name]), f"{name}_truth": truth[case], f"{name}_error": errors[name],
+                f"{name}_deviation": 1e-3 * truth[case], f"{name}_at_bound": False,
+            }  # fmt: skip
+        rows.append(row)
     found = [f"{name}{end}" for name in TRUTHS for end in ("", "_error", "_deviation")]
     results = ["value", "train_rmse", "holdout_rmse", "train_s", "train_s1", "train_s2", *found]
     rows[-1] |= dict.fromkeys(results, np.nan) | {
@@ -220,21 +217,16 @@ def check_fitness(fitness: Fitness) -> list[ContractPoint]:
     untouched = all(np.array_equal(a, b) for a, b in zip(given, trial_series(), strict=True))
     text = "the arrays are as they were" if untouched else "the arrays that it was given have changed"
     apart = np.array_equal(failed[:-1], values) and np.array_equal(alone, values[2:3])
-    return [
-        ContractPoint("one value per candidate", values.shape == (4,), f"shape {values.shape} for 4 candidates"),
-        ContractPoint("finite", bool(np.isfinite(values).all()), f"values {np.array2string(values, precision=3)}"),
-        ContractPoint(
-            "least at a perfect match", int(np.argmin(values)) == 0, f"{values[0]:.3g} at the measured series"
-        ),
-        ContractPoint(
-            "a failed candidate is worst", bool(failed[-1] > values.max()), f"{failed[-1]:.3g} for a NaN row"
-        ),
-        ContractPoint(
-            "others untouched", bool(apart), "alone, and beside a failed one, a candidate is compared with itself"
-        ),
-        ContractPoint("leaves its arguments alone", untouched, text),
-        ContractPoint("deterministic", bool(np.array_equal(values, again)), "a second call is compared with the first"),
+    points = [
+        ("one value per candidate", values.shape == (4,), f"shape {values.shape} for 4 candidates"),
+        ("finite", np.isfinite(values).all(), f"values {np.array2string(values, precision=3)}"),
+        ("least at a perfect match", np.argmin(values) == 0, f"{values[0]:.3g} at the measured series"),
+        ("a failed candidate is worst", failed[-1] > values.max(), f"{failed[-1]:.3g} for a NaN row"),
+        ("others untouched", apart, "alone, and beside a failed one, a candidate is compared with itself"),
+        ("leaves its arguments alone", untouched, text),
+        ("deterministic", np.array_equal(values, again), "a second call is compared with the first"),
     ]
+    return [ContractPoint(name, bool(holds), seen) for name, holds, seen in points]
 
 
 def trial_series() -> tuple[Array, Array]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,30 +43,25 @@ def check_plant(plant: Plant) -> Iterator[ContractPoint]:
         except ArmidError as error:
             here: Iterable[ContractPoint] = [ContractPoint("binds", False, str(error))]
         else:
-            here = chain(plant_declared(model), plant_moves(model))
+            here = plant_points(model)
         yield from (replace(f, name=f"{f.name}, {p.name} in {units_of(p)}") for f in here)
 
 
-def plant_declared(model: Model) -> list[ContractPoint]:
+def plant_points(model: Model) -> Iterator[ContractPoint]:
     plant, graph = model.plant, model.graph
     ports = ", ".join(plant.ports) or "none"
     asked = {key for node in graph.nodes.values() for key in node.needs}
     idle = [g.name for g in plant.guards if graph.is_static(f"guard__{g.name}") or (g.latch and g.name not in asked)]
-    return [
-        ContractPoint("binds", True, f"{len(model.parameters)} parameters, {len(model.states)} states; records "
-                                     f"{units_of(plant)}; ports: {ports}"),
-        *check_parameters(plant.parameters),
-        ContractPoint("printed", all(o.signal in str(model) for o in plant.outputs),
-                      "print(model) shows its equations"),
-        finding("guards", idle, "nothing depends on guard {}, or it never moves",
-                f"all of {len(plant.guards)} guards are used"),
-    ]  # fmt: skip
-
-
-def plant_moves(model: Model) -> Iterator[ContractPoint]:
-    manoeuvres, x = trial_manoeuvres(model.plant), nominal(model)
+    text = f"{len(model.parameters)} parameters, {len(model.states)} states; records {units_of(plant)}; ports: {ports}"
+    yield ContractPoint("binds", True, text)
+    yield from check_parameters(plant.parameters)
+    is_printed = all(o.signal in str(model) for o in plant.outputs)
+    yield ContractPoint("printed", is_printed, "print(model) shows its equations")
+    used = f"all of {len(plant.guards)} guards are used"
+    yield finding("guards", idle, "nothing depends on guard {}, or it never moves", used)
+    manoeuvres, x = trial_manoeuvres(plant), nominal(model)
     moved = [float(np.ptp(y)) for m in manoeuvres for y in simulate(model, m, x).outputs]
-    size = f"the signal runs over {', '.join(f'{v:.2g}' for v in moved)} {units_of(model.plant)}"
+    size = f"the signal runs over {', '.join(f'{v:.2g}' for v in moved)} {units_of(plant)}"
     yield ContractPoint("moves", 0.0 not in moved, size)
     yield finite(model, manoeuvres, over_box(model, N_CANDIDATES))
     yield deterministic(model, manoeuvres[0], over_box(model, 9))
@@ -80,33 +74,28 @@ def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS, strict: b
 
     strict: a function without a docstring fails; otherwise that is only said.
     """
-    for form in effect.every_form:
-        models, refusals = composed(form, plants)
-        points = chain(declared(form, models, refusals, strict), *(check_on(form, m, m) for m in models))
-        yield from (of_form(point, form) for point in points)
+    yield from (point for _, point in check_effects([effect], plants, strict))
 
 
 def check_effects(
     effects: Sequence[Effect], plants: Mapping[str, Plant] = PLANTS, strict: bool = False
-) -> list[list[ContractPoint]]:
-    """Try several effects as `check_effect` does each, with as little to compile as possible.
+) -> Iterator[tuple[str, ContractPoint]]:
+    """Try several effects as `check_effect` does each, with as little to compile as possible; yield name and point.
 
     All effects that a plant takes stand in one model, which is compiled once; all but the one that is tried are at
     their nulls, where they add exactly nothing. Further forms of effects share a model in the same way.
     """
-    found: list[list[ContractPoint]] = [[] for _ in effects]
     for k in range(max((len(effect.every_form) for effect in effects), default=0)):
-        forms = {i: effect.every_form[k] for i, effect in enumerate(effects) if k < len(effect.every_form)}
-        fits = {i: composed(form, plants) for i, form in forms.items()}
-        here = {i: declared(form, *fits[i], strict) for i, form in forms.items()}
+        forms = {effect.name: effect.every_form[k] for effect in effects if k < len(effect.every_form)}
+        fits: dict[str, list[Model]] = {}
+        for name, form in forms.items():
+            fits[name], refusals = composed(form, plants)
+            yield from ((name, of_form(p, form)) for p in declared(form, fits[name], refusals, strict))
         for plant in siblings(plants):
-            models = {i: model for i, (several, _) in fits.items() for model in several if model.plant is plant}
-            joint = joint_model(plant, [forms[i] for i in models])
-            for i, model in models.items():
-                here[i] += check_on(forms[i], model, joint or model)
-        for i, form in forms.items():
-            found[i] += [of_form(point, form) for point in here[i]]
-    return found
+            models = {name: model for name, several in fits.items() for model in several if model.plant is plant}
+            joint = joint_model(plant, [forms[name] for name in models])
+            for name, model in models.items():
+                yield from ((name, of_form(p, forms[name])) for p in check_on(forms[name], model, joint or model))
 
 
 def of_form(point: ContractPoint, form: Effect) -> ContractPoint:
@@ -128,8 +117,19 @@ def composed(form: Effect, plants: Mapping[str, Plant]) -> tuple[list[Model], li
 
 
 def declared(form: Effect, models: Sequence[Model], refusals: list[str], strict: bool) -> list[ContractPoint]:
-    return [binding([m.plant.name for m in models], refusals), *check_parameters(form.parameters), has_null(form),
-            documented(form, strict)]  # fmt: skip
+    """Tell which plants take an effect, else why none does; and what its declaration says."""
+    fits = f"fits {', '.join(m.plant.name for m in models)}" if models else (
+        f"fits no plant ({'; '.join(refusals)}); --plugin FILE.py:attribute has it tried on your own")  # fmt: skip
+    nulls = [p.name for p in form.parameters if p.null is not None]
+    vanishes = f"vanishes where {', '.join(nulls)} is null" if nulls else "no parameter has a null value"
+    silent = [name for name, f in functions_of(form) if not (f.__doc__ or "").strip()]
+    documented = finding("documented", silent, "no docstring: {}", "every function has a docstring")
+    return [
+        ContractPoint("binds", bool(models), fits),
+        *check_parameters(form.parameters),
+        ContractPoint("null values", bool(nulls), vanishes),
+        replace(documented, passed=not (silent and strict)),
+    ]
 
 
 def joint_model(plant: Plant, effects: Sequence[Effect]) -> Model | None:
@@ -300,25 +300,6 @@ def agrees(model: Model, alone: Model, candidate: Array, manoeuvre: Manoeuvre) -
 
 def units_of(plant: Plant) -> str:
     return ", ".join(o.unit for o in plant.outputs)
-
-
-def binding(fitting: list[str], refusals: list[str]) -> ContractPoint:
-    """Tell which plants take an effect; else why none does, and how a plant of one's own comes to be tried."""
-    text = f"fits {', '.join(fitting)}" if fitting else (
-        f"fits no plant ({'; '.join(refusals)}); --plugin FILE.py:attribute has it tried on your own")  # fmt: skip
-    return ContractPoint("binds", bool(fitting), text)
-
-
-def has_null(effect: Effect) -> ContractPoint:
-    names = [p.name for p in effect.parameters if p.null is not None]
-    text = f"vanishes where {', '.join(names)} is null" if names else "no parameter has a null value"
-    return ContractPoint("null values", bool(names), text)
-
-
-def documented(effect: Effect, strict: bool) -> ContractPoint:
-    silent = [name for name, f in functions_of(effect) if not (f.__doc__ or "").strip()]
-    found = finding("documented", silent, "no docstring: {}", "every function has a docstring")
-    return ContractPoint(found.name, found.passed or not strict, found.sentence)
 
 
 def functions_of(effect: Effect) -> Iterator[tuple[str, Equation]]:

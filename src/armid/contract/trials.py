@@ -30,7 +30,6 @@ class ContractPoint:
 
 
 def check_parameters(parameters: Iterable[Parameter]) -> list[ContractPoint]:
-    """Tell whether bounds are finite, other values lie between them, and units are named."""
     given = list(parameters)
     outside = [
         p.name for p in given if not all(p.low <= v <= p.high for v in (p.null, p.fixed, p.nominal) if v is not None)
@@ -233,17 +232,12 @@ class PlainModel:
         keys = [f"rate__{s}" for s in self.states]
         return np.array(self.evaluate(keys, self.moment(time, states, closed)), dtype=float)
 
-    def guard(self, key: str, time: float, states: Array, closed: Latches) -> float:
-        return float(self.evaluate([key], self.moment(time, states, closed))[0])
-
     def recorded(self, time: float, states: Array, closed: Latches) -> list[float]:
         return self.evaluate(self.signals, self.moment(time, states, closed))
 
     def switched(self, time: float, states: Array, closed: Latches) -> Latches:
-        return tuple(
-            1.0 if c or self.guard(f"guard__{k}", time, states, closed) <= 1e-12 else 0.0
-            for k, c in zip(self.latches, closed, strict=True)
-        )
+        guards = self.evaluate([f"guard__{k}" for k in self.latches], self.moment(time, states, closed))
+        return tuple(1.0 if c or guard <= 1e-12 else 0.0 for guard, c in zip(guards, closed, strict=True))
 
     def integrated(self, begin: float, states: Array, closed: Latches, times: Array) -> Any:
         """Return scipy's solution at some times, which ends where a guard changes its sign."""
@@ -258,7 +252,7 @@ class PlainModel:
         """Return a guard as an event that ends the integration, but not at once where it has just ended."""
 
         def event(time: float, states: Array) -> float:
-            value = self.guard(key, time, states, closed)
+            (value,) = self.evaluate([key], self.moment(time, states, closed))
             return value if time > begin + 1e-9 else 1.0 if value >= 0.0 else -1.0
 
         event.terminal = True  # type: ignore[attr-defined]

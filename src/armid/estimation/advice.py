@@ -5,8 +5,8 @@ record from each rival in turn, as uncertain as it is known by now, and all riva
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import combinations
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.special import ndtr, ndtri
 from armid.engine import probes, simulate
 from armid.errors import ArmidError
 from armid.estimation.design import BOX, Feasible, Key, Motions, fine_schedule, manoeuvre_grid
-from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords, descend, side_by_side
+from armid.estimation.least_squares import LeastSquaresProblem, descend, side_by_side
 
 Array = NDArray[np.float64]
 Whitening = Callable[[Array], Array]
@@ -67,10 +67,7 @@ class Rival:
 
     @property
     def candidate(self) -> Array:
-        return np.asarray(self.whole(self.z[np.newaxis])[0])
-
-    def whole(self, Z: Array) -> Array:
-        return self.records.space.complete(self.records.values(Z))
+        return np.asarray(self.records.whole(self.z[np.newaxis])[0])
 
     @cached_property
     def precision(self) -> Array:
@@ -89,38 +86,36 @@ class Rival:
         return np.asarray(both[int(np.argmin(outside(both)))])
 
 
+# Whitened signals of a new record that a rival gives at candidates in shares, (n_candidates, n).
+NewSignals = Callable[[Rival, Array], Array]
+
+
 def advise(
     rivals: Sequence[Rival],
-    white: Whitening | None = None,
+    white: Whitening,
     grid: Sequence[Feasible] | None = None,
     speed_limit: float | None = None,
-    threshold: float = THRESHOLD,
     threads: int = 1,
 ) -> tuple[Advice, ...]:
     """Rank feasible manoeuvres by how well one record of each would tell the rivals apart, the best first.
 
     Only manoeuvres that were simulated are returned, ranked by the mean power over pairs, then by the mean distance.
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
-    n_samples), into units of white noise, (n_signals, n), None: the mean weight of the records of one output. grid:
-    None: `manoeuvre_grid`. speed_limit: of the gyro. threshold: difference of the criterion at which a model is better.
+    n_samples), into units of white noise, (n_signals, n). grid: None: `manoeuvre_grid`. speed_limit: of the gyro.
     Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
     """
     if len(rivals) < 2:
         raise ArmidError(f"{len(rivals)} model was given to be told apart from others: at least two are expected")
     first = rivals[0].records
-    if white is None:
-        assert isinstance(first, WeightedRecords)
-        mean_weight = float(np.mean(np.square(1.0 / np.array(first.weights))) ** -0.5)
-        white = lambda signals: mean_weight * np.concatenate(signals, axis=-1)  # noqa: E731
     grid = grid or manoeuvre_grid(first.model, [r.record for r in first.replays])
     predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
     draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
     possible = [f for f in grid if all(f in known for known in predictions)]
-    ranks = {f: rank(predicted_powers(rivals, [p[f] for p in predictions], draws, threshold)) for f in possible}
+    ranks = {f: rank(predicted_powers(rivals, [p[f] for p in predictions], draws)) for f in possible}
     most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
     promising = sorted(possible, key=lambda f: ranks[f], reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
-    powers = side_by_side(lambda f: simulated_powers(rivals, f, white, draws, threshold), promising, threads)
+    powers = side_by_side(lambda f: simulated_powers(rivals, f, white, draws), promising, threads)
     ranked = sorted(zip(promising, powers, strict=True), key=lambda pair: rank(pair[1]), reverse=True)
     return tuple(advice_of(rivals, feasible, found) for feasible, found in ranked)
 
@@ -172,7 +167,7 @@ def predictions_of(
     """
     motions = Motions(rival.records.replays, rival.candidate, speed_limit)
     above, below = rival.z + rival.root.T, rival.z - rival.root.T
-    points = rival.whole(np.concatenate([rival.z[np.newaxis], above, below]))
+    points = rival.records.whole(np.concatenate([rival.z[np.newaxis], above, below]))
     n, found = len(rival.z), {}
     upward = np.where(outside(above) < outside(below), 1.0, np.where(outside(above) > outside(below), 0.0, 0.5))
     for feasible, signals in motions.signals(grid, points):
@@ -186,20 +181,18 @@ def spread_of(here: Array, above: Array, below: Array, upward: Array) -> Array:
     return np.asarray(((above - here).T * upward) + ((here - below).T * (1.0 - upward)))
 
 
-def predicted_powers(
-    rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array, threshold: float
-) -> Powers:
+def predicted_powers(rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array) -> Powers:
     found = {}
     for a, b in combinations(range(len(rivals)), 2):
         old = rivals[b].criterion - rivals[a].criterion
-        one = chance(predictions[a], predictions[b], old, draws, threshold)
-        other = chance(predictions[b], predictions[a], -old, draws, threshold)
+        one = chance(predictions[a], predictions[b], old, draws)
+        other = chance(predictions[b], predictions[a], -old, draws)
         found[a, b] = (0.5 * (one[0] + other[0]), float(np.sqrt(0.5 * (one[1] + other[1]))))
     return found
 
 
-def chance(right: Prediction, wrong: Prediction, old: float, draws: Array, threshold: float) -> tuple[float, float]:
-    """Return the chance that the right model wins by more than a threshold, and the squared distance delta^2.
+def chance(right: Prediction, wrong: Prediction, old: float, draws: Array) -> tuple[float, float]:
+    """Return the chance that the right model wins by more than the threshold, and the squared distance delta^2.
 
     After both are fitted again, the criterion of the wrong one less that of the right one is
     D = old + r_B^T V_B^-1 r_B - r_A^T V_A^-1 r_A, r the new record less the prediction, V = 1 + spread spread^T its
@@ -218,17 +211,16 @@ def chance(right: Prediction, wrong: Prediction, old: float, draws: Array, thres
     normal = draws[:, : len(reduced)]
     missed = normal @ factor.T + d[:, 0]
     gained = np.sum(missed @ weight * missed, axis=1) - np.sum(normal**2, axis=1)
-    return float(np.mean(old + gained > threshold)), float(d[:, 0] @ weight @ d[:, 0])
+    return float(np.mean(old + gained > THRESHOLD)), float(d[:, 0] @ weight @ d[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
 class OldAndNew(LeastSquaresProblem):
     """Pose the old records, as a parabola about their estimate, and one new record as one least-squares problem."""
 
-    rival: Rival = field(kw_only=True)
-    feasible: Feasible = field(kw_only=True)
-    white: Whitening = field(kw_only=True)
-    seen: Array = field(kw_only=True)
+    rival: Rival
+    new: NewSignals
+    seen: Array
 
     @cached_property
     def measured(self) -> Array:
@@ -236,21 +228,20 @@ class OldAndNew(LeastSquaresProblem):
 
     def signals(self, Z: Array) -> Array:
         """Return how far candidates are from the old estimate, in standard deviations, then their new signals."""
-        new = whitened_signals(self.rival, self.feasible, self.white, Z)
-        return np.concatenate([(Z - self.rival.z) @ self.rival.precision, new], axis=1)
+        old = (Z - self.rival.z) @ self.rival.precision
+        return np.concatenate([old, self.new(self.rival, Z)], axis=1)
 
 
-def whitened_signals(rival: Rival, feasible: Feasible, white: Whitening, Z: Array) -> Array:
+def whitened_signals(feasible: Feasible, white: Whitening, rival: Rival, Z: Array) -> Array:
     records = rival.records
-    run = simulate(records.model, feasible.manoeuvre, rival.whole(Z), fine_schedule(records.replays))
+    run = simulate(records.model, feasible.manoeuvre, records.whole(Z), fine_schedule(records.replays))
     places = sorted({r.place for r in records.replays})
     return np.asarray(white(run.outputs[places][..., feasible.window]))
 
 
-def simulated_powers(
-    rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array, threshold: float
-) -> Powers:
-    tried = [simulate_refits(rivals, i, feasible, white, draws, threshold) for i in range(len(rivals))]
+def simulated_powers(rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array) -> Powers:
+    new = partial(whitened_signals, feasible, white)
+    tried = [simulate_refits(rivals, i, new, draws) for i in range(len(rivals))]
     chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
     return {
         (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
@@ -258,25 +249,23 @@ def simulated_powers(
     }
 
 
-def simulate_refits(
-    rivals: Sequence[Rival], right: int, feasible: Feasible, white: Whitening, draws: Array, threshold: float
-) -> tuple[Array, Array]:
-    """Return the chance that each other rival loses to the right one by more than a threshold, and its distance.
+def simulate_refits(rivals: Sequence[Rival], right: int, new: NewSignals, draws: Array) -> tuple[Array, Array]:
+    """Return the chance that each other rival loses to the right one by more than the threshold, and its distance.
 
     The record is simulated without noise from the right model as it is known by now, once for each draw, and every
     rival is fitted again to old and new. Noise then scatters the difference D of the criteria by twice the distance of
-    the fitted predictions: the chance is Phi((D - threshold)/(2 distance)). draws: standard normal, (n_draws, at least
+    the fitted predictions: the chance is Phi((D - THRESHOLD)/(2 distance)). draws: standard normal, (n_draws, at least
     n_free). A draw whose simulation diverges says nothing.
     """
     true = rivals[right]
     chances, distances = [], []
     for draw in draws:
-        seen = whitened_signals(true, feasible, white, true.drawn(draw)[np.newaxis])[0]
+        seen = new(true, true.drawn(draw)[np.newaxis])[0]
         if not np.isfinite(seen).all():
             continue
-        values, signals = zip(*(fitted_again(r, feasible, white, seen) for r in rivals), strict=True)
+        values, signals = zip(*(fitted_again(r, new, seen) for r in rivals), strict=True)
         apart = np.array([np.linalg.norm(s - signals[right]) for s in signals])
-        margin = np.array(values) - values[right] - threshold
+        margin = np.array(values) - values[right] - THRESHOLD
         won = ndtr(margin / np.maximum(2.0 * apart, 1e-9))
         won[right] = 1.0
         chances.append(won)
@@ -286,11 +275,11 @@ def simulate_refits(
     return np.mean(chances, axis=0), np.mean(distances, axis=0)
 
 
-def fitted_again(rival: Rival, feasible: Feasible, white: Whitening, seen: Array) -> tuple[float, Array]:
+def fitted_again(rival: Rival, new: NewSignals, seen: Array) -> tuple[float, Array]:
     """Return criterion and prediction of a rival after a fit to old and new; of one that diverges 0 throughout."""
-    both = OldAndNew((), rival.records.space, rival=rival, feasible=feasible, white=white, seen=seen)
+    both = OldAndNew((), rival.records.space, rival, new, seen)
     start = np.clip(rival.z, 0.0, 1.0)
     if not np.isfinite(both.chi2(start)[0]):
         return rival.criterion + float(seen @ seen), np.zeros_like(seen)
     z = descend(both, [start], TOLERANCE)
-    return rival.criterion + float(both.chi2(z)[0]), whitened_signals(rival, feasible, white, z[np.newaxis])[0]
+    return rival.criterion + float(both.chi2(z)[0]), new(rival, z[np.newaxis])[0]

@@ -5,9 +5,10 @@ constants, whose prior is a normal distribution with their tolerance as standard
 variance t^2 adds t^2 C C^T to the covariance of the noise.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,14 +55,23 @@ class Product:
         return self.tolerance * self.slope
 
 
+def with_constants(piece: Piece, constants: Mapping[str, float]) -> Piece:
+    manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
+    return replace(piece, manoeuvre=manoeuvre)
+
+
+def of_pieces(undo: Callable[..., Piece], **told: Any) -> Callable[[Record], Record]:
+    """Return what changes each piece of each output of a file."""
+
+    def changed(record: Record) -> Record:
+        pieces, whole = (tuple(undo(p, **told) for p in some) for some in (record.pieces, record.whole_pieces))
+        return replace(record, pieces=pieces, whole_pieces=whole, others=tuple(map(changed, record.others)))
+
+    return changed
+
+
 def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> Record:
-    if not shares:
-        return record
-    pieces, whole = (
-        tuple(moved_piece(p, plant, shares) for p in some) for some in (record.pieces, record.whole_pieces)
-    )
-    others = tuple(moved_record(other, plant, shares) for other in record.others)
-    return replace(record, pieces=pieces, whole_pieces=whole, others=others)
+    return of_pieces(moved_piece, plant=plant, shares=shares)(record) if shares else record
 
 
 def moved_replay(replay: Replay, shares: Mapping[str, float]) -> Replay:
@@ -70,9 +80,7 @@ def moved_replay(replay: Replay, shares: Mapping[str, float]) -> Replay:
 
 def moved_piece(piece: Piece, plant: Plant, shares: Mapping[str, float]) -> Piece:
     given = {c.name: c.value for c in plant.constants} | dict(piece.manoeuvre.constants)
-    changed = {name: given[name] * (1.0 + share) for name, share in shares.items()}
-    manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **changed})
-    return replace(piece, manoeuvre=manoeuvre)
+    return with_constants(piece, {name: given[name] * (1.0 + share) for name, share in shares.items()})
 
 
 def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[str]) -> Array:
@@ -80,7 +88,7 @@ def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[
 
     By central differences; a constant whose change makes the simulation diverge has a column of 0.
     """
-    candidate = records.space.complete(records.values(z)[np.newaxis])
+    candidate = records.whole(z[np.newaxis])
     found = []
     for name in names:
         sides = [records.weighted([moved_replay(r, {name: s}).signal(candidate)[0] for r in records.replays])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armid.engine import Schedule, simulate
 from armid.engine.simulate import Simulation
+from armid.estimation.constants import with_constants
 from armid.estimation.information import Level, inverse
 from armid.estimation.least_squares import slopes_of, stencil
 from armid.model import Manoeuvre, ManoeuvreKey, Model, Plant
@@ -161,30 +162,34 @@ def keyed(plant: Plant, records: Sequence[Record]) -> Iterator[Feasible]:
         apart = (abs(keys[a.key] - keys[b.key]) >= APART * ((a.high or 0.0) - (a.low or 0.0)) for a, b in pairs)
         if keys and all(apart):
             constants = {k.constant: float(keys[k.key]) * k.factor for k in plant.keys}
-            manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
-            yield Feasible(keys, manoeuvre, piece.window)
+            yield Feasible(keys, with_constants(piece, constants).manoeuvre, piece.window)
 
 
 def key_levels(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> tuple[float | bool, ...]:
     if key.boolean:
         return (True, False)
-    if key.low is not None and key.high is not None and is_place(plant, key):
-        room = MARGIN * (key.high - key.low)
-        return tuple(float(v) for v in np.round(np.linspace(key.low + room, key.high - room, N_PLACES)))
+    low, high = range_of(key)
+    if is_place(plant, key):
+        room = MARGIN * (high - low)
+        return tuple(float(v) for v in np.round(np.linspace(low + room, high - room, N_PLACES)))
     default = next(c.value for c in plant.constants if c.name == key.constant)
     recorded = {round(r.constants.get(key.constant, default) / key.factor, 9) for r in records}
     some = sorted(recorded, reverse=True)[:MOST_LEVELS]
-    low, high = -np.inf if key.low is None else key.low, np.inf if key.high is None else key.high
     levels = sorted({*some, float(f"{TURNED_DOWN * max(some):.2g}")}, reverse=True)
     return tuple(v for v in levels if low <= v <= high)
 
 
 def is_place(plant: Plant, key: ManoeuvreKey) -> bool:
     """Tell whether a key is a place of the travel: where a state starts, or a target that must be unlike it."""
-    if key.boolean or key.low is None or key.high is None:
+    low, high = range_of(key)
+    if key.boolean or not np.isfinite(high - low):
         return False
-    starts = {k.constant for k in plant.keys for s in plant.states if starts_at(s.initial, k, key.factor * key.low)}
+    starts = {k.constant for k in plant.keys for s in plant.states if starts_at(s.initial, k, key.factor * low)}
     return key.constant in starts or key.unlike in starts
+
+
+def range_of(key: ManoeuvreKey) -> tuple[float, float]:
+    return -np.inf if key.low is None else key.low, np.inf if key.high is None else key.high
 
 
 def starts_at(initial: Callable[..., float], key: ManoeuvreKey, value: float) -> bool:
@@ -195,9 +200,9 @@ def key_travel(plant: Plant) -> dict[str, tuple[float, float]]:
     """Return state -> its range, SI, where the state starts at the constant of a key that has a range."""
     found = {}
     for key, state in product(plant.keys, plant.states):
-        if key.low is not None and key.high is not None and starts_at(state.initial, key, key.factor * key.low):
-            ends = sorted((key.factor * key.low, key.factor * key.high))
-            found[state.name] = (ends[0], ends[1])
+        ends = [key.factor * end for end in range_of(key)]
+        if np.isfinite(ends).all() and starts_at(state.initial, key, ends[0]):
+            found[state.name] = (min(ends), max(ends))
     return found
 
 
@@ -210,14 +215,12 @@ def changed_inputs(records: Sequence[Record]) -> Iterator[Feasible]:
     # the first pair is size 1 and pace 1: what was recorded
     for record, (size, pace) in product(records, list(product(SIZES, PACES))[1:]):
         piece = record.pieces[0].until_window_end()
-        manoeuvre = piece.manoeuvre
-        constants = dict(manoeuvre.constants)
-        if "start_speed" in constants:
-            constants["start_speed"] *= np.sign(size)
+        start = {n: v * np.sign(size) for n, v in piece.manoeuvre.constants.items() if n == "start_speed"}
+        manoeuvre = with_constants(piece, start).manoeuvre
         inputs = {name: paced(v, pace, manoeuvre.hold) * (size if np.ptp(np.sign(v)) > 1 else 1.0)
                   for name, v in manoeuvre.inputs.items()}  # fmt: skip
         keys: dict[str, Key] = {"like": record.file, "size": size, "pace": pace}
-        yield Feasible(keys, replace(manoeuvre, constants=constants, inputs=inputs), piece.window)
+        yield Feasible(keys, replace(manoeuvre, inputs=inputs), piece.window)
 
 
 def paced(values: Array, pace: float, hold: str) -> Array:
@@ -307,7 +310,6 @@ class Motions:
         """Return state -> how wide it may range: a little more than in the records, for states that files show."""
         widest = {name: 0.0 for name, state in self.model.states.items() if state.column}
         for piece in (piece for replay in replays for piece in replay.pieces):
-            whole = replace(self.schedule, plan=None)
-            run = simulate(self.model, piece.manoeuvre, self.candidate[np.newaxis], whole, states=True)
+            run = simulate(self.model, piece.manoeuvre, self.candidate[np.newaxis], self.schedule, states=True)
             widest = {name: max(wide, WIDER * float(np.ptp(run.states[name]))) for name, wide in widest.items()}
         return widest

@@ -17,6 +17,7 @@ from armid.estimation.information import (
     information_of,
     level_weights,
     levels_of,
+    normalised,
 )
 from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine, with_fitted_starts
 from armid.estimation.profile import Profile, profiles
@@ -50,19 +51,19 @@ class Group:
     direction: Array
 
 
-def groups(fisher: Array, names: tuple[str, ...], critical: float = CRITICAL) -> tuple[Group, ...]:
+def groups(fisher: Array, names: tuple[str, ...]) -> tuple[Group, ...]:
     """Return the groups of parameters that move together, the worst first.
 
     The smallest set whose index comes to half of that of all parameters is the first group; then the member that does
-    most harm is taken as known, and the rest is looked at again, until its index is below `critical`. fisher: in shares
+    most harm is taken as known, and the rest is looked at again, until its index is below 10. fisher: in shares
     of the range; a parameter that is not seen at all has a zero row and is in no group.
     """
     scaled, seen = normalised(fisher)
     visible = tuple(n for n, s in zip(names, seen, strict=True) if s)
     scale = np.sqrt(np.diag(fisher)[seen])
     left, found = tuple(range(len(visible))), []
-    while (index := index_of(scaled, left)) >= critical:
-        members = smallest(scaled, left, max(critical, EXPLAINS * index))
+    while (index := index_of(scaled, left)) >= CRITICAL:
+        members = smallest(scaled, left, max(CRITICAL, EXPLAINS * index))
         _, vectors = np.linalg.eigh(scaled[np.ix_(members, members)])
         moves = vectors[:, 0] / scale[list(members)]
         moves = moves / moves[int(np.argmax(np.abs(moves)))]
@@ -83,13 +84,6 @@ def collinearity_index(fisher: Array) -> float:
     return float(1.0 / np.sqrt(max(float(np.linalg.eigvalsh(scaled)[0]), SINGULAR)))
 
 
-def normalised(fisher: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the information matrix of the parameters that are seen, its diagonal scaled to 1, and which they are."""
-    scale = np.sqrt(np.maximum(np.diag(fisher), 0.0))
-    seen = np.isfinite(scale) & (scale > 0.0)
-    return np.asarray(fisher[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])), seen
-
-
 def index_of(scaled: Array, members: Members) -> float:
     return collinearity_index(scaled[np.ix_(members, members)])
 
@@ -98,7 +92,7 @@ def smallest(scaled: Array, among: Members, index: float) -> Members:
     """Return the smallest set, and of its size the worst, that comes to an index; all where none smaller does."""
     for size in range(2, (len(among) if len(among) <= MOST_TRIED else LARGEST_TRIED) + 1):
         worst = max(combinations(among, size), key=lambda members: index_of(scaled, members))
-        if index_of(scaled, worst) >= index or size == len(among):
+        if index_of(scaled, worst) >= index:
             return worst
     return among
 

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.estimation.design import Offer, identity
-from armid.estimation.examine import Examination, Group, collinearity_index, normalised
+from armid.estimation.examine import Examination, Group, collinearity_index
 from armid.estimation.identify import versions_of
-from armid.estimation.information import Level, level_weights, sensitivities
+from armid.estimation.information import Level, level_weights, normalised, sensitivities
 from armid.estimation.profile import THRESHOLD, Profile
-from armid.problem.space import Space
 from armid.report.document import (
     Column,
     Document,
@@ -107,8 +106,8 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
         rows.append((name, factor * p["value"], unit, profile_text(profile, factor),
                      ", ".join(word for word in (flag, bounded) if word),
                      deviation_of(result, name, p["deviation"]), curved))  # fmt: skip
-    columns = ["parameter", Column("value", "value", ".6g"), "unit", "95 % by profile", Column("remark", "remark"),
-               "deviation", "95 % by curvature"]  # fmt: skip
+    columns = ["parameter", Column("value", "value", ".6g"), "unit", "95 % by profile", "remark", "deviation",
+               "95 % by curvature"]  # fmt: skip
     note = "Remark: not above, not below: no bound on that side." if any(row[4] for row in rows) else ""
     return table("What the records say", columns, rows, note)
 
@@ -124,10 +123,10 @@ def profile_text(profile: Mapping[str, Any], factor: float) -> str:
     return f"{low if profile['bounded_low'] else f'box {low}'} to {high if profile['bounded_high'] else f'box {high}'}"
 
 
-def deviation_text(space: Space, i: int, deviation: float, value: float) -> str:
-    place = int(np.flatnonzero(space.free)[i])
+def deviation_text(found: Examination, i: int, deviation: float) -> str:
+    space, place = found.space, int(np.flatnonzero(found.space.free)[i])
     span = float(space.high[place] - space.low[place])
-    return scaled_text(space.names[place], space.units[place], span, deviation, value)
+    return scaled_text(space.names[place], space.units[place], span, deviation, float(found.x[i]))
 
 
 def scaled_text(name: str, unit: str, span: float, deviation: float, value: float) -> str:
@@ -222,7 +221,7 @@ def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
 def directions(fisher: Array, names: Sequence[str]) -> list[dict[str, Any]]:
     scaled, seen = normalised(fisher)
     kept = [n for n, s in zip(names, seen, strict=True) if s]
-    values, vectors = np.linalg.eigh(scaled) if kept else (np.empty(0), np.empty((0, 0)))
+    values, vectors = np.linalg.eigh(scaled)
     pairs = zip(values, vectors.T, strict=True)
     return [{"eigenvalue": float(value), "vector": by_name(kept, vector)} for value, vector in pairs]
 
@@ -240,8 +239,7 @@ def remarks(found: Examination) -> list[str]:
     said += [text for p in found.profiles if (text := profile_remark(found, p))]
     said += [f"With the constants within their tolerances, {text}." for text in found.combinations]
     if (found.wider > found.information.deviation).any():
-        each = (f"{n} {deviation_text(found.space, i, float(found.wider[i]), float(found.x[i]))}"
-                for i, n in enumerate(names))  # fmt: skip
+        each = (f"{n} {deviation_text(found, i, float(found.wider[i]))}" for i, n in enumerate(names))
         said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(each)}.")
     said += point_remarks(found) + level_remarks(found)
     if found.offers:
@@ -251,13 +249,12 @@ def remarks(found: Examination) -> list[str]:
 
 def group_remark(found: Examination, group: Group) -> str:
     span = (found.space.high - found.space.low)[found.space.free]
-    moves: list[str] = []
     leader = int(np.argmax(np.abs(group.direction)))
+    moves = []
     for name, share in zip(group.names, group.direction, strict=True):
         i = found.space.free_names.index(name)
-        change = 0.01 * (1.0 if len(moves) == leader else float(share)) * float(span[i])
-        text = deviation_text(found.space, i, abs(change), float(found.x[i]))
-        moves.append(f"{'+' if change >= 0.0 else '-'}{text} of {name}")
+        change = 0.01 * float(share) * float(span[i])
+        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(found, i, abs(change))} of {name}")
     followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
             f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
@@ -326,9 +323,7 @@ def level_text(level: Level, unit: str, noise: float) -> str:
 
 def offer_text(found: Examination, offer: Offer) -> str:
     i = offer.best
-    before, after = (
-        deviation_text(found.space, i, float(d[i]), float(found.x[i])) for d in (offer.before, offer.after)
-    )
+    before, after = (deviation_text(found, i, float(d[i])) for d in (offer.before, offer.after))
     return f"{offer.feasible.name}: {found.space.free_names[i]} from {before} to {after}"
 
 

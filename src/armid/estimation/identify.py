@@ -133,28 +133,9 @@ def identify(
 
     Starts of train records in motion are fitted with the parameters, about those of the least-squares estimate. Holdout
     records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so far is
-    judged, `stopped` is "interrupted".
-
-    Parameters
-    ----------
-    campaign, model, space
-        The records, the model and the box of its parameters.
-    fitness, identifier, seed
-        What is minimised, by which method, and the seed of its random numbers.
-    budget : int
-        Simulations; one candidate through all train records counts as one.
-    target : float
-        Fitness at which to stop (the paper's step 7).
-    accuracy : {"standard", "fine"}
-        Of the engine; None: as the noise of each record asks for.
-    progress : callable
-        Called with the meter after each generation.
-
-    Raises
-    ------
-    ArmidError
-        For a negative seed, a budget too large, a target that is not finite, a fitness that the identifier cannot
-        minimise, and when every candidate diverged.
+    judged, `stopped` is "interrupted". Arguments are those of `armid.identify`. Raises ArmidError for a negative seed,
+    a budget too large, a target that is not finite, a fitness that the identifier cannot minimise, and when every
+    candidate diverged.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ArmidError(f"the seed is {seed!r}, a whole number of at least 0 is expected")
@@ -164,10 +145,10 @@ def identify(
         # a whole number may have more digits than any float
         raise ArmidError(f"the budget is {quoted(budget)}, expected at most {LARGEST_BUDGET:,} simulations")
     identifier.refuse(fitness)
-    identifier.build(Meter(budget, target).budget)  # refuses bad options before anything is calibrated
-    train = replays(campaign.train, model, space, accuracy)
-    train = with_fitted_starts(train, space)
     meter = Meter(budget, target)
+    identifier.build(meter.budget)  # refuses bad options before anything is calibrated
+    train = with_fitted_starts(replays(campaign.train, model, space, accuracy), space)
+    seen = judged_by(fitness, train)
     if space.free.any():
         stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
         if meter.best_x is None:
@@ -177,15 +158,12 @@ def identify(
         # what rounding alone keeps off a bound is held by it
         low, high = space.low[space.free], space.high[space.free]
         x = np.where(meter.best_x - low < ROUNDING * (high - low), low, meter.best_x)
-        x = np.where(high - x < ROUNDING * (high - low), high, x)
+        x, value = np.where(high - x < ROUNDING * (high - low), high, x), meter.best_f
     else:
         stopped, x = "no parameter is free", np.empty(0)
-    candidate, seen = space.complete(x[np.newaxis])[0], judged_by(fitness, train)
-    if len(x):
-        value = meter.best_f
-    else:  # nobody has asked for its fitness yet
-        signals, measured = signals_of(seen, candidate[np.newaxis]), [r.measured for r in seen]
+        signals, measured = signals_of(seen, space.complete(x[np.newaxis])), [r.measured for r in seen]
         value = float(fitness_of(fitness, seen, measured, signals, weights_of(fitness, seen), output_sizes(seen))[0])
+    candidate = space.complete(x[np.newaxis])[0]
     holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     errors = campaign_errors(train, candidate)
     assert errors is not None
@@ -213,11 +191,17 @@ def search(
                 progress(meter)
             return interrupted() or meter.reached or meter.exhausted
 
+        def after_generation(running: Algorithm) -> None:
+            if is_over():
+                running.termination.terminate()
+                running.termination.update(running)
+
         try:
             if can_run_directly(algorithm):
                 run_directly(algorithm, problem, seed, is_over)
             else:
-                run_by_pymoo(algorithm, problem, meter, seed, is_over)
+                minimize(problem, algorithm, MeterTermination(meter), seed=seed, callback=after_generation,
+                         copy_algorithm=False)  # fmt: skip
         except BudgetIgnoredError:
             if meter.best_x is None:
                 raise
@@ -235,18 +219,6 @@ def search(
     if meter.exhausted:
         return "budget used" if meter.target is None else "budget used, target not reached"
     return f"{identifier.name} stopped by itself"
-
-
-def run_by_pymoo(
-    algorithm: Algorithm, problem: IdentificationProblem, meter: Meter, seed: int, is_over: Callable[[], bool]
-) -> None:
-    def after_generation(running: Algorithm) -> None:
-        if is_over():
-            running.termination.terminate()
-            running.termination.update(running)
-
-    options = {"seed": seed, "callback": after_generation, "copy_algorithm": False}
-    minimize(problem, algorithm, MeterTermination(meter), **options)
 
 
 def versions_of(packages: Sequence[str]) -> dict[str, str]:

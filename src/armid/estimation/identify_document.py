@@ -44,6 +44,7 @@ from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, pyplot
 from armid.units import SHOWN, shown
 
+Array = NDArray[np.float64]
 MOST_FITS_DRAWN = 8
 # Letters of a title that fit above one column.
 LINE = 60
@@ -59,10 +60,9 @@ def fit_figure(found: Identification) -> Any:
     figure, axes = record_axes(len(replays), 4.4, (3, 1.4))
     for pair, replay in zip(axes, replays, strict=True):
         factor, unit = shown(1.0, replay.record.unit)
-        measured, simulated = replay.measured, replay.signal(found.candidate[np.newaxis])[0]
-        rms = factor * np.sqrt(np.mean((measured - simulated) ** 2))
+        curves = curves_of(replay, found.candidate)
+        rms = factor * np.sqrt(np.mean(curves["residual"] ** 2))
         pair[0].set_title(f"{replay.name} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
-        curves = {"measured": measured, "simulated": simulated, "residual": measured - simulated}
         draw_record(pair, {name: (replay.times, y) for name, y in curves.items()}, replay.record.unit)
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=2, frameon=False)
     there_are = len(found.train_replays) + len(found.holdout_replays)
@@ -71,6 +71,11 @@ def fit_figure(found: Identification) -> Any:
     title = f"{found.campaign.name}: {model}, {found.identifier} on {found.fitness.name}{some}"
     figure.suptitle(fill(title, LINE * (1 if len(replays) == 1 else 2)), fontsize="large")
     return figure
+
+
+def curves_of(replay: Replay, candidate: Array) -> dict[str, Array]:
+    measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])[0]
+    return {"measured": measured, "simulated": simulated, "residual": measured - simulated}
 
 
 def chosen(found: Identification) -> list[Replay]:
@@ -113,7 +118,9 @@ def convergence_figure(found: Identification) -> Any:
     evaluations, values = found.trace
     x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
     figure, axis = pyplot().subplots(figsize=(6.8, 4.2), layout="constrained")
-    si_unit = fitness_unit(found)
+    # the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs
+    units = {r.record.unit for r in judged_by(found.fitness, found.train_replays)}
+    si_unit = next(iter(units)) if found.fitness.unit == "signal" and len(units) == 1 else ""
     factor, unit = shown(1.0, si_unit) if si_unit else (1.0, "")
     height = 1.0 - y if similarity else y * factor
     axis.step(x, height, where="post", color=OKABE_ITO["blue"], lw=1.8)
@@ -130,13 +137,6 @@ def convergence_figure(found: Identification) -> Any:
     return figure
 
 
-def fitness_unit(found: Identification) -> str:
-    """Return the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs."""
-    seen = {r.record.unit: r.record.output for r in judged_by(found.fitness, found.train_replays)}
-    return next(iter(seen)) if found.fitness.unit == "signal" and len(seen) == 1 else ""
-
-
-Array = NDArray[np.float64]
 PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {"convergence": ("The search", "Best so far against the number of simulations.")}
@@ -346,15 +346,12 @@ def details_of(found: Identification) -> dict[str, Any]:
 
     Of long records each curve keeps the samples that `thinned` chooses.
     """
-    replays, records = (*found.train_replays, *found.holdout_replays), []
-    for replay in replays[:MOST_RECORDS]:
-        measured, simulated = replay.measured, replay.signal(found.candidate[np.newaxis])[0]
-        curves = {"measured": measured, "simulated": simulated, "residual": measured - simulated}
-        records.append({
-            "file": replay.name, "role": replay.record.role, "noise_rms": replay.record.noise.rms,
-            "unit": replay.record.unit,
-            "n_samples": len(measured), "curves": {name: curve_entry(replay.times, y) for name, y in curves.items()},
-        })  # fmt: skip
+    replays = (*found.train_replays, *found.holdout_replays)
+    records = [{
+        "file": r.name, "role": r.record.role, "noise_rms": r.record.noise.rms, "unit": r.record.unit,
+        "n_samples": len(r.measured),
+        "curves": {name: curve_entry(r.times, y) for name, y in curves_of(r, found.candidate).items()},
+    } for r in replays[:MOST_RECORDS]]  # fmt: skip
     return {
         "remarks": remarks(found),
         "known_first": ranked(found)[:MOST_KNOWN_FIRST],

@@ -1,7 +1,7 @@
 """How well records pin down parameters: sensitivities, Fisher information, intervals, correlations."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.special import fdtrc
 
 from armid.engine import simulate
 from armid.errors import ArmidError
+from armid.estimation.constants import with_constants
 from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
 from armid.problem.problem import Replay
 from armid.problem.space import Space
@@ -26,6 +27,8 @@ SINGULAR = 1e-13
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
 # Chance below which a residual is no noise; independent samples in the blocks whose means are looked at.
 CHANCE, BLOCKS = 1e-3, (8, 32)
+# Parameters of a larger correlation than this cannot be told apart well.
+CORRELATED = 0.95
 # What is assumed for a record without noise, as a share of its rms speed.
 ASSUMED = 1e-3
 
@@ -57,9 +60,9 @@ class Information:
     names: tuple[str, ...]
     deviation: Array
     correlation: Array
-    levels: tuple[Level, ...] = ()
-    step: Array = field(default_factory=lambda: np.empty(0))
-    fisher: Array = field(default_factory=lambda: np.empty((0, 0)))
+    levels: tuple[Level, ...]
+    step: Array
+    fisher: Array
 
     @property
     def half_width(self) -> Array:
@@ -154,55 +157,56 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
 
 def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
     """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,)."""
-    candidate = records.space.complete(records.values(z)[np.newaxis])
+    candidate = records.whole(z[np.newaxis])
     for outputs in by_file(records.replays):
         replay, row = outputs[0], 0
         # a speed held for a second is the size of a position
         move = 1e-4 * replay.model.plant.scales.speed
         for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
-                runs = []
-                for sign in (1.0, -1.0):
-                    constants = dict(piece.manoeuvre.constants)
-                    constants[name] = constants.get(name, 0.0) + sign * move
-                    manoeuvre = replace(piece.manoeuvre, constants=constants)
-                    runs.append(simulate(replay.model, manoeuvre, candidate, calibration.schedule).outputs[:, 0])
+                start = piece.manoeuvre.constants.get(name, 0.0)
+                either = (with_constants(piece, {name: start + side}).manoeuvre for side in (move, -move))
+                above, below = (simulate(replay.model, m, candidate, calibration.schedule).outputs[:, 0]
+                                for m in either)  # fmt: skip
                 changes = [np.zeros(r.record.n_samples) for r in records.replays]
-                slopes = (runs[0] - runs[1])[:, piece.window] / (2.0 * move)
-                for i in (i for i, r in enumerate(records.replays) if r in outputs):
-                    slope = slopes[records.replays[i].place]
-                    changes[i][row : row + piece.n_samples] = deviation * slope
+                slopes = (above - below)[:, piece.window] / (2.0 * move)
+                for change, r in zip(changes, records.replays, strict=True):
+                    if r in outputs:
+                        change[row : row + piece.n_samples] = deviation * slopes[r.place]
                 yield records.weighted(changes)
             row += piece.n_samples
 
 
 def inverse(matrix: Array) -> Array:
-    scale = np.sqrt(np.diag(matrix))
-    seen = np.isfinite(scale) & (scale > 0.0)
+    scaled, seen = normalised(matrix)
     result = np.full(matrix.shape, np.nan)
     np.fill_diagonal(result, np.inf)
     if not seen.any():
         return result
-    scaled = matrix[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])
     values, vectors = np.linalg.eigh(scaled)
     good = values > SINGULAR * values.max()
     part = (vectors[:, good] / values[good]) @ vectors[:, good].T
     lost = (vectors[:, ~good] ** 2).sum(axis=1) > 1e-6
-    part /= np.outer(scale[seen], scale[seen])
+    scale = np.sqrt(np.diag(matrix)[seen])
+    part /= np.outer(scale, scale)
     part[lost, :], part[:, lost] = np.nan, np.nan
     part[lost, lost] = np.inf
     result[np.ix_(seen, seen)] = part
     return result
 
 
-def collinear(information: Information, above: float = 0.95) -> list[tuple[str, str, float]]:
+def normalised(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the information matrix of the parameters that are seen, its diagonal scaled to 1, and which they are."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    seen = np.isfinite(scale) & (scale > 0.0)
+    return np.asarray(matrix[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])), seen
+
+
+def collinear(information: Information) -> list[tuple[str, str, float]]:
     """Return the pairs of parameters that cannot be told apart well, strongest first: names and correlation."""
     names, correlation = information.names, information.correlation
-    pairs = [
-        (names[i], names[j], float(correlation[i, j]))
-        for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > above
-    ]  # fmt: skip
-    return sorted(pairs, key=lambda pair: -abs(pair[2]))
+    pairs = [(names[i], names[j], float(correlation[i, j])) for i in range(len(names)) for j in range(i)]
+    return sorted((pair for pair in pairs if abs(pair[2]) > CORRELATED), key=lambda pair: -abs(pair[2]))
 
 
 def level_of(replay: Replay, space: Space, x: Array) -> Level:

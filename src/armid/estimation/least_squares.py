@@ -75,10 +75,16 @@ class LeastSquaresProblem:
     def measured(self) -> Array:
         return self.weighted([r.measured for r in self.replays])
 
+    def whole(self, Z: Array) -> Array:
+        """Return candidates in shares with all their parameters, SI, (n_candidates, n_parameters)."""
+        return self.space.complete(self.values(Z))
+
+    def simulated(self, Z: Array) -> list[Array]:
+        return signals_of(self.replays, self.whole(Z))
+
     def signals(self, Z: Array) -> Array:
         """Return weighted simulated signals of candidates in shares, shape (n_candidates, n_samples)."""
-        whole = self.space.complete(self.values(Z))
-        return self.weighted(signals_of(self.replays, whole))
+        return self.weighted(self.simulated(Z))
 
     def residuals(self, Z: Array) -> Array:
         """Return measured minus simulated of candidates, (n_candidates, n_samples); NaN where one diverges."""
@@ -132,10 +138,10 @@ def weighted_records(
 
     Alike: 1, or where records hold several outputs 1 over the size of the output.
     """
-    levels = [r.record.noise.rms for r in replays]
-    alike = 1.0 / output_sizes(replays) if min(levels, default=0.0) == 0.0 else np.empty(0)
-    by_noise = alike if len(alike) else (1.0 / level for level in levels)
-    return WeightedRecords(replays, space, tuple(map(float, by_noise if weights is None else weights)))
+    if weights is None:
+        levels = np.array([r.record.noise.rms for r in replays])
+        weights = list(1.0 / (levels if levels.all() else output_sizes(replays)))
+    return WeightedRecords(replays, space, tuple(map(float, weights)))
 
 
 # Starts and parameters are fitted in turn, at most so often, until none moves by more than this share of its range.

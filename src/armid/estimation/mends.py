@@ -4,11 +4,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.estimation.constants import of_pieces, with_constants
+from armid.estimation.design import range_of
 from armid.model import Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record
 from armid.record.start import Track, state_shown
@@ -147,7 +148,7 @@ def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
 
 
 def may_be_radians(key: ManoeuvreKey, value: float) -> bool:
-    low, high = (-np.inf if key.low is None else key.low), (np.inf if key.high is None else key.high)
+    low, high = range_of(key)
     return 0.0 < abs(value) <= 2.0 * np.pi and low <= DEGREES * value <= high
 
 
@@ -161,16 +162,6 @@ def swapped(constants: Mapping[str, float], a: str, b: str) -> dict[str, float]:
 
 def multiplied(constants: Mapping[str, float], names: Iterable[str], factor: float) -> dict[str, float]:
     return {name: factor * constants[name] for name in names}
-
-
-def of_pieces(undo: Callable[..., Piece], **told: Any) -> Callable[[Record], Record]:
-    """Return what undoes something in each piece of each output of a file."""
-
-    def undone(record: Record) -> Record:
-        others = tuple(map(undone, record.others))
-        return replace(record, pieces=tuple(undo(p, **told) for p in record.pieces), others=others)
-
-    return undone
 
 
 def scaled(record: Record, plant: Plant, output: str, factor: float) -> Record:
@@ -232,15 +223,9 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
     return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index)[0]
 
 
-def with_constants(piece: Piece, constants: Mapping[str, float]) -> Piece:
-    manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
-    return replace(piece, manoeuvre=manoeuvre)
-
-
 def with_keys_changed(
     piece: Piece, defaults: Mapping[str, float], change: Callable[[Mapping[str, float]], dict[str, float]]
 ) -> Piece:
-    """Return a piece with what some keys of its own manoeuvre set changed."""
     return with_constants(piece, change({**defaults, **piece.manoeuvre.constants}))
 
 

@@ -5,6 +5,7 @@ the declared model is fitted roughly to the train records; where it misses more 
 of mistakes is undone in turn, and one is named only where that takes away most of the misfit.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -13,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
+from armid.estimation.constants import of_pieces, with_constants
 from armid.estimation.least_squares import WeightedRecords, descend
-from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, of_pieces, rms, with_constants
+from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, rms
 from armid.model import Manoeuvre, Model, Plant
-from armid.problem.problem import Replay, signals_of
+from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
@@ -118,10 +120,9 @@ class Trial:
 
     def errors(self, records: Sequence[Record], Z: Array) -> Array:
         """Return the error of each record at candidates in shares, (n_candidates, n_records), inf where it diverges."""
-        problem, Z = self.problem(records), np.atleast_2d(Z)
-        signals = signals_of(problem.replays, self.space.complete(problem.values(Z)))
-        squares = [np.sum((w * (signal - r.measured)) ** 2, axis=1)
-                   for w, r, signal in zip(problem.weights, problem.replays, signals, strict=True)]  # fmt: skip
+        problem = self.problem(records)
+        of = zip(problem.weights, problem.replays, problem.simulated(np.atleast_2d(Z)), strict=True)
+        squares = [np.sum((w * (signal - r.measured)) ** 2, axis=1) for w, r, signal in of]
         counts = np.array([len(r.each) for r in records])
         means = np.add.reduceat(np.array(squares).T, np.cumsum(counts) - counts, axis=1) / counts
         return np.asarray(np.nan_to_num(np.sqrt(means), nan=np.inf))
@@ -150,8 +151,7 @@ class Trial:
         return record
 
     def signals(self, record: Record, Z: Array) -> list[Array]:
-        problem = self.problem([record])
-        return [np.nan_to_num(x) for x in signals_of(problem.replays, self.space.complete(problem.values(Z)))]
+        return [np.nan_to_num(x) for x in self.problem([record]).simulated(Z)]
 
     def likeness(self, record: Record) -> float:
         problem, Z = self.problem([record]), self.spread([record])
@@ -166,8 +166,7 @@ class Trial:
         """Return by how many samples the first piece comes too late, 0 where no shift makes it more alike."""
         piece = record.pieces[0]
         x, n = piece.measured[piece.window], piece.n_samples
-        problem = self.problem([replace(record, pieces=(piece,), others=())])
-        signals = np.nan_to_num(problem.replays[0].signal(self.space.complete(problem.values(Z))))
+        (signals,) = self.signals(replace(record, pieces=(piece,), others=()), Z)
         product = np.fft.irfft(np.fft.rfft(x, 2 * n) * np.conj(np.fft.rfft(signals, 2 * n)), axis=-1)
         shifts = np.arange(-int(MOST_SHIFT * n), int(MOST_SHIFT * n) + 1)
         # energy of both in the part that they then have in common
@@ -489,10 +488,8 @@ def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
     owner = np.concatenate([np.full(len(p), i) for i, p in enumerate(prints)])
     _, place, counts = np.unique(np.concatenate(prints), return_inverse=True, return_counts=True)
     shared = np.flatnonzero(counts[place] > 1)
-    pairs: dict[tuple[int, int], int] = {}
-    for group in np.split(owner[shared][np.argsort(place[shared], kind="stable")], np.cumsum(counts[counts > 1])[:-1]):
-        for pair in combinations(np.unique(group).tolist(), 2):
-            pairs[pair] = pairs.get(pair, 0) + 1
+    groups = np.split(owner[shared][np.argsort(place[shared], kind="stable")], np.cumsum(counts[counts > 1])[:-1])
+    pairs = Counter(pair for group in groups for pair in combinations(np.unique(group).tolist(), 2))
     for (i, j), n in sorted(pairs.items()):
         a, b = records[i], records[j]
         if (a.repeat_of or a.file) == (b.repeat_of or b.file):
