@@ -426,7 +426,7 @@ def largest_named(levels: Sequence[SearchLevel], search: Search) -> tuple[Fit, l
     refused = None
     for level in reversed(levels):
         chosen = search.ordered(search.pruned(inside_its_ranges(level)))
-        search.exchange_twins(chosen)
+        search.exchange_all(chosen)
         groups = [group_of(chosen, key, search.of_size(len(chosen.active))) for key in chosen.active]
         big = [g for g in groups if g.too_big]
         if not big:

@@ -90,7 +90,7 @@ class Search:
 
     fits: every model that was fitted, by its effects. scores: of the candidates at each of them. rounds: the log.
     limit: chi2 to which a model must be able to come, else it is given up. enough: asked of each level that earned its
-    effects, whether to look no further.
+    effects, whether to look no further. exchanged: models in which substitutes were tried.
     """
 
     library: Library
@@ -99,6 +99,7 @@ class Search:
     rounds: list[Round] = field(default_factory=list)
     limit: float = np.inf
     enough: Callable[[SearchLevel], bool] = lambda _: False
+    exchanged: set[Active] = field(default_factory=set)
 
     def start(self) -> Fit:
         """Return the declared model at its estimate."""
@@ -195,7 +196,7 @@ class Search:
     def extend(self, parent: Fit) -> None:
         """Fit a model with each of the leading candidates added, beyond the first few where it is in reach.
 
-        Of those that do the same one stands for all; `exchange_twins` puts the others in its place.
+        Of those that do the same one stands for all; `exchange_all` puts the others in its place.
         """
         least = WORTH * max(1.0, parent.chi2 / len(parent.residual))
         worth = [s for s in self.scores_at(parent) if s.drop > least and s.twin is None]
@@ -237,6 +238,7 @@ class Search:
         Where the effect has its shapes free they are so in its place too, else it would lose by the width of a sign.
         """
         tried: dict[frozenset[EffectKey], Trial] = {}
+        self.exchanged.add(best.active)
         for rival in substitutes(best, self.library):
             is_free = rival.place.free_shape and bool(self.library.fixed_shapes(rival.key))
             for key in (rival.key, replace(rival.key, free_shape=True))[: 1 + is_free]:
@@ -248,11 +250,14 @@ class Search:
         """Return the candidates that were left out of the search as they do the same as one of some."""
         return {s.key for found in self.scores.values() for s in found if s.twin is not None and s.twin in keys}
 
-    def exchange_twins(self, fit: Fit) -> None:
-        """Fit the models in which what does the same as an effect stands in its place, where none of them is known."""
+    def exchange_all(self, fit: Fit) -> None:
+        """Fit the models in which a substitute stands in the place of an effect, where that is not done yet.
+
+        So it is with what does the same as an effect, and with a model whose shapes were set free at the very end.
+        """
         known, mine = {frozenset(declared_keys(active)) for active in self.fits}, declared_keys(fit.active)
         others = (mine - {key} | {twin} for key in mine for twin in self.twins_of({key}) - mine)
-        if any(frozenset(other) not in known for other in others):
+        if fit.active not in self.exchanged or any(frozenset(other) not in known for other in others):
             self.exchange_substitutes(fit)
 
     def free_shapes(self, fits: Iterable[Fit]) -> None:
