@@ -91,7 +91,7 @@ class LoopStudy:
             wanted = self.candidates_for(case)
             settings = {
                 "kind": self.kind, "campaigns": spec.campaigns, "bounds": spec.bounds, "fixed": spec.fixed,
-                "seed": spec.seed, "candidates": list(wanted), "own": self.registry.own("effects", *wanted),
+                "seed": spec.seed, "candidates": list(wanted), "own": self.registry.digests_of("effects", *wanted),
                 "case": case, "digest": digest,
             }  # fmt: skip
             yield planned(settings, case, CLOSES_LOOP, "", None, WHOLE, spec.seed, 0)

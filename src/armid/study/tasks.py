@@ -213,7 +213,7 @@ class Study:
         performed: performs a run in a process of its own, which what a user's function does cannot harm.
         """
         for entry in self.entries:
-            if self.registry.own("identifiers", entry.name):
+            if self.registry.digests_of("identifiers", entry.name):
                 settings = {"kind": self.kind, "only_built": True, "identifier": entry.name,
                             "options": dict(entry.options), "budget": entry.budget}  # fmt: skip
                 outcome = performed(ClaimedRun(entry.label, json.dumps(settings)))
@@ -274,7 +274,7 @@ class Study:
         fitnesses = entry.fitness if case.suite is None else (case.suite.definition.fitness,)
         choices = product(self.spec.windows_s, noises, fitnesses, entry.budgets(len(case.bounds)))
         for window, noise, fitness, budget in choices:
-            own = self.registry.own("fitness", fitness) | self.registry.own("identifiers", entry.name)
+            own = self.registry.digests_of("fitness", fitness) | self.registry.digests_of("identifiers", entry.name)
             settings = shared | {
                 "identifier": entry.name, "options": dict(entry.options), "budget": budget, "fitness": fitness,
                 "noise_deg_s": noise, "window_s": window, "seed": seed, "own": shared["own"] | own,
@@ -288,7 +288,7 @@ class Study:
         settings: dict[str, Any] = {
             "kind": self.kind, "case": case.name, "plant": plant, "effects": effects, "bounds": case.bounds,
             "fixed": case.fixed, "accuracy": self.spec.accuracy,
-            "own": self.registry.own("plants", plant) | self.registry.own("effects", *effects),
+            "own": self.registry.digests_of("plants", plant) | self.registry.digests_of("effects", *effects),
         }  # fmt: skip
         if case.suite is not None:
             return settings | {"suite": (case.suite.name, case.suite.version)}
@@ -362,7 +362,7 @@ def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
         for fitness in asked:
             identifier.refuse(fitness)
         built = identifier.with_options(entry.options)
-        if not registry.own("identifiers", entry.name):
+        if not registry.digests_of("identifiers", entry.name):
             built.build(entry.budget)
     except ArmidError as error:
         raise ArmidError(f"{where}: {error}") from error

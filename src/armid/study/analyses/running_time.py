@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
@@ -57,7 +57,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
 RUNNING_TIME = Analysis("running_time", "Cost of the truth", parts, "simulations until the parameters are right")
 
 
-def share_hit(hits: Array, grid: NDArray[np.int64]) -> Array:
+def share_hit(hits: Array, grid: ArrayLike) -> Array:
     """Return the share of (run, target) pairs that are hit within each number of simulations, (n_grid,).
 
     hits: (n_runs, n_targets), infinite for never. No restarts are assumed: a run that ends early stays where it ended.
@@ -108,7 +108,7 @@ def ecdf_figure(evidence: Evidence) -> Any:
 
 
 def share_panels(
-    curves: Sequence[tuple[str, Array, Mapping[str, Array]]], colours: Mapping[str, int], columns: int, width: float
+    curves: Sequence[tuple[str, ArrayLike, Mapping[str, Array]]], colours: Mapping[str, int], columns: int, width: float
 ) -> tuple[Any, list[Any]]:
     """Draw shares that rise with the simulations, one panel each. curves: title, simulations, and name -> share."""
     figure, axes = panels(len(curves), columns, width, panel_height(len(colours)))
