@@ -18,7 +18,7 @@ from armid.model import Manoeuvre, Model, Plant
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, SuiteProblem
 from armid.record import Campaign, Noise, Override, Piece, Record, read_campaign
-from armid.record.reader import campaign_path, record_constants
+from armid.record.reader import NAME, campaign_path, record_constants
 from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.spec import (
@@ -29,7 +29,6 @@ from armid.study.spec import (
     StudyRegistry,
     StudySpec,
     SuiteSpec,
-    lookup,
 )
 
 Array = NDArray[np.float64]
@@ -41,20 +40,12 @@ KNOWN = "known"
 FINER = 8
 
 
-@dataclass(frozen=True)
-class Source:
-    """A campaign that is read: folder, relative to the study's file, files, and a hash of them and campaign.toml."""
-
-    campaign: str
-    records: tuple[str, ...]
-    digest: str
-
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """Hold one case: manoeuvres to simulate (strokes), a campaign to read (source) or a problem of `armid.suite()`.
 
-    truth: parameter -> true value, SI, empty where not known. published: values of others to stand beside.
+    truth: parameter -> true value, SI, empty where not known. published: values of others to stand beside. source:
+    campaign, its folder relative to the study's file; records, its files; digest, of them and campaign.toml.
     """
 
     name: str
@@ -63,7 +54,7 @@ class Case:
     truth: Mapping[str, float] = field(default_factory=dict)
     published: Mapping[str, float] = field(default_factory=dict)
     strokes: tuple[dict[str, Any], ...] = ()
-    source: Source | None = None
+    source: dict[str, Any] | None = None
     suite: SuiteProblem | None = None
 
     @property
@@ -155,17 +146,15 @@ def _campaign_case(
     campaign = _with_records(read_campaign(path, registry.plants, registry.effects), entry.records, where)
     if campaign.plant.name not in {v.name for v in registry.plants[spec.plant].variants} | {spec.plant}:
         raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{spec.plant}' is expected")
-    model = campaign.model(registry.effects)
-    for name in dict.fromkeys(spec.effects):
-        if name not in campaign.effects:
-            model = model + lookup(registry.effects, name, "effect", where)
+    further = [name for name in dict.fromkeys(spec.effects) if name not in campaign.effects]
+    model = registry.with_effects(campaign.model(registry.effects), further, where)
     space = _space(model, campaign.parameters, spec, entry, where)
     for window in spec.windows_s:
         if not isinstance(window, str):
             for record in campaign.records:
                 with_window(record, window, f"{where}, windows_s")
     files = tuple(r.file for r in campaign.records)
-    source = Source(folder_name, files, digest_of(path, ("campaign.toml", *files)))
+    source = {"campaign": folder_name, "records": files, "digest": digest_of(path, (NAME, *files))}
     return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source)
 
 
@@ -196,6 +185,13 @@ def _with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -
     if not some.train:
         raise ArmidError(f"{where}: none of the records {', '.join(files)} has the role 'train'")
     return some
+
+
+def unchanged_campaign(folder: Path, files: Iterable[str], digest: str, name: str, registry: StudyRegistry) -> Campaign:
+    """Read a campaign whose files are still those that were hashed; name: as the study calls it."""
+    if digest_of(folder, files) != digest:
+        raise ArmidError(f"campaign {name} has changed since the study was started: start it again")
+    return read_campaign(folder, registry.plants, registry.effects)
 
 
 def digest_of(folder: Path, files: Iterable[str]) -> str:

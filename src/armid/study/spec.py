@@ -9,6 +9,7 @@ from typing import Any
 
 from armid.engine.calibrate import ALLOWED
 from armid.errors import ArmidError
+from armid.model import Model
 from armid.record.schema import (
     Kind,
     KindError,
@@ -262,6 +263,11 @@ class StudyRegistry(Registry):
             return self.identifier_of(name)
         except ArmidError as error:
             raise ArmidError(f"{where}: {error}") from error
+
+    def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
+        for name in names:
+            model = model + lookup(self.effects, name, "effect", where)
+        return model
 
     def digests_of(self, kind: str, *names: str) -> dict[str, str]:
         """Return `kind name` -> hash for those of the names that are the user's own; chains are looked into."""

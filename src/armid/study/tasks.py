@@ -13,7 +13,7 @@ import errno
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from itertools import product
@@ -198,9 +198,8 @@ class Study:
         spec = validated(StudySpec, table, where)
         if spec.report not in REPORTS:
             raise unknown_name("report", spec.report, REPORTS[1:], where)
-        model = Model(lookup(registry.plants, spec.plant, "plant", where))
-        for name in spec.effects:
-            model = model + lookup(registry.effects, name, "effect", where)
+        plant = Model(lookup(registry.plants, spec.plant, "plant", where))
+        model = registry.with_effects(plant, spec.effects, where)
         entries = _entries(spec, registry, where)
         cases = cases_of(spec, model, registry, folder, where)
         for entry in entries:
@@ -293,7 +292,7 @@ class Study:
         if case.suite is not None:
             return settings | {"suite": (case.suite.name, case.suite.version)}
         if case.source is not None:
-            return settings | {"campaign": asdict(case.source)}
+            return settings | {"campaign": case.source}
         return settings | {
             "truth": case.truth, "strokes": case.strokes, "interval_s": self.spec.interval_s,
             "noise_seed": self.spec.noise_seed,
@@ -404,8 +403,8 @@ def _case_description(case: Case) -> dict[str, Any]:
         "fixed": case.fixed,
         "units": dict(zip(case.space.names, case.space.units, strict=True)),
         "effects": [e.name for e in case.model.effects],
-        "campaign": case.source.campaign if case.source else None,
-        "records": list(case.source.records) if case.source else len(case.strokes),
+        "campaign": case.source["campaign"] if case.source else None,
+        "records": list(case.source["records"]) if case.source else len(case.strokes),
     } | ({} if case.suite is None else suite_description(case.suite))
 
 
