@@ -123,7 +123,8 @@ def _case(
     if entry.records is not None:
         raise ArmidError(f"{where}: 'records' are files of a campaign, and no campaign is given")
     space = _space(model, {}, spec, entry, where)
-    return _simulated_case(entry.name, entry.truth, entry.published, entry.manoeuvres, space, spec, model, where)
+    case = Case(entry.name, model, space, dict(entry.truth), dict(entry.published))
+    return _simulated_case(case, entry.manoeuvres, spec, where)
 
 
 def _space(
@@ -202,23 +203,16 @@ def digest_of(folder: Path, files: Iterable[str]) -> str:
     return digest.hexdigest()
 
 
-def _simulated_case(
-    name: str,
-    truth: Mapping[str, float],
-    published: Mapping[str, float],
-    manoeuvres: Sequence[Mapping[str, Any]],
-    space: Space,
-    spec: StudySpec,
-    model: Model,
-    where: str,
-) -> Case:
-    if model.plant.inputs:
-        raise ArmidError(f"{where}: plant '{model.plant.name}' is driven by {model.plant.inputs[0].name}, which no "
-                         "manoeuvre tells: a campaign is expected")  # fmt: skip
-    strokes = tuple(_stroke(m, spec, model.plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
+def _simulated_case(case: Case, manoeuvres: Sequence[Mapping[str, Any]], spec: StudySpec, where: str) -> Case:
+    """Return a case with manoeuvres to simulate, and with the true value of every parameter."""
+    plant = case.model.plant
+    if plant.inputs:
+        raise ArmidError(f"{where}: plant '{plant.name}' is driven by {plant.inputs[0].name}, which no manoeuvre "
+                         "tells: a campaign is expected")  # fmt: skip
+    strokes = tuple(_stroke(m, spec, plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
     if not any(s["role"] == "train" for s in strokes):
         raise ArmidError(f"{where}: no manoeuvre has the role 'train', at least one is expected")
-    case = Case(name, model, space, _completed(truth, model, where), dict(published), strokes)
+    case = replace(case, truth=_completed(case.truth, case.model, where), strokes=strokes)
     _check_truth(case, where)
     _check_windows(case, spec, where)
     return case
@@ -289,7 +283,7 @@ def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:
     points = (parts + rng.random(parts.shape)) / n
     whole = space.complete(low + (high - low) * (wanted.margin + (1.0 - 2.0 * wanted.margin) * points))
     truths = [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
-    first = _simulated_case("", truths[0], {}, wanted.manoeuvres, space, spec, model, where)
+    first = _simulated_case(Case("", model, space, truths[0]), wanted.manoeuvres, spec, where)
     names = [f"random {i:0{len(str(n))}d}" for i in range(1, n + 1)]
     return [replace(first, name=name, truth=_completed(t, model, where)) for name, t in zip(names, truths, strict=True)]
 

@@ -387,15 +387,11 @@ def start_of(pid: int) -> str:
 
 
 def is_gone(process: ProcessIdentity) -> bool:
-    """Tell whether a process of this place has surely ended; one of another place never surely has."""
-    if process.place != this_place():
-        return False
+    """Tell whether a process of this place has surely ended."""
     if process.start:
         return start_of(process.pid) != process.start
     try:
         os.kill(process.pid, 0)
-    except ProcessLookupError:
-        return True
-    except OSError:
-        return False
+    except OSError as error:
+        return isinstance(error, ProcessLookupError)
     return False

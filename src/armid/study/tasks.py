@@ -118,8 +118,7 @@ def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
             raise
         if of_machine(error):
             raise MachineError(f"the machine, not a run, is at fault: {sentence(error)}") from error
-        seconds = time.perf_counter() - began
-        return Outcome(run.run, FAILED, sentence(error), seconds=seconds, started_at=started_at)
+        return Outcome(run.run, FAILED, sentence(error), 0, time.perf_counter() - began, started_at)
     seconds = time.perf_counter() - began
     return Outcome(run.run, DONE, "", made.used, seconds, started_at, made.model, versions(), made.rows)
 
@@ -422,12 +421,10 @@ def window_text(window: Sequence[float] | str) -> str:
 
 def _parameter_rows(space: Space, x: np.ndarray, train: tuple[Replay, ...]) -> list[tuple[Any, ...]]:
     """Return value, bounds, Cramer-Rao deviation, largest correlation and flag of each free parameter."""
-    information = information_at(train, space, x)
-    low, high = space.low[space.free], space.high[space.free]
-    units = [u for u, f in zip(space.units, space.free, strict=True) if f]
+    information, free = information_at(train, space, x), space.only(space.free_names)
     sizes = np.abs(information.correlation)
     known = np.isfinite(sizes) & ~np.eye(len(sizes), dtype=bool)
     largest = [float(row[there].max()) if there.any() else None for row, there in zip(sizes, known, strict=True)]
-    columns = (space.free_names, units, x.tolist(), low.tolist(), high.tolist(), information.deviation.tolist(),
-               largest, held_by_bound(space, x).tolist())  # fmt: skip
+    columns = (free.names, free.units, x.tolist(), free.low.tolist(), free.high.tolist(),
+               information.deviation.tolist(), largest, held_by_bound(space, x).tolist())  # fmt: skip
     return list(zip(*columns, strict=True))
