@@ -267,7 +267,7 @@ def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(w
         text.write("\n# mended\n")
     from armid.study.spec import study_registry
 
-    assert study_registry(told["plugins"]).own("identifiers", "raises+bobyqa") != {}
+    assert study_registry(told["plugins"]).digests_of("identifiers", "raises+bobyqa") != {}
     changed = run_study(file, **told)
     same = set(changed.runs["run"]) & set(first.runs["run"])
     assert same == set(first.runs[kept]["run"])

@@ -86,8 +86,7 @@ def test_a_run_is_kept_once(store):
     first, second = Outcome("a0", DONE, seconds=1.0), Outcome("a0", DONE, seconds=2.0)
     assert store.save(first)
     assert not store.save(second)
-    assert store.counts()[:3] == (4, 1, 0)
-    assert store.counts().simulations_left == 30
+    assert store.counts() == (4, 1, 0)
     assert load_study(store.path).runs["seconds"].tolist() == [1.0]
 
 

@@ -20,7 +20,6 @@ from armid.cli.options import (
     examples,
     give,
     given,
-    number,
     numbers,
     out_option,
     plugin_option,
@@ -110,9 +109,8 @@ DEFAULT = (
 @out_option("Folder for report.html, report.md, result.json and the figures.")
 @accuracy_option
 def identify_command(
-    campaign: Path, identifier: str | None, options: tuple[str, ...], fitness: str | None, effects: str,
-    bounds: tuple[str, ...], fix: tuple[str, ...], window: str, budget: int | None, target: float | None, paper: bool,
-    seed: int, out: Path | None, accuracy: str, plugins: tuple[str, ...],
+    campaign: Path, identifier: str | None, options: tuple[str, ...], fitness: str | None, budget: int | None,
+    target: float | None, paper: bool, seed: int, out: Path | None, accuracy: str, **problem: Any,
 ) -> None:  # fmt: skip
     """Identify parameters from the train records.
 
@@ -131,7 +129,7 @@ def identify_command(
     refuse_unwritable(out, IDENTIFICATION.file)
     with progress_bar() as update:
         found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), update,
-                    options=named, paper=paper, **given(effects, plugins, window, bounds, fix))  # fmt: skip
+                    options=named, paper=paper, **given(**problem))  # fmt: skip
     show_and_save(found, out)
     if found.stopped == INTERRUPTED:
         sys.exit(130)
@@ -144,11 +142,10 @@ def progress_bar() -> Iterator[Callable[[Any], None]]:
         yield lambda meter: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TimeRemainingColumn
 
-    columns = (TextColumn("{task.completed:.0f}/{task.fields[budget]} simulations"), BarColumn(),
-               TextColumn("{task.fields[rate]:.0f}/s"), TimeRemainingColumn(),
-               TextColumn("best {task.fields[best]:.6g}"))  # fmt: skip
+    columns = ("{task.completed:.0f}/{task.fields[budget]} simulations", BarColumn(), "{task.fields[rate]:.0f}/s",
+               TimeRemainingColumn(), "best {task.fields[best]:.6g}")  # fmt: skip
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task("", total=None, budget="", best=float("inf"), rate=0.0)
         # rich does not know a speed until it has seen two steps
@@ -184,8 +181,8 @@ LEAST_NOISE = 1e-15
 @out_option("Folder for identifiability.html, identifiability.json and the figures.")
 @accuracy_option
 def identifiability_command(
-    campaign: Path, effects: str, bounds: tuple[str, ...], fix: tuple[str, ...], at: str, source: Path | None,
-    window: str, noise: float | None, rank: str, out: Path | None, accuracy: str, plugins: tuple[str, ...],
+    campaign: Path, at: str, source: Path | None, noise: float | None, rank: str, out: Path | None, accuracy: str,
+    **problem: Any,
 ) -> None:  # fmt: skip
     """Say what the train records tell about the parameters, and what one more manoeuvre would buy.
 
@@ -203,13 +200,10 @@ def identifiability_command(
     if at and source is not None:
         raise ArmidError("--at and --from are both given: one point is expected")
     refuse_unwritable(out, IDENTIFIABILITY.file)
-    point, where = None, "--at"
-    if at:
-        point = {n: number(v, f"--at {n}") for n, v in assignments(at.split(","), "--at").items()}
-    elif source is not None:
+    point, where = numbers(at.split(","), "--at") if at else None, "--at"
+    if source is not None:
         point, where = read_point(source), f"--from {source}"
-    found = examine(campaign, None, None, point, noise, rank, accuracy_of(accuracy), where=where,
-                    **given(effects, plugins, window, bounds, fix))  # fmt: skip
+    found = examine(campaign, None, None, point, noise, rank, accuracy_of(accuracy), where=where, **given(**problem))
     show_and_save(found, out)
 
 
@@ -240,9 +234,8 @@ PROGRESS = "progress.jsonl"
 @seed_option
 @click.option("--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations.")
 def close_loop_command(
-    campaign: Path, out: Path, effects: str, candidates: str, without: str, no_curve: bool,
-    bounds: tuple[str, ...], fix: tuple[str, ...], window: str, seed: int, threads: int, plugins: tuple[str, ...],
-) -> None:  # fmt: skip
+    campaign: Path, out: Path, candidates: str, without: str, no_curve: bool, seed: int, threads: int, **problem: Any
+) -> None:
     """Find the effects that the declared model lacks, and report the error before and after.
 
     Identifies the declared model on the train records, tells whether what remains is more than noise, names the effect
@@ -261,8 +254,7 @@ def close_loop_command(
     try:
         with status_line() as show_status:
             found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
-                               without=without, curve=not no_curve, progress=kept,
-                               **given(effects, plugins, window, bounds, fix))  # fmt: skip
+                               without=without, curve=not no_curve, progress=kept, **given(**problem))  # fmt: skip
         show_and_save(found, out)
     except BaseException:
         if kept.exists():

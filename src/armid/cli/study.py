@@ -53,21 +53,19 @@ def study_command(
             tell(f"{known.name}: {known.cost()}; what is finished already is kept")
         limit = TIME_LIMIT_S if time_limit is None else time_limit
         ending = run(known, study, jobs, dask, out, limit, only, retry, show_progress)
-    answer = show_answer(ending.folder) if ending.counts.done else []
+    answer: list[str] = []
+    if ending.counts.done:
+        from armid.study.document import summary_of
+        from armid.study.results import load_study
+
+        document = summary_of(load_study(ending.folder))
+        present(document)
+        answer = document.said
     say(*words(ending))
     counts = {key: getattr(ending.counts, key) for key in ("planned", "done", "failed", "missing")}
     give(study=known.name, folder=ending.folder, answer=answer, **counts, interrupted=ending.interrupted)
     if ending.interrupted:
         sys.exit(130)
-
-
-def show_answer(folder: Path) -> list[str]:
-    from armid.study.document import summary_of
-    from armid.study.results import load_study
-
-    document = summary_of(load_study(folder))
-    present(document)
-    return document.said
 
 
 def words(ending: "Ending") -> list[str]:

@@ -18,7 +18,7 @@ from armid.model import Manoeuvre, Model, Plant
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, SuiteProblem
 from armid.record import Campaign, Noise, Override, Piece, Record, read_campaign
-from armid.record.reader import campaign_path, record_constants
+from armid.record.reader import NAME, campaign_path, record_constants
 from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.spec import (
@@ -29,7 +29,6 @@ from armid.study.spec import (
     StudyRegistry,
     StudySpec,
     SuiteSpec,
-    lookup,
 )
 
 Array = NDArray[np.float64]
@@ -41,20 +40,12 @@ KNOWN = "known"
 FINER = 8
 
 
-@dataclass(frozen=True)
-class Source:
-    """A campaign that is read: folder, relative to the study's file, files, and a hash of them and campaign.toml."""
-
-    campaign: str
-    records: tuple[str, ...]
-    digest: str
-
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """Hold one case: manoeuvres to simulate (strokes), a campaign to read (source) or a problem of `armid.suite()`.
 
-    truth: parameter -> true value, SI, empty where not known. published: values of others to stand beside.
+    truth: parameter -> true value, SI, empty where not known. published: values of others to stand beside. source:
+    campaign, its folder relative to the study's file; records, its files; digest, of them and campaign.toml.
     """
 
     name: str
@@ -63,7 +54,7 @@ class Case:
     truth: Mapping[str, float] = field(default_factory=dict)
     published: Mapping[str, float] = field(default_factory=dict)
     strokes: tuple[dict[str, Any], ...] = ()
-    source: Source | None = None
+    source: dict[str, Any] | None = None
     suite: SuiteProblem | None = None
 
     @property
@@ -132,7 +123,8 @@ def _case(
     if entry.records is not None:
         raise ArmidError(f"{where}: 'records' are files of a campaign, and no campaign is given")
     space = _space(model, {}, spec, entry, where)
-    return _simulated_case(entry.name, entry.truth, entry.published, entry.manoeuvres, space, spec, model, where)
+    case = Case(entry.name, model, space, dict(entry.truth), dict(entry.published))
+    return _simulated_case(case, entry.manoeuvres, spec, where)
 
 
 def _space(
@@ -155,17 +147,15 @@ def _campaign_case(
     campaign = _with_records(read_campaign(path, registry.plants, registry.effects), entry.records, where)
     if campaign.plant.name not in {v.name for v in registry.plants[spec.plant].variants} | {spec.plant}:
         raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{spec.plant}' is expected")
-    model = campaign.model(registry.effects)
-    for name in dict.fromkeys(spec.effects):
-        if name not in campaign.effects:
-            model = model + lookup(registry.effects, name, "effect", where)
+    further = [name for name in dict.fromkeys(spec.effects) if name not in campaign.effects]
+    model = registry.with_effects(campaign.model(registry.effects), further, where)
     space = _space(model, campaign.parameters, spec, entry, where)
     for window in spec.windows_s:
         if not isinstance(window, str):
             for record in campaign.records:
                 with_window(record, window, f"{where}, windows_s")
     files = tuple(r.file for r in campaign.records)
-    source = Source(folder_name, files, digest_of(path, ("campaign.toml", *files)))
+    source = {"campaign": folder_name, "records": files, "digest": digest_of(path, (NAME, *files))}
     return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source)
 
 
@@ -198,6 +188,13 @@ def _with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -
     return some
 
 
+def unchanged_campaign(folder: Path, files: Iterable[str], digest: str, name: str, registry: StudyRegistry) -> Campaign:
+    """Read a campaign whose files are still those that were hashed; name: as the study calls it."""
+    if digest_of(folder, files) != digest:
+        raise ArmidError(f"campaign {name} has changed since the study was started: start it again")
+    return read_campaign(folder, registry.plants, registry.effects)
+
+
 def digest_of(folder: Path, files: Iterable[str]) -> str:
     digest = hashlib.sha256()
     for name in files:
@@ -206,23 +203,16 @@ def digest_of(folder: Path, files: Iterable[str]) -> str:
     return digest.hexdigest()
 
 
-def _simulated_case(
-    name: str,
-    truth: Mapping[str, float],
-    published: Mapping[str, float],
-    manoeuvres: Sequence[Mapping[str, Any]],
-    space: Space,
-    spec: StudySpec,
-    model: Model,
-    where: str,
-) -> Case:
-    if model.plant.inputs:
-        raise ArmidError(f"{where}: plant '{model.plant.name}' is driven by {model.plant.inputs[0].name}, which no "
-                         "manoeuvre tells: a campaign is expected")  # fmt: skip
-    strokes = tuple(_stroke(m, spec, model.plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
+def _simulated_case(case: Case, manoeuvres: Sequence[Mapping[str, Any]], spec: StudySpec, where: str) -> Case:
+    """Return a case with manoeuvres to simulate, and with the true value of every parameter."""
+    plant = case.model.plant
+    if plant.inputs:
+        raise ArmidError(f"{where}: plant '{plant.name}' is driven by {plant.inputs[0].name}, which no manoeuvre "
+                         "tells: a campaign is expected")  # fmt: skip
+    strokes = tuple(_stroke(m, spec, plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
     if not any(s["role"] == "train" for s in strokes):
         raise ArmidError(f"{where}: no manoeuvre has the role 'train', at least one is expected")
-    case = Case(name, model, space, _completed(truth, model, where), dict(published), strokes)
+    case = replace(case, truth=_completed(case.truth, case.model, where), strokes=strokes)
     _check_truth(case, where)
     _check_windows(case, spec, where)
     return case
@@ -293,7 +283,7 @@ def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:
     points = (parts + rng.random(parts.shape)) / n
     whole = space.complete(low + (high - low) * (wanted.margin + (1.0 - 2.0 * wanted.margin) * points))
     truths = [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
-    first = _simulated_case("", truths[0], {}, wanted.manoeuvres, space, spec, model, where)
+    first = _simulated_case(Case("", model, space, truths[0]), wanted.manoeuvres, spec, where)
     names = [f"random {i:0{len(str(n))}d}" for i in range(1, n + 1)]
     return [replace(first, name=name, truth=_completed(t, model, where)) for name, t in zip(names, truths, strict=True)]
 

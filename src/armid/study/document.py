@@ -48,31 +48,29 @@ def report_of(
     knows, and for an analysis of a user that returns no table and no figure.
     """
     study, own = results.study, own or {}
-    kind = known_kind(study)
-    if key is not None and kind == IDENTIFIES:
+    closes_loops = known_kind(study) == CLOSES_LOOP
+    if key is not None and not closes_loops:
         raise ArmidError(f"study '{study['name']}' knows its truths, a key is not expected")
     if results.runs.empty:
         raise ArmidError(f"study '{study['name']}' has no finished run: nothing can be reported")
     for name in own:
         if name in {a.name for a in ANALYSES}:
             raise ArmidError(f"analyses: '{name}' is there already, give yours another name")
-    if kind == IDENTIFIES:
+    answer: tuple[str, ...]
+    if closes_loops:
+        runs = loop_runs(results.loops)
+        found = [Section("Verdicts", (verdicts(runs),)), Section("Campaigns", (campaigns(runs),))]
+        facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
+    else:
         evidence = Evidence(results)
         found = [Section(a.title, tuple(a.parts(evidence))) for a in (OF_SUITES if evidence.is_suite else ANALYSES)]
-        sections, facts, runs = tuple(s for s in found if s.parts), facts_of(evidence), wide_runs(evidence)
-        main = sections[0].parts
-        answer = answer_of(evidence, main[0])
-    else:
-        runs = loop_runs(results.loops)
-        main = (verdicts(runs),)
-        sections = (Section("Verdicts", main), Section("Campaigns", (campaigns(runs),)))
-        facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
-    sections = (*sections, *own_sections(own, runs), made_section(results, again))
+        facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, found[0].parts[0])
+    sections = (*(s for s in found if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)
     whole = state.startswith("Complete")
     return Document(
         study["name"], "Study", str(study.get("question", "")), (*answer, state) if whole else answer, sections,
-        warning="" if whole else state, facts=facts, main=main,
+        warning="" if whole else state, facts=facts, main=sections[0].parts,
     )  # fmt: skip
 
 

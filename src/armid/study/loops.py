@@ -13,10 +13,9 @@ from numpy.random import default_rng
 
 from armid.errors import ArmidError, nearest, quoted
 from armid.loop import close_loop, report_of
-from armid.record import read_campaign
 from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import unknown_name, validated
-from armid.study.cases import digest_of
+from armid.study.cases import digest_of, unchanged_campaign
 from armid.study.outcome import Performed, Planned, planned
 from armid.study.run_cache import RunCache
 from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE, LoopSpec, StudyRegistry, lookup
@@ -91,7 +90,7 @@ class LoopStudy:
             wanted = self.candidates_for(case)
             settings = {
                 "kind": self.kind, "campaigns": spec.campaigns, "bounds": spec.bounds, "fixed": spec.fixed,
-                "seed": spec.seed, "candidates": list(wanted), "own": self.registry.own("effects", *wanted),
+                "seed": spec.seed, "candidates": list(wanted), "own": self.registry.digests_of("effects", *wanted),
                 "case": case, "digest": digest,
             }  # fmt: skip
             yield planned(settings, case, CLOSES_LOOP, "", None, WHOLE, spec.seed, 0)
@@ -100,9 +99,7 @@ class LoopStudy:
     def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
         began = time.process_time()
         registry, folder = cache.registry, cache.folder / settings["campaigns"] / settings["case"]
-        if _digest(folder) != settings["digest"]:
-            raise ArmidError(f"campaign {settings['case']} has changed since the study was started: start it again")
-        campaign = read_campaign(folder, registry.plants, registry.effects)
+        campaign = unchanged_campaign(folder, _files(folder), settings["digest"], settings["case"], registry)
         model = campaign.model(registry.effects)
         candidates = {name: lookup(registry.effects, name, "effect", "settings") for name in settings["candidates"]}
         bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
@@ -126,9 +123,9 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
             raise ArmidError(f"{where}: key 'only' holds {quoted(pattern)}, which is no campaign of "
                              f"{quoted(spec.campaigns)}, {nearest(pattern, names)}")  # fmt: skip
     chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in spec.only)]
-    return {name: _digest(place / name) for name in chosen}
+    return {name: digest_of(place / name, _files(place / name)) for name in chosen}
 
 
-def _digest(folder: Path) -> str:
-    """Return a hash of campaign.toml and all records of a campaign, so that runs on other records are other runs."""
-    return digest_of(folder, sorted(name for name in os.listdir(folder) if name == NAME or name.endswith(SUFFIX)))
+def _files(folder: Path) -> list[str]:
+    """Return campaign.toml and all records of a campaign: runs on others are other runs."""
+    return sorted(name for name in os.listdir(folder) if name == NAME or name.endswith(SUFFIX))

@@ -119,20 +119,20 @@ class StudyResults(Shown):
 
     def settings_of(self, run: str) -> dict[str, Any]:
         """Return all that decided a run."""
-        with _reading(self.path) as connection:
-            row = connection.execute("SELECT settings FROM settings WHERE run = ?", (run,)).fetchone()
-        if row is None:
-            raise ArmidError(f"{self.path} holds no run '{run}'")
+        text = self._one("SELECT settings FROM settings WHERE run = ?", run, f"run '{run}'")
         with corruption_guard(self.path, f"the settings of run '{run}'"):
-            settings: dict[str, Any] = json.loads(row[0])
+            settings: dict[str, Any] = json.loads(text)
         return settings
 
     def text_of(self, digest: str) -> str:
         """Return the text whose hash a run names: the equations of its model, or the versions (JSON) it ran on."""
+        return self._one("SELECT text FROM texts WHERE hash = ?", digest, f"text of hash '{digest}'")
+
+    def _one(self, query: str, value: str, what: str) -> str:
         with _reading(self.path) as connection:
-            row = connection.execute("SELECT text FROM texts WHERE hash = ?", (digest,)).fetchone()
+            row = connection.execute(query, (value,)).fetchone()
         if row is None:
-            raise ArmidError(f"{self.path} holds no text of hash '{digest}'")
+            raise ArmidError(f"{self.path} holds no {what}")
         return str(row[0])
 
     def _traces(self, query: str, values: tuple[str, ...]) -> Iterator[RunTrace]:

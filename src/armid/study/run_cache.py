@@ -2,7 +2,7 @@
 
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,9 @@ from armid.model import Model
 from armid.problem.problem import Replay, replay_of
 from armid.problem.space import Space, space_of
 from armid.problem.suite import VERSION, suite
-from armid.record import Record, read_campaign
-from armid.study.cases import DEGREE, campaign_folder, clean_records, digest_of, in_window, noisy_records
+from armid.record import Campaign, Record
+from armid.record.reader import NAME
+from armid.study.cases import DEGREE, campaign_folder, clean_records, in_window, noisy_records, unchanged_campaign
 from armid.study.spec import StudyRegistry, lookup
 
 # How many cases, each at one level of noise and in one window, are kept ready in a process.
@@ -77,21 +78,17 @@ class RunCache:
         if source is None:
             plant = lookup(self.registry.plants, settings["plant"], "plant", "settings")
         else:
-            campaign = self._once("campaign", source, lambda: self._campaign(source))
+            campaign = self._once("campaign", source, lambda: self._campaign(**source))
             plant = campaign.plant
-        model = Model(plant)
-        for name in settings["effects"]:
-            model = model + lookup(self.registry.effects, name, "effect", "settings")
+        model = self.registry.with_effects(Model(plant), settings["effects"], "settings")
         if source is not None:
             return model, tuple(r for r in campaign.records if r.file in source["records"])
         parts = {word: settings[word] for word in ("plant", "effects", "truth", "strokes", "interval_s")}
         return model, self._once("clean", parts, lambda: clean_records(settings, model))
 
-    def _campaign(self, source: Mapping[str, Any]) -> Any:
-        path = campaign_folder(self.folder, source["campaign"], "settings")
-        if digest_of(path, ("campaign.toml", *source["records"])) != source["digest"]:
-            raise ArmidError(f"campaign {source['campaign']} has changed since the study was started: start it again")
-        return read_campaign(path, self.registry.plants, self.registry.effects)
+    def _campaign(self, campaign: str, records: Sequence[str], digest: str) -> Campaign:
+        path = campaign_folder(self.folder, campaign, "settings")
+        return unchanged_campaign(path, (NAME, *records), digest, campaign, self.registry)
 
     def _once(self, what: str, of: Mapping[str, Any], make: Callable[[], Any]) -> Any:
         key = what + json.dumps(of, sort_keys=True)

@@ -208,11 +208,10 @@ def progress_bar(is_shown: bool) -> Iterator[Progress]:
         yield lambda counts, outcome: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn
+    from rich.progress import BarColumn
     from rich.progress import Progress as Bar
 
-    columns = (TextColumn("{task.completed:.0f}/{task.total:.0f} runs"), BarColumn(),
-               TextColumn("{task.fields[rate]}"), TextColumn("{task.fields[left]}"))  # fmt: skip
+    columns = "{task.completed:.0f}/{task.total:.0f} runs", BarColumn(), "{task.fields[rate]}", "{task.fields[left]}"
     with Bar(*columns, console=Console(stderr=True), refresh_per_second=4) as bar:
         task = bar.add_task("", total=1, visible=False, rate="", left="")
         began, finished, simulations = time.monotonic(), 0, 0

@@ -4,14 +4,12 @@ import hashlib
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 from armid.engine.calibrate import ALLOWED
 from armid.errors import ArmidError
-from armid.identifiers import Identifier, identifier_of
-from armid.model import Effect, Plant
-from armid.problem.fitness import Fitness
+from armid.model import Model
 from armid.record.schema import (
     Kind,
     KindError,
@@ -249,41 +247,29 @@ class LoopSpec:
     key: str = field(default="", metadata=key(line_of_text, "the file that holds the truth, relative to this file"))
 
 
-@dataclass(frozen=True, eq=False)
-class StudyRegistry:
-    """What a study may name: name -> plant, effect, fitness or identifier.
+@dataclass(eq=False)
+class StudyRegistry(Registry):
+    """What a study may name.
 
     plugins: `FILE.py:attribute` of the user's own. digests: (kind, name) -> hash of the file that it was read from; it
     is part of a run's settings, so that results of an older version of that file are not taken for the present one's.
     """
 
-    registry: Registry
-    plugins: tuple[str, ...]
-    digests: Mapping[tuple[str, str], str]
+    plugins: tuple[str, ...] = ()
+    digests: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
-    @property
-    def plants(self) -> dict[str, Plant]:
-        return self.registry.plants
-
-    @property
-    def effects(self) -> dict[str, Effect]:
-        return self.registry.effects
-
-    @cached_property
-    def fitness(self) -> dict[str, Fitness]:
-        return self.registry.fitness
-
-    @cached_property
-    def identifiers(self) -> dict[str, Identifier]:
-        return self.registry.identifiers
-
-    def identifier(self, name: str, where: str) -> Identifier:
+    def identifier(self, name: str, where: str) -> Any:
         try:
-            return identifier_of(name, self.identifiers)
+            return self.identifier_of(name)
         except ArmidError as error:
             raise ArmidError(f"{where}: {error}") from error
 
-    def own(self, kind: str, *names: str) -> dict[str, str]:
+    def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
+        for name in names:
+            model = model + lookup(self.effects, name, "effect", where)
+        return model
+
+    def digests_of(self, kind: str, *names: str) -> dict[str, str]:
         """Return `kind name` -> hash for those of the names that are the user's own; chains are looked into."""
         parts = [part for name in names for part in re.split(r"[+:]", name)]
         return {f"{kind} {part}": self.digests[kind, part] for part in parts if (kind, part) in self.digests}
@@ -298,7 +284,7 @@ def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
         kind, name, _ = load_plugin(plugin)
         with open(plugin.rpartition(":")[0], "rb") as file:
             digests[kind, name] = hashlib.sha256(file.read()).hexdigest()
-    return StudyRegistry(registry, named, digests)
+    return StudyRegistry(registry.plants, registry.effects, registry.own, named, digests)
 
 
 def lookup(there: Mapping[str, Any], name: str, what: str, where: str) -> Any:

@@ -65,8 +65,8 @@ SELECT p.place, p.run, s.settings FROM plan p JOIN settings s USING (run)
 WHERE p.place > :after AND {CHOSEN} AND {UNFINISHED} AND {UNCLAIMED} ORDER BY p.place LIMIT :n
 """
 COUNTS = f"""
-SELECT count(*), count(status), ifnull(sum(status = '{FAILED}'), 0),
-ifnull(sum(CASE WHEN status IS NULL THEN budget END), 0) FROM plan p LEFT JOIN runs USING (run) WHERE {CHOSEN}
+SELECT count(*), count(status), ifnull(sum(status = '{FAILED}'), 0) FROM plan p LEFT JOIN runs USING (run)
+WHERE {CHOSEN}
 """
 FAILURES = f"FROM plan p JOIN runs r USING (run) WHERE {CHOSEN} AND r.status = '{FAILED}'"
 OTHERS = f"""
@@ -77,12 +77,9 @@ VOID = "DELETE FROM claims WHERE place = ? AND pid = ? AND start = ?"
 
 
 class Counts(NamedTuple):
-    """Runs planned, done and failed, and the simulations that the missing ones may make."""
-
     planned: int
     done: int
     failed: int
-    simulations_left: int
 
     @property
     def missing(self) -> int:
@@ -169,21 +166,18 @@ class Store:
         with translate_errors(self.path), transaction(self._connection):
             if self._kept("plan") != self._plan:
                 raise ArmidError(f"{self.path} was given another plan by another runner: start again to go on with it")
-            rows = self._next(n)
+            rows = self._selected(NEXT, after=self._place, n=n)
             if not rows:
                 self._place = -1
                 claims = self._connection.execute("SELECT DISTINCT place, pid, start FROM claims").fetchall()
                 for process in (ProcessIdentity(*row) for row in claims):
                     if process.place != self._process.place or is_gone(process):
                         self._connection.execute(VOID, process)
-                rows = self._next(n)
+                rows = self._selected(NEXT, after=self._place, n=n)
             mine = [(run, *self._process) for _, run, _ in rows]
             self._connection.executemany("INSERT INTO claims VALUES (?, ?, ?, ?)", mine)
         self._place = rows[-1][0] if rows else -1
         return [ClaimedRun(run, settings) for _, run, settings in rows]
-
-    def _next(self, n: int) -> list[tuple[int, str, str]]:
-        return self._selected(NEXT, after=self._place, n=n)
 
     def _selected(self, query: str, **further: object) -> list[Any]:
         """Return rows of the runs that this runner looks at."""
@@ -211,8 +205,8 @@ class Store:
         return digest
 
     def counts(self) -> Counts:
-        ((planned, finished, failed, left),) = self._selected(COUNTS)
-        return Counts(planned, finished - failed, failed, left)
+        ((planned, finished, failed),) = self._selected(COUNTS)
+        return Counts(planned, finished - failed, failed)
 
     def first_error(self) -> str:
         """Return what the first failed run says, "" when none has failed."""
@@ -393,15 +387,11 @@ def start_of(pid: int) -> str:
 
 
 def is_gone(process: ProcessIdentity) -> bool:
-    """Tell whether a process of this place has surely ended; one of another place never surely has."""
-    if process.place != this_place():
-        return False
+    """Tell whether a process of this place has surely ended."""
     if process.start:
         return start_of(process.pid) != process.start
     try:
         os.kill(process.pid, 0)
-    except ProcessLookupError:
-        return True
-    except OSError:
-        return False
+    except OSError as error:
+        return isinstance(error, ProcessLookupError)
     return False

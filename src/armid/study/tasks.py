@@ -13,7 +13,7 @@ import errno
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from itertools import product
@@ -118,8 +118,7 @@ def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
             raise
         if of_machine(error):
             raise MachineError(f"the machine, not a run, is at fault: {sentence(error)}") from error
-        seconds = time.perf_counter() - began
-        return Outcome(run.run, FAILED, sentence(error), seconds=seconds, started_at=started_at)
+        return Outcome(run.run, FAILED, sentence(error), 0, time.perf_counter() - began, started_at)
     seconds = time.perf_counter() - began
     return Outcome(run.run, DONE, "", made.used, seconds, started_at, made.model, versions(), made.rows)
 
@@ -198,9 +197,8 @@ class Study:
         spec = validated(StudySpec, table, where)
         if spec.report not in REPORTS:
             raise unknown_name("report", spec.report, REPORTS[1:], where)
-        model = Model(lookup(registry.plants, spec.plant, "plant", where))
-        for name in spec.effects:
-            model = model + lookup(registry.effects, name, "effect", where)
+        plant = Model(lookup(registry.plants, spec.plant, "plant", where))
+        model = registry.with_effects(plant, spec.effects, where)
         entries = _entries(spec, registry, where)
         cases = cases_of(spec, model, registry, folder, where)
         for entry in entries:
@@ -213,7 +211,7 @@ class Study:
         performed: performs a run in a process of its own, which what a user's function does cannot harm.
         """
         for entry in self.entries:
-            if self.registry.own("identifiers", entry.name):
+            if self.registry.digests_of("identifiers", entry.name):
                 settings = {"kind": self.kind, "only_built": True, "identifier": entry.name,
                             "options": dict(entry.options), "budget": entry.budget}  # fmt: skip
                 outcome = performed(ClaimedRun(entry.label, json.dumps(settings)))
@@ -274,7 +272,7 @@ class Study:
         fitnesses = entry.fitness if case.suite is None else (case.suite.definition.fitness,)
         choices = product(self.spec.windows_s, noises, fitnesses, entry.budgets(len(case.bounds)))
         for window, noise, fitness, budget in choices:
-            own = self.registry.own("fitness", fitness) | self.registry.own("identifiers", entry.name)
+            own = self.registry.digests_of("fitness", fitness) | self.registry.digests_of("identifiers", entry.name)
             settings = shared | {
                 "identifier": entry.name, "options": dict(entry.options), "budget": budget, "fitness": fitness,
                 "noise_deg_s": noise, "window_s": window, "seed": seed, "own": shared["own"] | own,
@@ -288,12 +286,12 @@ class Study:
         settings: dict[str, Any] = {
             "kind": self.kind, "case": case.name, "plant": plant, "effects": effects, "bounds": case.bounds,
             "fixed": case.fixed, "accuracy": self.spec.accuracy,
-            "own": self.registry.own("plants", plant) | self.registry.own("effects", *effects),
+            "own": self.registry.digests_of("plants", plant) | self.registry.digests_of("effects", *effects),
         }  # fmt: skip
         if case.suite is not None:
             return settings | {"suite": (case.suite.name, case.suite.version)}
         if case.source is not None:
-            return settings | {"campaign": asdict(case.source)}
+            return settings | {"campaign": case.source}
         return settings | {
             "truth": case.truth, "strokes": case.strokes, "interval_s": self.spec.interval_s,
             "noise_seed": self.spec.noise_seed,
@@ -362,7 +360,7 @@ def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
         for fitness in asked:
             identifier.refuse(fitness)
         built = identifier.with_options(entry.options)
-        if not registry.own("identifiers", entry.name):
+        if not registry.digests_of("identifiers", entry.name):
             built.build(entry.budget)
     except ArmidError as error:
         raise ArmidError(f"{where}: {error}") from error
@@ -404,8 +402,8 @@ def _case_description(case: Case) -> dict[str, Any]:
         "fixed": case.fixed,
         "units": dict(zip(case.space.names, case.space.units, strict=True)),
         "effects": [e.name for e in case.model.effects],
-        "campaign": case.source.campaign if case.source else None,
-        "records": list(case.source.records) if case.source else len(case.strokes),
+        "campaign": case.source["campaign"] if case.source else None,
+        "records": list(case.source["records"]) if case.source else len(case.strokes),
     } | ({} if case.suite is None else suite_description(case.suite))
 
 
@@ -423,12 +421,10 @@ def window_text(window: Sequence[float] | str) -> str:
 
 def _parameter_rows(space: Space, x: np.ndarray, train: tuple[Replay, ...]) -> list[tuple[Any, ...]]:
     """Return value, bounds, Cramer-Rao deviation, largest correlation and flag of each free parameter."""
-    information = information_at(train, space, x)
-    low, high = space.low[space.free], space.high[space.free]
-    units = [u for u, f in zip(space.units, space.free, strict=True) if f]
+    information, free = information_at(train, space, x), space.only(space.free_names)
     sizes = np.abs(information.correlation)
     known = np.isfinite(sizes) & ~np.eye(len(sizes), dtype=bool)
     largest = [float(row[there].max()) if there.any() else None for row, there in zip(sizes, known, strict=True)]
-    columns = (space.free_names, units, x.tolist(), low.tolist(), high.tolist(), information.deviation.tolist(),
-               largest, held_by_bound(space, x).tolist())  # fmt: skip
+    columns = (free.names, free.units, x.tolist(), free.low.tolist(), free.high.tolist(),
+               information.deviation.tolist(), largest, held_by_bound(space, x).tolist())  # fmt: skip
     return list(zip(*columns, strict=True))

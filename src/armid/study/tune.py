@@ -41,14 +41,13 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
 class Tuned:
     """What was found for an identifier: options that are better than its defaults, empty where none are.
 
-    default, tuned: area over the convergence curve, mean over the training instances, from 0 to 1. n: configurations.
+    default, tuned: area over the convergence curve, mean over the training instances, from 0 to 1.
     """
 
     label: str
     options: Mapping[str, float]
     default: float
     tuned: float
-    n: int
 
 
 def tunable(study: Study) -> list[Entry]:
@@ -81,8 +80,8 @@ def tune(entry: Entry, study: Study, cases: list[Case], n: int, seed: int) -> Tu
         chosen = {name: suggested(trial, name, *ends) for name, ends in RANGES[entry.name].items()}
         trials.tell(trial, score(entry, study, cases, chosen, seed))
     if n < 2 or trials.best_value <= default:
-        return Tuned(entry.label, {}, default, default, n)
-    return Tuned(entry.label, trials.best_params, default, trials.best_value, n)
+        return Tuned(entry.label, {}, default, default)
+    return Tuned(entry.label, trials.best_params, default, trials.best_value)
 
 
 def suggested(trial: Any, name: str, low: float, high: float) -> Any:

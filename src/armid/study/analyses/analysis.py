@@ -278,6 +278,10 @@ def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
     return keys.sort_values(by, kind="stable", ignore_index=True).drop(columns=["_label", "_case"])
 
 
+def every_nth(rows: DataFrame, most: int) -> DataFrame:
+    return rows.iloc[:: max(1, -(-len(rows) // most))]
+
+
 def published_values(study: dict[str, Any]) -> DataFrame:
     rows = []
     for case in study["cases"]:

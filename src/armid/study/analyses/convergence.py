@@ -1,6 +1,6 @@
 """Convergence: error and fitness of the best candidate against simulations, median and quartiles over runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.report.document import Column, Figure, Part, Table, slug
-from armid.report.style import COLOURS, DASHES, PALE, legend_below, named_lines, panel_height, panels
+from armid.report.style import COLOURS, DASHES, PALE, legend_below, panels
 from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
-from armid.study.analyses.running_time import share_hit
+from armid.study.analyses.running_time import PAIRS_HIT, share_hit, share_panels
 
 Array = NDArray[np.floating[Any]]
 QUARTILES = (0.25, 0.5, 0.75)
@@ -74,11 +74,13 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
     every = np.concatenate([b[np.isfinite(b)] for of in bands.values() for b in of.values()])
     limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
     settings = list(dict.fromkeys(s for of in bands.values() for s in of))
+    # NaN where nobody has any yet
+    best = {s: np.fmin.accumulate(np.fmin.reduce([of[s][1] for of in bands.values() if s in of])) for s in settings}
     figure, axes = panels(len(bands), COLUMNS, 4.4, 3.5)
     for place, (axis, (variant, of)) in enumerate(zip(axes, bands.items(), strict=True)):
         for setting, (lower, middle, upper) in of.items():
             i = settings.index(setting)
-            axis.plot(grid, best_of_all(bands, setting), color=PALE, lw=1.0, zorder=1)
+            axis.plot(grid, best[setting], color=PALE, lw=1.0, zorder=1)
             axis.fill_between(grid, lower, upper, color=COLOURS[i % 7], alpha=0.22, lw=0, zorder=2)
             axis.plot(grid, middle, color=COLOURS[i % 7], ls=DASHES[i % 3], lw=1.8, label=setting, zorder=3)
         axis.set(xscale="log", yscale="log", xlim=(1, grid[-1]), ylim=limits)
@@ -93,13 +95,6 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
             axis.set_xlabel("simulations")
     legend_below(figure, 4)
     return figure
-
-
-def best_of_all(bands: Mapping[str, Mapping[str, Array]], setting: str) -> Array:
-    """Return the smallest median of all variants up to each count of simulations, NaN where none has any yet."""
-    medians = np.array([of[setting][1] for of in bands.values() if setting in of])
-    smallest: Array = np.minimum.accumulate(np.min(np.where(np.isnan(medians), np.inf, medians), axis=0))
-    return np.where(np.isfinite(smallest), smallest, np.nan)
 
 
 ATTAINED_CAPTION = (
@@ -148,16 +143,14 @@ def areas(evidence: Evidence) -> Table:
 
 def attained(evidence: Evidence) -> Any:
     """Draw the shares of targets hit against simulations a parameter, one panel a setting and one line a variant."""
-    figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
     per_parameter = evidence.histories.value_hits / evidence.n_free[:, np.newaxis]
-    budget = evidence.runs["budget"].to_numpy(float) / evidence.n_free
-    for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
-        axis.set(xscale="log", ylim=(0.0, 1.0))
+    budget, curves = evidence.runs["budget"].to_numpy(float) / evidence.n_free, []
+    for setting, variants in evidence.groups.items():
         # a curve ends where the budget of its setting does
         last = max(float(budget[rows].max()) for rows in variants.values())
         grid = np.geomspace(1.0 / evidence.n_free.max(), last, 121)
-        lines = {v: share_hit(per_parameter[rows], grid) for v, rows in variants.items()}
-        named_lines(axis, grid, lines, evidence.colours)
-        axis.set(title=setting, xlabel="simulations / free parameters", ylabel="share of (run, target) pairs hit")
-        axis.grid(alpha=0.3)
+        curves.append((setting, grid, {v: share_hit(per_parameter[rows], grid) for v, rows in variants.items()}))
+    figure, axes = share_panels(curves, evidence.colours, 2, 7.8)
+    for axis in axes:
+        axis.set(xlabel="simulations / free parameters", ylabel=PAIRS_HIT)
     return figure

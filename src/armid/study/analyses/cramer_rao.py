@@ -1,7 +1,7 @@
 """Scatter of the estimates over noise realisations against its Cramer-Rao bound."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -62,27 +62,12 @@ def parts(evidence: Evidence) -> Sequence[Part]:
 CRAMER_RAO = Analysis("cramer_rao", TITLE, parts, "standard deviation and bias over the Cramer-Rao bound")
 
 
-class Efficiency(NamedTuple):
-    """Scatter and bias in units of the Cramer-Rao bound (a standard deviation, SI); intervals are of 95 %.
+def efficiency(values: ArrayLike, truth: float, bound: float) -> dict[str, float]:
+    """Return scatter and bias of estimates under as many noise realisations, in units of the Cramer-Rao bound [SI].
 
-    ratio: sample standard deviation, from low to high; robust: the same from the quartiles; bias: mean - truth.
-    """
-
-    n: int
-    bound: float
-    ratio: float
-    low: float
-    high: float
-    robust: float
-    bias: float
-    bias_half_width: float
-
-
-def efficiency(values: ArrayLike, truth: float, bound: float) -> Efficiency:
-    """Compare estimates under as many noise realisations with the truth and the Cramer-Rao bound.
-
-    ratio = s/sigma with s^2 = sum (x - mean)^2/(n - 1); its interval from the chi-square distribution of (n - 1)
-    s^2/sigma^2, exact for normal estimates. Source: Kay, Fundamentals of Statistical Signal Processing I, ch. 3.
+    ratio = s/bound, from low to high, with s^2 = sum (x - mean)^2/(n - 1); robust: the same from the quartiles; bias:
+    mean - truth. Intervals are of 95 %, that of the ratio from the chi-square distribution, exact for normal estimates.
+    Source: Kay, Fundamentals of Statistical Signal Processing I, ch. 3.
     """
     from scipy.stats import chi2, t
 
@@ -92,11 +77,11 @@ def efficiency(values: ArrayLike, truth: float, bound: float) -> Efficiency:
     low, high = np.sqrt(free / chi2.ppf([0.975, 0.025], free))
     quartiles = np.quantile(x, [0.25, 0.75])
     half_width = t.ppf(0.975, free) * s / np.sqrt(x.size)
-    return Efficiency(
-        x.size, bound, s / bound, s / bound * low, s / bound * high,
-        (quartiles[1] - quartiles[0]) / (2.0 * QUARTILE) / bound,
-        (x.mean() - truth) / bound, half_width / bound,
-    )  # fmt: skip
+    return {
+        "n": x.size, "bound": bound, "ratio": s / bound, "low": s / bound * low, "high": s / bound * high,
+        "robust": (quartiles[1] - quartiles[0]) / (2.0 * QUARTILE) / bound, "bias": (x.mean() - truth) / bound,
+        "bias_half_width": half_width / bound,
+    }  # fmt: skip
 
 
 def efficiencies(estimates: DataFrame) -> DataFrame:
@@ -107,10 +92,11 @@ def efficiencies(estimates: DataFrame) -> DataFrame:
     for key, group in usable.groupby(keys, sort=False):
         if len(group) >= LEAST_REALISATIONS:
             bound, truth = float(group["deviation"].median()), float(group["truth"].iloc[0])
-            rows.append((*key, *efficiency(group["value"], truth, bound), int(group["at_bound"].sum())))
-    frame = DataFrame(rows, columns=[*keys, *Efficiency._fields, "n_at_bound"])
-    verdict = frame["ratio"].between(*EFFICIENT).map({True: "yes", False: "no"})
-    return frame.assign(verdict=verdict)
+            found = efficiency(group["value"], truth, bound)
+            verdict = "yes" if EFFICIENT[0] <= found["ratio"] <= EFFICIENT[1] else "no"
+            more = {"n_at_bound": int(group["at_bound"].sum()), "verdict": verdict}
+            rows.append(dict(zip(keys, key, strict=True)) | found | more)
+    return DataFrame(rows)
 
 
 def summary(rows: DataFrame) -> Table:

@@ -5,11 +5,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from pandas import DataFrame
+from pandas import DataFrame, concat
 
 from armid.report.document import Figure, Part, slug
 from armid.report.style import COLOURS, MARKERS, PALE, no_formulas, pyplot
-from armid.study.analyses.analysis import Analysis, Evidence
+from armid.study.analyses.analysis import Analysis, Evidence, every_nth
 
 # Range of the colours of the map [%]; cells carry numbers up to so many cases.
 LOWEST, HIGHEST = 1e-6, 1e2
@@ -123,5 +123,4 @@ def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:
 
 
 def thinned(ends: DataFrame) -> DataFrame:
-    parts = [g.iloc[:: -(-len(g) // MOST_POINTS)].index for _, g in ends.groupby("variant", sort=False)]
-    return ends.loc[[i for part in parts for i in part]]
+    return concat([every_nth(own, MOST_POINTS) for _, own in ends.groupby("variant", sort=False)])

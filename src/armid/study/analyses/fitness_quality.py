@@ -9,7 +9,7 @@ from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
 from armid.report.style import COLOURS, MARKERS, legend_below, panels
-from armid.study.analyses.analysis import N_RUNS, SETTING, Analysis, Evidence
+from armid.study.analyses.analysis import N_RUNS, SETTING, Analysis, Evidence, every_nth
 
 # Smaller values of 1 - S and of relative errors are drawn there.
 FLOOR = 1e-16
@@ -76,8 +76,7 @@ def fitness_quality_figure(runs: DataFrame) -> Any:
     for axis, setting in zip(axes, settings, strict=True):
         own = runs[(runs["setting"] == setting) & (runs["status"] == "done")]
         for k, name in enumerate(names):
-            group = own[own["fitness"] == name]
-            group = group.iloc[:: max(1, -(-len(group) // MOST_POINTS))]
+            group = every_nth(own[own["fitness"] == name], MOST_POINTS)
             misfit = np.maximum(1.0 - group["train_s"].to_numpy(float), FLOOR)
             error = np.maximum(100.0 * group["largest_error"].to_numpy(float), 100.0 * FLOOR)
             axis.plot(misfit, error, MARKERS[k % 7], ms=4.5, mfc="none", mew=0.9, color=COLOURS[k % 7], label=name)

@@ -88,11 +88,16 @@ def rank_tests(runs: DataFrame) -> RankTests:
     Source: Demsar, J. Mach. Learn. Res. 7 (2006) 1.
     """
     raised = runs.assign(largest_error=runs["largest_error"].clip(lower=FLOOR))
-    medians = raised.groupby(["case", "variant"], sort=False)["largest_error"].median().unstack("variant")
-    blocks = medians.reindex(columns=list(dict.fromkeys(runs["variant"]))).dropna(axis=0)
+    blocks = blocks_of(raised, "largest_error")
     statistic, p = friedman(blocks.to_numpy())
     ranks = blocks.rank(axis=1).mean(axis=0).sort_values(kind="stable")
     return RankTests(blocks, ranks, statistic, p, pair_tests(blocks, raised))
+
+
+def blocks_of(runs: DataFrame, quantity: str) -> DataFrame:
+    """Return the median over the seeds, one row a case that all ran and one column a variant."""
+    medians = runs.groupby(["case", "variant"], sort=False)[quantity].median().unstack("variant")
+    return medians.reindex(columns=list(dict.fromkeys(runs["variant"]))).dropna(axis=0)
 
 
 def friedman(blocks: Array) -> tuple[float, float]:
@@ -242,9 +247,8 @@ BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", lambda evidence:
 def final_values(evidence: Evidence, setting: str) -> DataFrame:
     runs = evidence.of(setting)
     floors = runs["case"].map({c["name"]: c["floor"] for c in evidence.study["cases"]}).astype(float) + NEAR_TRUTH
-    raised = runs.assign(value=np.maximum(runs["value"].where(runs["status"] == "done", np.inf), floors))
-    medians = raised.groupby(["case", "variant"], sort=False)["value"].median().unstack("variant")
-    return medians.reindex(columns=list(dict.fromkeys(runs["variant"]))).dropna(axis=0)
+    reached = np.maximum(runs["value"].where(runs["status"] == "done", np.inf), floors)
+    return blocks_of(runs.assign(value=reached), "value")
 
 
 def class_ranks(evidence: Evidence) -> Table:

@@ -4,10 +4,11 @@ The expected running time is what one success costs when a method is started aga
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
@@ -16,6 +17,7 @@ from armid.study.analyses.analysis import N_RUNS, SETTING, TARGETS, VARIANT, Ana
 from armid.study.analyses.success import TOLERANCES
 
 Array = NDArray[np.floating[Any]]
+PAIRS_HIT = "share of (run, target) pairs hit"
 # Said of both targets.
 CAPTION = (
     "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
@@ -55,7 +57,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
 RUNNING_TIME = Analysis("running_time", "Cost of the truth", parts, "simulations until the parameters are right")
 
 
-def share_hit(hits: Array, grid: NDArray[np.int64]) -> Array:
+def share_hit(hits: Array, grid: ArrayLike) -> Array:
     """Return the share of (run, target) pairs that are hit within each number of simulations, (n_grid,).
 
     hits: (n_runs, n_targets), infinite for never. No restarts are assumed: a run that ends early stays where it ended.
@@ -97,14 +99,25 @@ def running_time(
 
 def ecdf_figure(evidence: Evidence) -> Any:
     kept = evidence.histories
-    figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
-    for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
-        axis.set(xscale="log", ylim=(0.0, 1.0))
-        lines = {v: share_hit(kept.error_hits[rows], kept.grid) for v, rows in variants.items()}
-        named_lines(axis, kept.grid, lines, evidence.colours)
-        axis.set(title=setting, xlabel="simulations", ylabel="share of (run, target) pairs hit")
-        axis.grid(alpha=0.3)
+    curves = [(setting, kept.grid, {v: share_hit(kept.error_hits[rows], kept.grid) for v, rows in variants.items()})
+              for setting, variants in evidence.groups.items()]  # fmt: skip
+    figure, axes = share_panels(curves, evidence.colours, 2, 7.8)
+    for axis in axes:
+        axis.set(xlabel="simulations", ylabel=PAIRS_HIT)
     return figure
+
+
+def share_panels(
+    curves: Sequence[tuple[str, ArrayLike, Mapping[str, Array]]], colours: Mapping[str, int], columns: int, width: float
+) -> tuple[Any, list[Any]]:
+    """Draw shares that rise with the simulations, one panel each. curves: title, simulations, and name -> share."""
+    figure, axes = panels(len(curves), columns, width, panel_height(len(colours)))
+    for axis, (title, grid, lines) in zip(axes, curves, strict=True):
+        axis.set(xscale="log", ylim=(0.0, 1.0))
+        named_lines(axis, grid, lines, colours)
+        axis.set_title(title)
+        axis.grid(alpha=0.3)
+    return figure, axes
 
 
 def running_time_figure(evidence: Evidence, hits: Array, targets: Array, label: str) -> Any:
@@ -178,24 +191,18 @@ def data_profile(hits: Array, n_parameters: NDArray[np.integer[Any]], grid: Arra
     d(kappa) = #{p : h_p <= kappa (n_p + 1)} / n_problems. hits: of one tolerance, (n_problems,); grid: kappa.
     Source: More and Wild, SIAM J. Optim. 20 (2009) 172, Eq. 2.5.
     """
-    gradients = np.sort(hits / (n_parameters + 1))
-    return np.searchsorted(gradients, grid, side="right") / gradients.size
+    return share_hit(hits / (n_parameters + 1), grid)
 
 
 def data_profile_figure(evidence: Evidence) -> Any:
-    kept, n_free, columns = evidence.histories, evidence.n_free, len(SHARES_LEFT)
-    figure, axes = panels(len(evidence.groups) * columns, columns, 6.6, panel_height(len(evidence.colours)))
-    what = [(setting, share) for setting in evidence.groups for share in SHARES_LEFT]
-    for axis, (setting, share) in zip(axes, what, strict=True):
+    kept, n_free, columns, curves = evidence.histories, evidence.n_free, len(SHARES_LEFT), []
+    for (setting, variants), share in product(evidence.groups.items(), SHARES_LEFT):
         place = int(np.flatnonzero(share * (1.0 + 1e-9) >= TARGETS)[0])
-        variants = evidence.groups[setting]
         least = min(int(n_free[rows].min()) for rows in variants.values()) + 1
         grid = np.geomspace(1.0, int(kept.grid[-1]) / least, N_GRID)
-        axis.set(xscale="log", ylim=(0.0, 1.0))
         lines = {v: data_profile(kept.value_hits[rows, place], n_free[rows], grid) for v, rows in variants.items()}
-        named_lines(axis, grid, lines, evidence.colours)
-        axis.grid(alpha=0.3)
-        axis.set_title(f"{setting}, {share:g} left")
+        curves.append((f"{setting}, {share:g} left", grid, lines))
+    figure, axes = share_panels(curves, evidence.colours, columns, 6.6)
     for axis in axes[-columns:]:
         axis.set_xlabel("simulations / (free parameters + 1)")
     for axis in axes[::columns]:

@@ -1,7 +1,7 @@
 """Table II of the paper beside ours: mean and spread of repeated identifications."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,23 +66,21 @@ def table2(estimates: DataFrame, published: DataFrame) -> Table:
 
 def paper_row(name: str, values: np.ndarray, box: DataFrame) -> dict[str, object]:
     """Return the paper's line of one parameter; a value on the bound of our box, which is the paper's, is counted."""
-    found = spread(values)
     low, high = box.loc[name, ["low", "high"]].to_numpy(float)
     at_bound = int(np.count_nonzero(np.isclose(values, low) | np.isclose(values, high)))
     return {
-        "setting": "measured arm", "variant": PAPER, "parameter": name, "n": found.n, "mean": found.mean,
-        "deviation": found.deviation, "low": low, "high": high, "n_at_bound": at_bound,
+        "setting": "measured arm", "variant": PAPER, "parameter": name, **spread(values), "low": low, "high": high,
+        "n_at_bound": at_bound,
     }  # fmt: skip
 
 
 def one_row(group: DataFrame) -> dict[str, object]:
-    found = spread(group["value"])
     records = [spread(v) for _, v in group.groupby("case", sort=False)["value"]]
     truths = group["truth"].dropna().unique()
     return {
-        "truth": float(truths[0]) if truths.size == 1 else np.nan, "n": found.n, "mean": found.mean,
-        "deviation": found.deviation, "between": spread([r.mean for r in records]).deviation,
-        "within": float(np.sqrt(np.mean([r.deviation**2 for r in records]))), "bound": group["deviation"].median(),
+        "truth": float(truths[0]) if truths.size == 1 else np.nan, **spread(group["value"]),
+        "between": spread([r["mean"] for r in records])["deviation"],
+        "within": float(np.sqrt(np.mean([r["deviation"] ** 2 for r in records]))), "bound": group["deviation"].median(),
         "low": group["low"].iloc[0], "high": group["high"].iloc[0], "n_at_bound": int(group["at_bound"].sum()),
     }  # fmt: skip
 
@@ -90,7 +88,7 @@ def one_row(group: DataFrame) -> dict[str, object]:
 def table2_records(estimates: DataFrame) -> Table:
     keys = ["setting", "variant", "case", "parameter", "unit"]
     rows = [
-        dict(zip(keys, k, strict=True)) | spread(g["value"])._asdict()
+        dict(zip(keys, k, strict=True)) | spread(g["value"])
         | {"bound": g["deviation"].median(), "n_at_bound": int(g["at_bound"].sum())}
         for k, g in estimates.groupby(keys, sort=False)
     ]  # fmt: skip
@@ -98,18 +96,10 @@ def table2_records(estimates: DataFrame) -> Table:
     return Table("table2_records", "Table II, record by record", TABLE_CAPTION, DataFrame(rows), columns, most=0)
 
 
-class Spread(NamedTuple):
-    n: int
-    mean: float
-    deviation: float
-
-
-def spread(values: ArrayLike) -> Spread:
+def spread(values: ArrayLike) -> dict[str, float]:
     """Return number, mean and deviation; the paper's Table II prints the last as "mean square error"."""
     sample = np.asarray(values, np.float64)
-    if not sample.size:
-        return Spread(0, np.nan, np.nan)
-    return Spread(sample.size, float(sample.mean()), float(sample.std(ddof=0)))
+    return {"n": sample.size, "mean": float(sample.mean()), "deviation": float(sample.std(ddof=0))}
 
 
 def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
