@@ -35,10 +35,10 @@ from armid.loop.constants import (
     measurements,
     trends_of,
 )
-from armid.loop.diagnose import diagnose, diagnosed, holdout_residuals, is_significant, train_residuals
+from armid.loop.diagnose import holdout_residuals, is_significant, train_residuals
 from armid.loop.empirical import Term, empirical_term
-from armid.loop.equivalence import WITHIN, EffectGroup, Likeness, RivalModel, group_of, rival_models
-from armid.loop.fit import Fit, criterion, dwarfs_noise, predicted_alike, with_own_starts, with_standard_accuracy
+from armid.loop.equivalence import WITHIN, EffectGroup, group_of, rival_models
+from armid.loop.fit import Fit, behind, criterion, predicted_alike, with_standard_accuracy
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
     CARRIES_NOT,
@@ -331,7 +331,7 @@ class Decision:
     groups: Sequence[EffectGroup]
     claimed: frozenset[str] = frozenset()
     refused: EffectGroup | None = None
-    rivals: tuple[RivalModel, ...] = ()
+    rivals: tuple[Fit, ...] = ()
     members: Sequence[Fit] = ()
     contest: Sequence[Rival] = ()
     missing: Missing | None = None
@@ -365,10 +365,10 @@ def decide(search: Search) -> Decision:
                         [group_beside(constants, search)], constants=constants, equal=[constants])  # fmt: skip
     named, groups, refused = largest_named(predicting_best(levels), search)
     rivals = rival_models(named, search.of_size(len(named.active)))
-    members = [f for g in groups for n in g.all_names[1:] if (f := search.model_with(n, named)) is not None]
+    members = [f for g in groups for n in g.rivals if (f := search.model_with(n, named)) is not None]
     contest = contest_of(groups, refused, search, last) or contest_of_models(named, rivals)
     return Decision(search, library, declared, named, last, groups, claimed_names(named, search), refused, rivals,
-                    [*members, *(r.fit for r in rivals)], contest,
+                    [*members, *rivals], contest,
                     equal=beside if len(named.active) == 1 else ())  # fmt: skip
 
 
@@ -381,7 +381,7 @@ def with_curve(found: Decision) -> Decision:
     if term is None:
         return replace(found, missing=missing)
     names = dict.fromkeys(EffectKey(f"{UNNAMED}{d.port}").public for d in term.others)
-    curves = EffectGroup(term.fit.active[-1].public, tuple(Likeness(n, 0.0, 1.0) for n in names), ())
+    curves = EffectGroup(term.fit.names[-1], tuple(names))
     contest = contest_of(found.groups, None, found.search, found.largest)
     return Decision(term.search, term.search.library, found.declared, term.fit, found.largest,
                     [*found.groups, curves], missing=missing, term=term, contest=contest)  # fmt: skip
@@ -391,12 +391,12 @@ def steps_of(found: Decision, judged: Sequence[Judgement]) -> tuple[Step, ...]:
     """Return one step for each effect of the chosen model, or one for the constants that take their place."""
     if found.constants is not None:
         name, group = found.constants.name, found.groups[0]
-        return (Step(name, "", group.names[1:], False, True, found.constants.moved, judged[0], group),)
+        return (Step(name, "", group.alike, False, True, found.constants.moved, judged[0], group),)
     originals, others = found.library.originals, constants_beside(found.equal)
     steps = []
     for key, after, group in zip(found.chosen.active, judged, found.groups, strict=True):
-        constants = tuple(n for n in group.names if n.startswith(CONSTANT))
-        effects = tuple(n for n in group.names[1:] if n not in constants)
+        constants = tuple(n for n in (group.name, *group.alike) if n.startswith(CONSTANT))
+        effects = tuple(n for n in group.alike if n not in constants)
         steps.append(Step(key.public, ", ".join(originals[key.declared].adds), effects, key.is_empirical,
                           key.public in found.claimed, (*constants, *others), after, group))  # fmt: skip
     return tuple(steps)
@@ -408,7 +408,7 @@ def predicting_best(levels: Sequence[SearchLevel]) -> list[SearchLevel]:
     There significance is had for nothing, and what wins on train may lose on what was left out.
     """
     earned = [level for level in levels if level.earned]
-    if len(earned) < 2 or not dwarfs_noise(earned[-1].best):
+    if len(earned) < 2 or not earned[-1].best.dwarfs_noise:
         return earned
     alike = predicted_alike([level.best for level in earned])
     smallest = next(i for i, level in enumerate(earned) if any(level.best is f for f in alike))
@@ -441,7 +441,7 @@ def inside_its_ranges(level: SearchLevel) -> Fit:
     A strength or a shape that ends at its bound says that the effect is not what it was declared to be.
     """
     best = level.best
-    near = (f for f in level.fits if criterion(f, best.independent) - criterion(best, best.independent) < WITHIN)
+    near = (f for f in level.fits if behind(f, best) < WITHIN)
     return next((f for f in near if not f.is_at_a_bound), best)
 
 
@@ -451,22 +451,22 @@ def claimed_names(named: Fit, search: Search) -> frozenset[str]:
     Those of a model that leaves noise; where the misfit dwarfs the noise, those that every model holds which predicts
     the parts left out as well as the best does.
     """
-    names = frozenset(key.public for key in named.active)
+    names = frozenset(named.names)
     if not names or not is_significant(named):
         return names
-    if not dwarfs_noise(named):
+    if not named.dwarfs_noise:
         return frozenset()
     sizes = range(len(named.active) + 1)
     models = [named, *(f for n in sizes for f in search.of_size(n)[:MOST_COMPARED] if f is not named)]
-    return names.intersection(*({k.public for k in f.active} for f in predicted_alike(models)))
+    return names.intersection(*(f.names for f in predicted_alike(models)))
 
 
 def is_denied(before: Judgement, after: Judgement) -> bool:
     """Tell whether held-out records are simulated clearly worse with what was added than without it."""
-    old, new = before.holdout_error, after.holdout_error
-    if old is None or new is None or after.holdout is None:
+    old, new = before.holdout, after.holdout
+    if old is None or new is None:
         return False
-    return new.rmse > DENIED * old.rmse and new.rmse > OVER_NOISE * after.holdout.noise_rms
+    return new.errors.rmse > DENIED * old.errors.rmse and new.errors.rmse > OVER_NOISE * new.noise_rms
 
 
 def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, members: Sequence[Fit]) -> Judgement:
@@ -474,22 +474,16 @@ def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, member
 
     biases: see `unseen_biases_of`. members: models that cannot be told from it, over which intervals reach.
     """
-    fit = with_own_starts(with_standard_accuracy(fit))
+    fit = with_standard_accuracy(fit)
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
-    diagnosis, unseen_diagnosis = diagnosed(fit), None if unseen is None else diagnose(unseen)
-    train_error = campaign_errors(seen.judged, fit.candidate)
-    assert train_error is not None
-    remains = diagnosis.significant or (unseen_diagnosis is not None and unseen_diagnosis.significant)
-    return Judgement(
-        fit, library.public_model(fit.active),
-        estimates(fit, library, remains, biases, members), seen, unseen, train_error,
-        None if unseen is None else campaign_errors(unseen.judged, fit.candidate), diagnosis, unseen_diagnosis,
-    )  # fmt: skip
+    remains = any(r.diagnosis.significant for r in (seen, unseen) if r is not None)
+    model = library.public_model(fit.active)
+    return Judgement(fit, model, estimates(fit, library, remains, biases, members), seen, unseen)
 
 
 def verdicts_of(
     before: Judgement, after: Judgement, steps: Sequence[Step], withdrawn: Withdrawn | None,
-    refused: EffectGroup | None, rivals: Sequence[RivalModel],
+    refused: EffectGroup | None, rivals: Sequence[Fit],
 ) -> tuple[str, ...]:  # fmt: skip
     """Return the verdicts that hold, each in one word, the one to be told first before the others.
 
@@ -510,19 +504,19 @@ def verdicts_of(
 
 def contest_of(groups: Sequence[EffectGroup], refused: EffectGroup | None, search: Search, best: Fit) -> list[Rival]:
     """Return the models that differ in the effect of the first group of several, none where nothing is in doubt."""
-    in_doubt = [g for g in (*groups, *([refused] if refused is not None else [])) if g.alike or g.unlike]
+    in_doubt = [g for g in (*groups, *([refused] if refused is not None else [])) if g.rivals]
     named = [g for g in in_doubt if not g.name.startswith(SHOWN_AS)][:1]
-    names = [name for g in named for name in (g.name, *(r.name for r in (*g.alike, *g.unlike)))]
+    names = [name for g in named for name in (g.name, *g.rivals)]
     fits = [(name, search.model_with(name, best)) for name in names[:MOST_RIVALS]]
     return [rival(name, fit, best) for name, fit in fits if fit is not None]
 
 
-def contest_of_models(named: Fit, rivals: Sequence[RivalModel]) -> list[Rival]:
+def contest_of_models(named: Fit, rivals: Sequence[Fit]) -> list[Rival]:
     """Return a model and its rivals that differ in more effects than one, none where there is no such rival."""
     if not rivals:
         return []
     mine = rival(" + ".join(key.compiled for key in named.active), named, named)
-    return [mine, *(rival(" + ".join(r.names), r.fit, named) for r in rivals[: MOST_RIVALS - 1])]
+    return [mine, *(rival(" + ".join(r.names), r, named) for r in rivals[: MOST_RIVALS - 1])]
 
 
 def rival(name: str, fit: Fit, best: Fit) -> Rival:

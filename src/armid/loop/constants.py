@@ -19,7 +19,7 @@ from armid.estimation.least_squares import LeastSquaresProblem, descend
 from armid.loop.candidates import ROUGHLY, Library
 from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import MOST as TOO_MANY
-from armid.loop.equivalence import WITHIN, EffectGroup, Likeness
+from armid.loop.equivalence import WITHIN, EffectGroup
 from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.score_test import free_values
 from armid.loop.search import Search, unless_diverged
@@ -197,9 +197,8 @@ def measurements(models: Sequence[ConstantModel]) -> list[str]:
 def group_beside(constants: ConstantModel, search: Search) -> EffectGroup:
     """Return the constants with the single effects that do as well, none where they are too many to say anything."""
     fits = [f for f in search.of_size(1) if f.chi2 < constants.chi2 + WITHIN]
-    near = dict.fromkeys(f.active[0].public for f in fits)
-    alike = tuple(Likeness(name, 0.0, 1.0) for name in near) if len(near) < TOO_MANY else ()
-    return EffectGroup(constants.name, alike, ())
+    near = tuple(dict.fromkeys(f.active[0].public for f in fits))
+    return EffectGroup(constants.name, near if len(near) < TOO_MANY else ())
 
 
 def known_together(fit: Fit, library: Library) -> tuple[str, ...]:

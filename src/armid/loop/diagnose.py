@@ -11,6 +11,7 @@ from scipy.special import chdtrc, fdtrc
 
 from armid.engine import along, simulate
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
+from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
 from armid.loop.candidates import Library, calibrated_replays
 from armid.loop.fit import Fit, beyond, decomposed
@@ -56,6 +57,16 @@ class Residuals:
     @property
     def model(self) -> Model:
         return self.replays[0].model
+
+    @cached_property
+    def errors(self) -> JointErrors:
+        errors = campaign_errors(self.judged, self.candidate)
+        assert errors is not None
+        return errors
+
+    @cached_property
+    def diagnosis(self) -> "Diagnosis":
+        return diagnose(self)
 
     @property
     def variance(self) -> float:
@@ -166,7 +177,7 @@ def variable_names(model: Model) -> list[str]:
     return [*first, *(n for n in states if n not in first), *(i.name for i in plant.inputs), *drive]
 
 
-@lru_cache(maxsize=4)  # asked for by one test after the other; what they share is found once
+@lru_cache(maxsize=16)  # many ask about the same few models; what their tests share is found once
 def train_residuals(fit: Fit) -> Residuals:
     """Return what a fit leaves on its records, beyond the reach of their measured starts: these are known roughly."""
     residual, basis = fit.residual, fit.basis
@@ -176,15 +187,11 @@ def train_residuals(fit: Fit) -> Residuals:
     return Residuals(fit.records.data, fit.records.replays, fit.candidate, residual, basis)
 
 
-@lru_cache(maxsize=16)  # many ask about the same few models
-def diagnosed(fit: Fit) -> "Diagnosis":
-    return diagnose(train_residuals(fit))
-
-
 def is_significant(fit: Fit) -> bool:
     """Tell whether what a model leaves on train is more than noise; where its size alone says so, that is enough."""
-    whole = next(size_tests(train_residuals(fit)), None)
-    return (whole is not None and whole.p < CERTAIN) or diagnosed(fit).significant
+    seen = train_residuals(fit)
+    whole = next(size_tests(seen), None)
+    return (whole is not None and whole.p < CERTAIN) or seen.diagnosis.significant
 
 
 def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -> Residuals | None:

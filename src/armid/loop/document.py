@@ -11,7 +11,7 @@ from armid.estimation.constants import NAMED
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
 from armid.loop.candidates import SHOWN_AS
-from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, Residuals, time_in_words
+from armid.loop.diagnose import SIGNIFICANCE, Finding, Residuals, time_in_words
 from armid.loop.figures import candidate_figure, figures_of, record_figure
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
@@ -311,8 +311,8 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
     before, after = found.before, found.after
     records = [*record_entries(before.train, after.train), *record_entries(before.holdout, after.holdout)]
     diagnoses = {
-        name: {role: None if seen is None or told is None else diagnosis_sentences(told, seen) for role, told, seen in
-               (("train", judged.diagnosis, judged.train), ("holdout", judged.holdout_diagnosis, judged.holdout))}
+        name: {role: None if seen is None else diagnosis_sentences(seen)
+               for role, seen in (("train", judged.train), ("holdout", judged.holdout))}
         for name, judged in (("before", before), ("after", after))
     }  # fmt: skip
     return {
@@ -398,9 +398,8 @@ def carried_sentence(found: ClosedLoop) -> str:
     if found.withdrawn is None:
         return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip
-    assert found.before.holdout_error is not None
-    assert judged.holdout_error is not None
-    worse = judged.holdout_error.rmse / found.before.holdout_error.rmse - 1.0
+    assert found.before.holdout is not None
+    worse = unseen.errors.rmse / found.before.holdout.errors.rmse - 1.0
     names = " + ".join(s.effect for s in found.withdrawn.steps)
     return (f"The train records ask for {names}, but the records held out are simulated {worse:.0%} worse with it "
             f"({missed}): it is withdrawn, and the declared model stands.")  # fmt: skip
@@ -410,13 +409,13 @@ def doubtful(found: ClosedLoop) -> str:
     if found.after.fit.constants:
         return constants_sentence(found)
     if found.refused is not None:
-        rivals = [r.name for r in (*found.refused.alike, *found.refused.unlike)]
+        rivals = found.refused.rivals
         return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
                 f"as well ({found.refused.name}, {', '.join(rivals[:6])}): none is named.")  # fmt: skip
     said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
     said += [f"{s.effect} cannot be told from {' or '.join(s.constants)} within tolerance"
              for s in found.steps if s.constants]  # fmt: skip
-    said += [f"{s.effect} fits hardly better than {' or '.join(r.name for r in s.group.unlike)}"
+    said += [f"{s.effect} fits hardly better than {' or '.join(s.group.unlike)}"
              for s in found.steps if s.group.unlike]  # fmt: skip
     names = " + ".join(found.effects)
     said += [f"{names} fits hardly better than {' + '.join(r.names)}" for r in found.rivals]
@@ -444,7 +443,8 @@ def missing_sentences(missing: Missing) -> list[str]:
     return [*said, f"On what it depends, by the share that a curve predicts on parts left out of its fit: {curves}."]
 
 
-def diagnosis_sentences(diagnosis: Diagnosis, seen: Residuals) -> list[str]:
+def diagnosis_sentences(seen: Residuals) -> list[str]:
+    diagnosis = seen.diagnosis
     if not diagnosis.significant:
         return [f"What remains cannot be told from noise (least chance of {len(diagnosis.findings)} tests together "
                 f"{diagnosis.p:.2g}, {SIGNIFICANCE:g} would be significant)."]  # fmt: skip

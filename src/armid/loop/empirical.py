@@ -11,7 +11,7 @@ from armid.errors import ArmidError
 from armid.loop.candidates import UNNAMED, EffectKey, Library, joined
 from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import WITHIN
-from armid.loop.fit import Fit, compare, criterion, dwarfs_noise, fit_from, predicted_alike
+from armid.loop.fit import Fit, compare, criterion, fit_from, predicted_alike
 from armid.loop.missing_signal import (
     N_HEIGHTS,
     Dependence,
@@ -70,7 +70,7 @@ def empirical_term(named: Fit, search: Search) -> tuple[Missing | None, Term | N
         judged = compare(named, term.fit, n_extra=max(term.fit.n_free - named.n_free, 1))
         if not judged.earned or judged.left_out[1] >= judged.left_out[0] or not term.fit.needs(term.fit.active[-1]):
             continue
-        if not dwarfs_noise(named) or not any(f is named for f in predicted_alike([named, term.fit])):
+        if not named.dwarfs_noise or not any(f is named for f in predicted_alike([named, term.fit])):
             return missing, term
     return missing, None
 

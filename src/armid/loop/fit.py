@@ -63,8 +63,18 @@ class Fit:
         return max(1.0, float(np.sqrt(self.chi2 / len(self.residual))))
 
     @property
+    def dwarfs_noise(self) -> bool:
+        """Whether it leaves more than ten times the noise."""
+        return self.chi2 > DWARFED**2 * len(self.residual)
+
+    @property
     def n_free(self) -> int:
         return len(self.z)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Public names of the effects."""
+        return tuple(key.public for key in self.active)
 
     @property
     def model(self) -> Model:
@@ -198,11 +208,11 @@ def fit_from(
 
 
 def with_standard_accuracy(fit: Fit) -> Fit:
-    """Return a fit whose records are simulated on the engine's standard accuracy, itself where they are already."""
+    """Return a fit about its own starts whose records are simulated on the engine's standard accuracy, or finer."""
     records = fit.records
     standard = calibrated_replays([r.record for r in records.replays], fit.model, records.space, fit.values)
     if not is_finer(standard, records.replays):
-        return fit
+        return with_own_starts(fit)
     # the pieces are those of the fit, whose constants may be others than the record's
     pairs = zip(records.replays, standard, strict=True)
     # nor coarser than what the fit was made with
@@ -213,7 +223,8 @@ def with_standard_accuracy(fit: Fit) -> Fit:
         ))
         for ours, theirs in pairs
     )  # fmt: skip
-    return replace(fit_from(replace(records, replays=replays), fit.active, [fit.z]), constants=fit.constants)
+    again = fit_from(replace(records, replays=replays), fit.active, [fit.z])
+    return with_own_starts(replace(again, constants=fit.constants))
 
 
 def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
@@ -270,11 +281,6 @@ class Comparison:
         return ""
 
 
-def dwarfs_noise(fit: Fit) -> bool:
-    """Tell whether what a model leaves is more than ten times the noise."""
-    return fit.chi2 > DWARFED**2 * len(fit.residual)
-
-
 def criterion(fit: Fit, independent: float) -> float:
     """Return n_eff ln(chi2) + k ln(n_eff), the Bayesian criterion with effective samples; smaller is better.
 
@@ -283,6 +289,11 @@ def criterion(fit: Fit, independent: float) -> float:
     chi2 counts in proportion to what remains: no term is added for ever to a residual that the library cannot explain.
     """
     return float(independent * np.log(fit.chi2) + fit.n_free * np.log(independent))
+
+
+def behind(fit: Fit, best: Fit) -> float:
+    """Return how much worse than that of another model its criterion is."""
+    return criterion(fit, best.independent) - criterion(best, best.independent)
 
 
 def compare(smaller: Fit, larger: Fit, n_candidates: int = 1, n_shapes: int = 1, n_extra: int = 1) -> Comparison:
@@ -307,7 +318,7 @@ def left_out(smaller: Fit, larger: Fit) -> tuple[float, float]:
     Where the misfit dwarfs the noise, records that are alike are left out together, and the worse grouping counts.
     Infinite where a fit without a part diverges on it.
     """
-    groupings = larger.records.data.groupings()[1:] if dwarfs_noise(smaller) else []
+    groupings = larger.records.data.groupings()[1:] if smaller.dwarfs_noise else []
     found = []
     for parts in (parts_to_judge(smaller, larger), *groupings):
         before, after = (float(sum(left_out_part(fit, part) for part in parts)) for fit in (smaller, larger))

@@ -15,7 +15,7 @@ from armid.estimation.least_squares import held_by_bound
 from armid.loop.candidates import Library
 from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.empirical import Term
-from armid.loop.equivalence import EffectGroup, RivalModel
+from armid.loop.equivalence import EffectGroup
 from armid.loop.fit import Fit
 from armid.loop.missing_signal import Missing
 from armid.loop.score_test import Score, rest_of, score
@@ -80,33 +80,41 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Hold one model and what it leaves.
-
-    train, holdout: what it leaves on the records, their errors and what was found there; holdout None where there are
-    no such records.
-    """
+    """Hold one model and what it leaves on the records; holdout: None where there are no such records."""
 
     fit: Fit
     model: Model
     estimates: tuple[Estimate, ...]
     train: Residuals
     holdout: Residuals | None
-    train_error: JointErrors
-    holdout_error: JointErrors | None
-    diagnosis: Diagnosis
-    holdout_diagnosis: Diagnosis | None
+
+    @property
+    def train_error(self) -> JointErrors:
+        return self.train.errors
+
+    @property
+    def holdout_error(self) -> JointErrors | None:
+        return None if self.holdout is None else self.holdout.errors
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        return self.train.diagnosis
+
+    @property
+    def holdout_diagnosis(self) -> Diagnosis | None:
+        return None if self.holdout is None else self.holdout.diagnosis
 
     @property
     def significant(self) -> bool:
-        return self.diagnosis.significant or (self.holdout_diagnosis is not None and self.holdout_diagnosis.significant)
+        return self.diagnosis.significant or (self.holdout is not None and self.holdout.diagnosis.significant)
 
     @property
     def fails_to_carry_over(self) -> bool:
         """Whether train is noise and held-out records are not, by more than the doubt of the prediction."""
-        if self.holdout is None or self.holdout_error is None or self.holdout_diagnosis is None:
+        unseen = self.holdout
+        if unseen is None or self.diagnosis.significant or not unseen.diagnosis.significant:
             return False
-        is_larger = self.holdout_error.rmse > CARRIED * self.holdout.noise_rms
-        return not self.diagnosis.significant and self.holdout_diagnosis.significant and is_larger
+        return unseen.errors.rmse > CARRIED * unseen.noise_rms
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +170,7 @@ class ClosedLoop(Result):
     steps: tuple[Step, ...]
     withdrawn: Withdrawn | None
     refused: EffectGroup | None
-    rivals: tuple[RivalModel, ...]
+    rivals: tuple[Fit, ...]
     advice: tuple[Advice, ...]
     next_steps: tuple[str, ...]
     known_together: tuple[str, ...]
@@ -331,13 +339,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
         "next_steps": list(found.next_steps),
         "known_together": list(found.known_together),
         "taken_as_exact": list(found.campaign.taken_as_exact),
-        "log": [
-            {
-                "n_effects": r.n_effects, "n_tried": r.n_tried, "refused": r.refused,
-                "leading": [{"effects": list(names), "chi2_per_sample": finite(value)} for names, value in r.leading],
-            }
-            for r in found.search.rounds
-        ],
+        "log": list(found.search.rounds),
     }  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import compress
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.least_squares import REACH, held_by_bound
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
-from armid.loop.diagnose import diagnosed, is_significant
+from armid.loop.diagnose import is_significant, train_residuals
 from armid.loop.equivalence import substitutes
 from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, fit_globally, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
@@ -70,25 +70,12 @@ class SearchLevel:
         return self.comparison is None or self.comparison.earned
 
 
-@dataclass(frozen=True)
-class Round:
-    """Say what one round of the search tried, what it reached, and why it was taken or refused.
-
-    n_tried: models that were fitted. leading: names and chi2 per sample of the best, best first. refused: the threshold
-    in words, "" where the best was taken.
-    """
-
-    n_effects: int
-    n_tried: int
-    leading: tuple[tuple[tuple[str, ...], float], ...]
-    refused: str
-
-
 @dataclass(eq=False)
 class Search:
     """Extend models until nothing earns its parameters.
 
-    fits: every model that was fitted, by its effects. scores: of the candidates at each of them. rounds: the log.
+    fits: every model that was fitted, by its effects. scores: of the candidates at each of them. rounds: the log, as
+    report.json holds it.
     limit: chi2 to which a model must be able to come, else it is given up. enough: asked of each level that earned its
     effects, whether to look no further.
     """
@@ -96,7 +83,7 @@ class Search:
     library: Library
     fits: dict[frozenset[EffectKey], Fit] = field(default_factory=dict)
     scores: dict[frozenset[EffectKey], list[Score]] = field(default_factory=dict)
-    rounds: list[Round] = field(default_factory=list)
+    rounds: list[dict[str, Any]] = field(default_factory=list)
     limit: float = np.inf
     enough: Callable[[SearchLevel], bool] = lambda _: False
 
@@ -146,7 +133,7 @@ class Search:
         smaller: the model with which they are compared.
         """
         size = len(last.best.active) + 1
-        if last.best.active and (p := diagnosed(last.best).p) > QUIET:
+        if last.best.active and (p := train_residuals(last.best).diagnosis.p) > QUIET:
             self.note_round(size, f"what is left is noise (chance {p:.2g}; below {QUIET:g} the search goes on)")
             return None
         self.extend(last.best)
@@ -181,10 +168,11 @@ class Search:
         return SearchLevel(tuple(fits), compared)
 
     def note_round(self, size: int, refused: str) -> None:
-        """Note how a round ended."""
+        """Note how a round ended: the threshold that refused its best in words, "" where it was taken."""
         fits = self.of_size(size)
-        best = {tuple(k.public for k in f.active): f.chi2 / len(f.residual) for f in reversed(fits[: 2 * N_LOGGED])}
-        self.rounds.append(Round(size, len(fits), tuple(reversed(best.items()))[:N_LOGGED], refused))
+        best = {f.names: f.chi2 / len(f.residual) for f in reversed(fits[: 2 * N_LOGGED])}
+        leading = [{"effects": list(names), "chi2_per_sample": c} for names, c in reversed(best.items())][:N_LOGGED]
+        self.rounds.append({"n_effects": size, "n_tried": len(fits), "refused": refused, "leading": leading})
 
     def scores_at(self, fit: Fit) -> list[Score]:
         active = frozenset(fit.active)
@@ -319,7 +307,7 @@ class Search:
 
     def model_with(self, name: str, best: Fit) -> Fit | None:
         """Return the best fit of the same size that holds an effect and differs from the best by no more than it."""
-        known = [f for f in self.of_size(len(best.active)) if name in {k.public for k in f.active}]
+        known = [f for f in self.of_size(len(best.active)) if name in f.names]
         near = [f for f in known if len(declared_keys(f.active) - declared_keys(best.active)) <= 1]
         return near[0] if near else None
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.information import NORMAL_95, start_changes
 from armid.loop.candidates import Library
-from armid.loop.diagnose import diagnose, holdout_residuals, is_significant
+from armid.loop.diagnose import holdout_residuals, is_significant
 from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.search import start_of, unless_diverged
 from armid.loop.whitening import WhiteRecords
@@ -400,7 +400,7 @@ def suspect_held_out(
     if is_significant(fit):
         return best, None
     unseen = holdout_residuals(fit, tuple(records), library)
-    if unseen is None or not diagnose(unseen).significant:
+    if unseen is None or not unseen.diagnosis.significant:
         return best, None
     few = LEFT * (float(unseen.residual @ unseen.residual) - len(unseen.residual))
     base = WhiteRecords(unseen.replays, fit.records.space, unseen.data)
@@ -416,7 +416,7 @@ def suspect_held_out(
             left = holdout_residuals(fit, changed, library)
             assert left is not None
             chi2 = float(left.residual @ left.residual) - len(left.residual)
-            if chi2 < least and (chi2 < few or not diagnose(left).significant):
+            if chi2 < least and (chi2 < few or not left.diagnosis.significant):
                 suspect = Mended(fit, index, fault, value, deviation, chi2).suspect(record, plant, REPORTED)
                 least, best = chi2, changed
     return best, suspect
