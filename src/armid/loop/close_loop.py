@@ -12,7 +12,6 @@ from armid.estimation.advice import Advice, Rival, advise
 from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import Estimates, with_fitted_starts
-from armid.estimation.mends import Suspicion
 from armid.estimation.screen import screen
 from armid.loop.candidates import (
     CONSTANT,
@@ -74,6 +73,9 @@ from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
+LibraryFor = Callable[[Sequence[Record]], Library]
+# What is decided, who is suspected, and the train records as they are taken.
+Settled = tuple["Decision", list[Suspect], tuple[Record, ...]]
 MOST_ADVICE, MOST_RIVALS = 5, 4
 # Models of each size whose predictions are compared before a name is claimed.
 MOST_COMPARED = 4
@@ -146,11 +148,17 @@ def close_loop(
         told(f"going on from {len(estimates)} fits of {progress}")
 
     def library_for(records: Sequence[Record]) -> Library:
+        """Return the candidates with records, of which those in motion start where the declared model fits best."""
         data = replace(whitened(records, model.plant), estimates=estimates)
-        return with_starts_fitted(library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {},
-                                             threads, told, within))  # fmt: skip
+        library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told,
+                             within)  # fmt: skip
+        posed = library.problem(())
+        return library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
 
-    screened = screened_train(model, campaign, bounds or {}, fixed or {})
+    own_bounds = {n: b for n, b in (bounds or {}).items() if n in model.parameters}
+    own_fixed = {n: v for n, v in (fixed or {}).items() if n in model.parameters}
+    space = space_of(model, campaign.parameters, own_bounds, own_fixed)
+    screened = screen(replace(campaign, records=campaign.train), model, space)
     implausible = any(s.kind in GROSS for s in screened)
     found, suspects, train = settled(library_for, campaign.train, implausible)
     found = with_curve(found) if curve and not implausible else found
@@ -166,7 +174,7 @@ def close_loop(
     if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
         steps = tuple(replace(step, claimed=False) for step in steps)
     withdrawn = Withdrawn(steps, after) if steps and is_denied(before, after) else None
-    verdicts = verdicts_of(before, after, steps, withdrawn, found.refused, found.rivals)
+    verdicts = verdicts_of(before, after, steps, withdrawn, found)
     if any(s.role == "train" for s in suspects):
         verdicts = (DISAGREES, *(v for v in verdicts if v not in (NO_DISCREPANCY, EXPLAINED)))
     if implausible:
@@ -189,20 +197,8 @@ def close_loop(
                       search, found.missing, term)  # fmt: skip
 
 
-def screened_train(
-    model: Model, campaign: Campaign, bounds: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
-) -> tuple[Suspicion, ...]:
-    """Return the mistakes in the train records; the gross ones (sign, unit, clock, exchanged files) end a search."""
-    train, own = replace(campaign, records=campaign.train), model.parameters
-    space = space_of(model, campaign.parameters, {n: b for n, b in bounds.items() if n in own},
-                     {n: v for n, v in fixed.items() if n in own})  # fmt: skip
-    return screen(train, model, space)
-
-
-def settled(
-    library_for: Callable[[Sequence[Record]], Library], train: tuple[Record, ...], implausible: bool
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
-    """Suspect the records, then decide; return what was decided, who is suspected, and the train records as taken.
+def settled(library_for: LibraryFor, train: tuple[Record, ...], implausible: bool) -> Settled:
+    """Suspect the records, then decide.
 
     A fault of one record that leaves noise, or next to nothing of what was more, is undone, unless one effect or
     constants do clearly better on all records; where several faults of it do as well, the record is left out. So it is
@@ -215,8 +211,8 @@ def settled(
     declared = search.start()
     if implausible:
         return Decision(search, library, declared, declared, declared, ()), [], train
-    mended = mended_records(declared, library) if is_significant(declared) else []
-    trends = trends_of(declared, library) if is_significant(declared) else []
+    lacks = is_significant(declared)
+    mended, trends = (mended_records(declared, library), trends_of(declared, library)) if lacks else ([], [])
     if mended or trends:
         # Of constants and effects only those count that come down to this.
         limit = max([*(m.chi2 for m in mended[:1]), *(t.chi2 for t in trends[:1])]) + WITHIN
@@ -246,9 +242,7 @@ def settled(
     return suspected_again(library_for, decided, train)
 
 
-def suspected_again(
-    library_for: Callable[[Sequence[Record]], Library], found: "Decision", train: tuple[Record, ...]
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
+def suspected_again(library_for: LibraryFor, found: "Decision", train: tuple[Record, ...]) -> Settled:
     """Suspect the records where what was found leaves more than noise, as `settled` does."""
     if found.constants is None and is_significant(found.largest):
         apart = disagreeing_record([found.declared, found.largest])
@@ -262,9 +256,8 @@ def suspected_again(
 
 
 def decided_without_fault(
-    library_for: Callable[[Sequence[Record]], Library], mended: Sequence[Mended], library: Library,
-    train: tuple[Record, ...],
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:  # fmt: skip
+    library_for: LibraryFor, mended: Sequence[Mended], library: Library, train: tuple[Record, ...]
+) -> Settled:
     """Return what is decided on records without the best of some faults, as `settled` does."""
     best, plant, measured = mended[0], library.declared.plant, library.data.records
     faulty = measured[best.index]
@@ -282,9 +275,8 @@ def decided_without_fault(
 
 
 def decided_without_trend(
-    library_for: Callable[[Sequence[Record]], Library], trends: Sequence[Trend], library: Library,
-    train: tuple[Record, ...],
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:  # fmt: skip
+    library_for: LibraryFor, trends: Sequence[Trend], library: Library, train: tuple[Record, ...]
+) -> Settled:
     """Return what is decided on records without the best of some trends, as `settled` does."""
     best, *others = trends
     alike = [t for t in others if t.chi2 < best.chi2 + WITHIN]
@@ -366,7 +358,7 @@ def decide(search: Search) -> Decision:
     named, groups, refused = largest_named(predicting_best(levels), search)
     rivals = rival_models(named, search.of_size(len(named.active)))
     members = [f for g in groups for n in g.rivals if (f := search.model_with(n, named)) is not None]
-    contest = contest_of(groups, refused, search, last) or contest_of_models(named, rivals)
+    contest = contest_of([*groups, refused], search, last) or contest_of_models(named, rivals)
     return Decision(search, library, declared, named, last, groups, claimed_names(named, search), refused, rivals,
                     [*members, *rivals], contest,
                     equal=beside if len(named.active) == 1 else ())  # fmt: skip
@@ -380,9 +372,8 @@ def with_curve(found: Decision) -> Decision:
     missing, term = empirical_term(found.chosen, found.search)
     if term is None:
         return replace(found, missing=missing)
-    names = dict.fromkeys(EffectKey(f"{UNNAMED}{d.port}").public for d in term.others)
-    curves = EffectGroup(term.fit.names[-1], tuple(names))
-    contest = contest_of(found.groups, None, found.search, found.largest)
+    curves = EffectGroup(term.fit.names[-1], tuple(EffectKey(f"{UNNAMED}{port}").public for port in term.others))
+    contest = contest_of(found.groups, found.search, found.largest)
     return Decision(term.search, term.search.library, found.declared, term.fit, found.largest,
                     [*found.groups, curves], missing=missing, term=term, contest=contest)  # fmt: skip
 
@@ -413,12 +404,6 @@ def predicting_best(levels: Sequence[SearchLevel]) -> list[SearchLevel]:
     alike = predicted_alike([level.best for level in earned])
     smallest = next(i for i, level in enumerate(earned) if any(level.best is f for f in alike))
     return earned[: smallest + 1]
-
-
-def with_starts_fitted(library: Library) -> Library:
-    """Return the library whose records in motion start where the declared model fits best, others as they are."""
-    records = library.problem(())
-    return library.about(with_fitted_starts(records.replays, records.space), library.misfit)
 
 
 def largest_named(levels: Sequence[SearchLevel], search: Search) -> tuple[Fit, list[EffectGroup], EffectGroup | None]:
@@ -482,33 +467,30 @@ def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, member
 
 
 def verdicts_of(
-    before: Judgement, after: Judgement, steps: Sequence[Step], withdrawn: Withdrawn | None,
-    refused: EffectGroup | None, rivals: Sequence[Fit],
-) -> tuple[str, ...]:  # fmt: skip
+    before: Judgement, after: Judgement, steps: Sequence[Step], withdrawn: Withdrawn | None, found: "Decision"
+) -> tuple[str, ...]:
     """Return the verdicts that hold, each in one word, the one to be told first before the others.
 
     A term without a name never explains; of what does not carry over nothing is explained.
     """
     denied = withdrawn is not None or after.fails_to_carry_over
-    found = [CARRIES_NOT] if denied else []
+    verdicts = [CARRIES_NOT] if denied else []
     is_constant = any(s.effect.startswith(NAMED) for s in steps)
     in_doubt = any(s.alternatives or s.group.unlike or (s.constants and not is_constant) for s in steps)
-    if refused is not None or rivals or in_doubt:
-        found.append(TOO_ALIKE)
+    if found.refused is not None or found.rivals or in_doubt:
+        verdicts.append(TOO_ALIKE)
     if not steps or withdrawn is not None:
-        found += [UNEXPLAINED] if before.diagnosis.significant and refused is None else []
+        verdicts += [UNEXPLAINED] if before.diagnosis.significant and found.refused is None else []
     elif after.significant or any(s.empirical for s in steps):
-        found.append(PARTLY)
-    return tuple(found) or (EXPLAINED if steps else NO_DISCREPANCY,)
+        verdicts.append(PARTLY)
+    return tuple(verdicts) or (EXPLAINED if steps else NO_DISCREPANCY,)
 
 
-def contest_of(groups: Sequence[EffectGroup], refused: EffectGroup | None, search: Search, best: Fit) -> list[Rival]:
+def contest_of(groups: Sequence[EffectGroup | None], search: Search, best: Fit) -> list[Rival]:
     """Return the models that differ in the effect of the first group of several, none where nothing is in doubt."""
-    in_doubt = [g for g in (*groups, *([refused] if refused is not None else [])) if g.rivals]
-    named = [g for g in in_doubt if not g.name.startswith(SHOWN_AS)][:1]
-    names = [name for g in named for name in (g.name, *g.rivals)]
-    fits = [(name, search.model_with(name, best)) for name in names[:MOST_RIVALS]]
-    return [rival(name, fit, best) for name, fit in fits if fit is not None]
+    in_doubt = next((g for g in groups if g is not None and g.rivals and not g.name.startswith(SHOWN_AS)), None)
+    names = () if in_doubt is None else (in_doubt.name, *in_doubt.rivals)[:MOST_RIVALS]
+    return [rival(name, fit, best) for name in names if (fit := search.model_with(name, best)) is not None]
 
 
 def contest_of_models(named: Fit, rivals: Sequence[Fit]) -> list[Rival]:

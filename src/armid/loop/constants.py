@@ -21,7 +21,7 @@ from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import MOST as TOO_MANY
 from armid.loop.equivalence import WITHIN, EffectGroup
 from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
-from armid.loop.score_test import free_values
+from armid.loop.score_test import candidate_at
 from armid.loop.search import Search, unless_diverged
 from armid.loop.suspects import FREED, Suspect, simulated_file, with_measured
 from armid.loop.whitening import WhiteRecords
@@ -230,8 +230,7 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
 
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:
     """Return the change of the whitened signal by a parameter, its size taken as 1, about a fit, (n_samples,)."""
-    candidate = np.asarray(records.space.complete(free_values(records, fit.values)[np.newaxis])[0])
-    both = np.tile(candidate, (2, 1))
+    both = np.tile(candidate_at(records, fit.values), (2, 1))
     both[:, records.space.index(name)] += np.array([STEP, -STEP]) * size
     upper, lower = replace(records, data=fit.records.data).whole_signals(both)
     return np.asarray((upper - lower) / (2.0 * STEP))

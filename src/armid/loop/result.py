@@ -101,10 +101,6 @@ class Judgement:
         return self.train.diagnosis
 
     @property
-    def holdout_diagnosis(self) -> Diagnosis | None:
-        return None if self.holdout is None else self.holdout.diagnosis
-
-    @property
     def significant(self) -> bool:
         return self.diagnosis.significant or (self.holdout is not None and self.holdout.diagnosis.significant)
 
