@@ -383,12 +383,11 @@ def steps_of(found: Decision, judged: Sequence[Judgement]) -> tuple[Step, ...]:
     if found.constants is not None:
         name, group = found.constants.name, found.groups[0]
         return (Step(name, "", group.alike, False, True, found.constants.moved, judged[0], group),)
-    originals, others = found.library.originals, constants_beside(found.equal)
-    steps = []
+    candidates, others, steps = found.library.candidates, constants_beside(found.equal), []
     for key, after, group in zip(found.chosen.active, judged, found.groups, strict=True):
         constants = tuple(n for n in (group.name, *group.alike) if n.startswith(CONSTANT))
         effects = tuple(n for n in group.alike if n not in constants)
-        steps.append(Step(key.public, ", ".join(originals[key.declared].adds), effects, key.is_empirical,
+        steps.append(Step(key.public, ", ".join(candidates[key.declared].adds), effects, key.is_empirical,
                           key.public in found.claimed, (*constants, *others), after, group))  # fmt: skip
     return tuple(steps)
 

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
-from armid.engine import along, simulate
+from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
@@ -124,12 +124,9 @@ class Residuals:
         """Samples before and after each one-way switch of the plant, name -> (n_samples,); empty without a switch."""
         found: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
-            parts = []
-            for replay in self.replays:
-                for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
-                    run = simulate(self.model, piece.manoeuvre, self.candidate[np.newaxis], calibration.schedule)
-                    parts.append(piece.manoeuvre.times()[piece.window] >= run.switch_times[name][0])
-            after = np.concatenate(parts)
+            runs = (zip(r.pieces, r.runs(self.candidate[np.newaxis]), strict=True) for r in self.replays)
+            after = np.concatenate([piece.manoeuvre.times()[piece.window] >= run.switch_times[name][0]
+                                    for piece, run in chain.from_iterable(runs)])  # fmt: skip
             found |= {f"before '{name}'": ~after, f"after '{name}'": after}
         return {n: samples for n, samples in found.items() if samples.any()}
 

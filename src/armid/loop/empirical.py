@@ -119,11 +119,8 @@ def with_terms(library: Library) -> Library:
         extended = joined(model, effect)
         if extended is not None:
             model, added[EffectKey(effect.name)] = extended, effect
-    return replace(
-        library, candidates={**library.candidates, **added}, originals={**library.originals, **added},
-        bundles=((*(library.bundles[0] if library.bundles else ()), *added), *library.bundles[1:]),
-        _models={}, _problems={},
-    )  # fmt: skip
+    bundles = ((*(library.bundles[0] if library.bundles else ()), *added), *library.bundles[1:])
+    return replace(library, candidates={**library.candidates, **added}, bundles=bundles, _models={}, _problems={})
 
 
 def with_candidate(library: Library, key: EffectKey, effect: Effect) -> Library:
@@ -133,10 +130,7 @@ def with_candidate(library: Library, key: EffectKey, effect: Effect) -> Library:
     """
     if key not in library.candidates:
         raise ArmidError(f"a term at port {effect.name} cannot be composed with the candidates")
-    return replace(
-        library, candidates={**library.candidates, key: effect}, originals={**library.originals, key: effect},
-        _models={}, _problems={},
-    )  # fmt: skip
+    return replace(library, candidates={**library.candidates, key: effect}, _models={}, _problems={})
 
 
 def hat(place, knot):

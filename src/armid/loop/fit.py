@@ -15,7 +15,7 @@ from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.design import BOX
 from armid.estimation.information import start_changes
-from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, spread_starts
+from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound
 from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer
 from armid.loop.whitening import WhiteRecords
 from armid.model import Model
@@ -241,14 +241,6 @@ def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
         if np.all(np.abs(fit.z - last.z) <= SETTLED) or abs(last.chi2 / fit.chi2 - 1.0) <= max(SETTLED, untold):
             break
     return fit
-
-
-def fit_globally(records: WhiteRecords, active: Active) -> Fit:
-    """Return the least-squares estimate without a start, see `spread_starts`.
-
-    Raises ArmidError when every candidate diverges.
-    """
-    return fit_from(records, active, spread_starts(records) if records.space.free.any() else ())
 
 
 @dataclass(frozen=True)

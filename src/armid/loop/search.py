@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import REACH, held_by_bound
+from armid.estimation.least_squares import REACH, held_by_bound, spread_starts
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
 from armid.loop.diagnose import is_significant, train_residuals
 from armid.loop.equivalence import substitutes
-from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, fit_globally, with_own_starts
+from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
 from armid.loop.whitening import WhiteRecords
 
@@ -90,7 +90,9 @@ class Search:
     def start(self) -> Fit:
         """Return the declared model at its estimate."""
         if frozenset() not in self.fits:
-            self.fits[frozenset()] = accurate(fit_globally(self.library.problem(()), ()), self.library)
+            records = self.library.problem(())
+            starts = spread_starts(records) if records.space.free.any() else ()
+            self.fits[frozenset()] = accurate(fit_from(records, (), starts), self.library)
         return self.fits[frozenset()]
 
     def further(self, level: SearchLevel, limit: float, to_noise: bool = True) -> Fit | None:

@@ -4,7 +4,7 @@ Each is undone in one record, by the size that fits best together with the free 
 suspect. One effect explains all records with one strength, a fault one record: where both do, the record is suspected.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -23,6 +23,7 @@ from armid.model import Model, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Piece, Record
 from armid.record.broken import broken_samples
+from armid.units import shown
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -106,15 +107,15 @@ class Fault:
 
         faulty: the record of that of its outputs in which the fault is, None: the first.
         """
-        each = [self.trimmed_output(r, value, plant) if self.touches(faulty or record, r) else r for r in record.each]
+        each = list(record.each)
+        for i, one in enumerate(record.each):
+            if self.touches(faulty or record, one):
+                there, (first, last) = self.undone(one, value, plant), self.lost(one, value)
+                ends = [(first - p.start_index, one.measured.size - last - p.start_index) for p in there.pieces]
+                pieces = [replace(p, window=slice(max(p.window.start, low), min(p.window.stop, high)))
+                          for p, (low, high) in zip(there.pieces, ends, strict=True)]  # fmt: skip
+                each[i] = replace(there, pieces=tuple(p for p in pieces if p.n_samples > 0))
         return replace(each[0], others=tuple(each[1:]))
-
-    def trimmed_output(self, record: Record, value: float, plant: Plant) -> Record:
-        there, (first, last) = self.undone(record, value, plant), self.lost(record, value)
-        low, high = first, record.measured.size - last
-        pieces = [replace(p, window=slice(max(p.window.start, low - p.start_index),
-                                          min(p.window.stop, high - p.start_index))) for p in there.pieces]  # fmt: skip
-        return replace(there, pieces=tuple(p for p in pieces if p.n_samples > 0))
 
     def lost(self, record: Record, value: float) -> tuple[int, int]:
         """Return how many samples at either end of a record have no measured value once its times are mended."""
@@ -266,22 +267,16 @@ def of_file(base: WhiteRecords, index: int) -> list[int]:
 
 def residual_of(posed: WhiteRecords, index: int, z: Array) -> Array:
     """Return the whitened residual of the file of one record, the others' at 0, (n_samples,)."""
-    measured = [posed.replays[i].measured for i in of_file(posed, index)]
-    pairs = zip(measured, simulated_file(posed, index, z), strict=True)
-    return alone(posed, index, [x - y for x, y in pairs])
+    left = [np.zeros(r.record.n_samples) for r in posed.replays]
+    for i, simulated in zip(of_file(posed, index), simulated_file(posed, index, z), strict=True):
+        left[i] = posed.replays[i].measured - simulated
+    return posed.data.white(left)
 
 
 def simulated_file(posed: WhiteRecords, index: int, z: Array) -> list[Array]:
     """Return the simulated signals of the outputs of the file of one record, each (n_samples of it,)."""
     replays = [posed.replays[i] for i in of_file(posed, index)]
     return [signal[0] for signal in signals_of(replays, posed.space.complete(posed.values(z)[np.newaxis]))]
-
-
-def alone(posed: WhiteRecords, index: int, signals: Sequence[Array]) -> Array:
-    """Return signals of the outputs of the file of one record, those of others at 0, whitened, (n_samples,)."""
-    known = dict(zip(of_file(posed, index), signals, strict=True))
-    return posed.data.white([known[i] if i in known else np.zeros(r.record.n_samples)
-                             for i, r in enumerate(posed.replays)])  # fmt: skip
 
 
 def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Array]:
@@ -477,10 +472,9 @@ def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
     ]  # fmt: skip
 
 
-def suspect_sentence(suspect: Suspect, units: Mapping[str, tuple[str, float]]) -> str:
-    """Return a suspect in words; units: SI unit -> how it is shown and by what factor."""
-    shown, factor = units.get(suspect.unit, (suspect.unit, 1.0))
-    s, unit = suspect, "" if shown == "1" else f" {shown}"
+def suspect_sentence(s: Suspect) -> str:
+    factor, name = shown(1.0, s.unit)
+    unit = "" if name == "1" else f" {name}"
     if s.kind in ("gap", "clipped", "stuck", "spikes"):
         words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
         where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"

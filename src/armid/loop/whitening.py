@@ -217,7 +217,8 @@ class WhitenedData:
         # of each file the first output
         files = dict(reversed({r.file: r for r in reversed(self.records)}.items()))
         alike = dict(zip(files, alike_motions(list(files.values())), strict=True))
-        set_for = [str(sorted(set_constants(r).items())) for r in self.records]
+        # but for the constants of a record's own start
+        set_for = [str(sorted(c for c in r.constants.items() if not c[0].startswith("start_"))) for r in self.records]
         for labels in ([str(alike[r.file]) for r in self.records], set_for):
             names = list(dict.fromkeys(labels))
             if 1 < len(names) < len(found[0]):
@@ -269,11 +270,6 @@ def correlated(a: Array, b: Array) -> float:
     if n < 2 or max(len(a), len(b)) > 1.05 * n or min(np.ptp(a[:n]), np.ptp(b[:n])) == 0.0:
         return 0.0
     return float(np.corrcoef(a[:n], b[:n])[0, 1])
-
-
-def set_constants(record: Record) -> dict[str, float]:
-    """Return the constants of a record but for those of its own start."""
-    return {name: value for name, value in record.constants.items() if not name.startswith("start_")}
 
 
 def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
