@@ -1,7 +1,7 @@
 """Is there a discrepancy, and where: tests of a whitened residual against noise."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import chain, pairwise
 
@@ -15,7 +15,7 @@ from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
 from armid.loop.candidates import Library, calibrated_replays
 from armid.loop.fit import Fit, beyond, decomposed
-from armid.loop.whitening import WhitenedData, WhiteRecords, whitened
+from armid.loop.whitening import WhitenedData, WhiteRecords, whitened, with_samples
 from armid.model import Model
 from armid.problem.problem import Replay
 from armid.record import Record
@@ -83,29 +83,17 @@ class Residuals:
 
     @cached_property
     def raw(self) -> list[Array]:
-        raw = [r.measured - r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
-        return raw if self.data.sound is None else [x * m for x, m in zip(raw, self.sound, strict=True)]
-
-    @property
-    def sound(self) -> list[Array]:
-        """1 for each sample that is data, else 0, by record."""
-        sound = self.data.sound
-        return self.data.by_record(np.ones(self.data.edges[-1]) if sound is None else sound)
+        """What is left of each record, not whitened, 0 where a sample is no data."""
+        pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
+        return [(r.measured - r.signal(self.candidate[np.newaxis])[0]) * sound for r, sound in pairs]
 
     @property
     def judged(self) -> tuple[Replay, ...]:
         """The replays whose errors count: where a sample is no data, the simulated one stands for it."""
-        return self.replays if self.data.sound is None else tuple(map(self.mended, self.replays, self.sound))
-
-    def mended(self, replay: Replay, sound: Array) -> Replay:
-        simulated, first, pieces = replay.signal(self.candidate[np.newaxis])[0], 0, []
-        for piece in replay.pieces:
-            here = slice(first, first + piece.n_samples)
-            measured = piece.measured.copy()
-            measured[piece.window] = np.where(sound[here] > 0.0, measured[piece.window], simulated[here])
-            pieces.append(replace(piece, measured=measured))
-            first += piece.n_samples
-        return replace(replay, pieces=tuple(pieces))
+        pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
+        return tuple(r if sound.all() else
+                     with_samples(r, np.where(sound > 0.0, r.measured, r.signal(self.candidate[np.newaxis])[0]))
+                     for r, sound in pairs)  # fmt: skip
 
     @cached_property
     def variables(self) -> dict[str, Array]:
@@ -275,14 +263,13 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
     records = {r.name: (rows >= a) & (rows < b) for r, (a, b) in zip(seen.replays, pairwise(edges), strict=True)}
     square = np.repeat([level.rms**-2.0 for level in levels], lengths) * np.concatenate(seen.raw) ** 2
     square = seen.residual**2 if seen.doubted else square
-    sound = np.concatenate(seen.sound)
     counted = np.repeat([level.n_power / level.n_samples for level in levels], lengths)
     known, share = min(level.n_power for level in levels), 1.0 - seen.basis.shape[1] / n
     whole = {"all records": np.ones(n, dtype=np.bool_)}
     for kind in ("size", "record", "stage"):
         parts = {"size": whole, "record": records if len(records) > 1 else {}}.get(kind)
         for where, samples in (seen.stages if parts is None else parts).items():
-            ratio = float(np.sum(square[samples])) / max(float(sound[samples].sum()), 1.0) / share
+            ratio = float(np.sum(square[samples])) / max(float(seen.data.sound[samples].sum()), 1.0) / share
             yield Finding(kind, where, ratio, float(fdtrc(counted[samples].sum() * share, known, ratio)))
 
 

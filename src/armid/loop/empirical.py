@@ -90,11 +90,16 @@ def terms(missing: Missing, search: Search) -> list[Term]:
 
 
 def term_of(dependence: Dependence, missing: Missing, search: Search) -> Term:
-    """Fit one curve together with all other parameters."""
-    lacking = missing.lacking
-    effect, heights = empirical_effect(search.library.declared, dependence)
+    """Fit one curve together with all other parameters.
+
+    Raises ArmidError where the term cannot be compiled with the others.
+    """
+    lacking, library = missing.lacking, search.library
+    effect, heights = empirical_effect(library.declared, dependence)
     key = EffectKey(effect.name)
-    library = with_candidate(search.library, key, effect)
+    if key not in library.candidates:
+        raise ArmidError(f"a term at port {effect.name} cannot be composed with the candidates")
+    library = replace(library, candidates={**library.candidates, key: effect}, _models={}, _problems={})
     records = library.problem((*lacking.active, key), lacking.values)
     flat = free_values(records, lacking.values)
     guess = np.array([heights.get(n, v) for n, v in zip(records.space.free_names, flat, strict=True)])
@@ -121,16 +126,6 @@ def with_terms(library: Library) -> Library:
             model, added[EffectKey(effect.name)] = extended, effect
     bundles = ((*(library.bundles[0] if library.bundles else ()), *added), *library.bundles[1:])
     return replace(library, candidates={**library.candidates, **added}, bundles=bundles, _models={}, _problems={})
-
-
-def with_candidate(library: Library, key: EffectKey, effect: Effect) -> Library:
-    """Return a library whose term at a port is a certain curve.
-
-    Raises ArmidError where the term cannot be compiled with the others.
-    """
-    if key not in library.candidates:
-        raise ArmidError(f"a term at port {effect.name} cannot be composed with the candidates")
-    return replace(library, candidates={**library.candidates, key: effect}, _models={}, _problems={})
 
 
 def hat(place, knot):

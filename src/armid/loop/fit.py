@@ -258,7 +258,7 @@ class Comparison:
     @property
     def earned(self) -> bool:
         """Whether the larger model is significant, cheaper by the criterion, and no worse on what was left out."""
-        return self.p < FAMILYWISE and self.gain > 0.0 and self.left_out[1] <= self.left_out[0]
+        return not self.why
 
     @property
     def why(self) -> str:

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -345,10 +347,11 @@ def dependence(segments: Sequence[Segment], port: str, variable: str, factor: st
     if len(np.unique(groups)) == 1:
         groups = np.arange(len(groups)) * N_BLOCKS // len(groups)
     n_free = segments[0].jacobian.shape[1]
-    parts = [NormalEquations.of(design[groups == n], residual[groups == n], n_free) for n in np.unique(groups)]
-    whole, before, after = NormalEquations.total(parts), 0.0, 0.0
+    each = [(design[groups == n], residual[groups == n]) for n in np.unique(groups)]
+    parts = [NormalEquations(d.T @ d, d.T @ r, float(r @ r), n_free) for d, r in each]
+    whole, before, after = reduce(add, parts), 0.0, 0.0
     for i, left_out in enumerate(parts):
-        others = NormalEquations.total([*parts[:i], *parts[i + 1 :]])
+        others = reduce(add, [*parts[:i], *parts[i + 1 :]])
         before += left_out.without_curve.rest(others.without_curve.solution)
         after += left_out.rest(others.solution)
     free_alone = whole.without_curve.rest(whole.without_curve.solution)
@@ -375,14 +378,9 @@ class NormalEquations:
     square: float
     n_free: int
 
-    @staticmethod
-    def of(design: Array, residual: Array, n_free: int) -> "NormalEquations":
-        return NormalEquations(design.T @ design, design.T @ residual, float(residual @ residual), n_free)
-
-    @staticmethod
-    def total(parts: Sequence["NormalEquations"]) -> "NormalEquations":
-        return NormalEquations(sum((p.gram for p in parts), np.zeros(1)), sum((p.slope for p in parts), np.zeros(1)),
-                               sum(p.square for p in parts), parts[0].n_free)  # fmt: skip
+    def __add__(self, other: "NormalEquations") -> "NormalEquations":
+        square = self.square + other.square
+        return NormalEquations(self.gram + other.gram, self.slope + other.slope, square, self.n_free)
 
     @property
     def without_curve(self) -> "NormalEquations":

@@ -18,7 +18,7 @@ from armid.loop.candidates import Library
 from armid.loop.diagnose import holdout_residuals, is_significant
 from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.search import start_of, unless_diverged
-from armid.loop.whitening import WhiteRecords
+from armid.loop.whitening import WhiteRecords, with_samples
 from armid.model import Model, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Piece, Record
@@ -213,8 +213,7 @@ def leaves_of(model: Model, key: str) -> set[str]:
 def with_record(base: WhiteRecords, index: int, fault: Fault, value: float) -> WhiteRecords:
     """Return a problem in which one record, or its whole file, is replaced by itself without a fault."""
     faulty, edges = base.data.records[index], base.data.edges
-    sound = np.ones(edges[-1]) if base.data.sound is None else base.data.sound.copy()
-    records, replays = list(base.data.records), list(base.replays)
+    sound, records, replays = base.data.sound.copy(), list(base.data.records), list(base.replays)
     inside = of_file(base, index)
     for i in inside:
         old = records[i]
@@ -233,13 +232,7 @@ def with_measured(base: WhiteRecords, index: int, changes: Sequence[Array]) -> W
     """Return a problem in which the outputs of the file of one record were measured so much larger."""
     replays, inside = list(base.replays), of_file(base, index)
     for i, change in zip(inside, changes, strict=True):
-        pieces, first = [], 0
-        for piece in replays[i].pieces:
-            measured = piece.measured.copy()
-            measured[piece.window] += change[first : first + piece.n_samples]
-            pieces.append(replace(piece, measured=measured))
-            first += piece.n_samples
-        replays[i] = replace(replays[i], pieces=tuple(pieces))
+        replays[i] = with_samples(replays[i], replays[i].measured + change)
     return replace(base, replays=with_shared_starts(replays, inside))
 
 
@@ -450,10 +443,9 @@ def without_record(base: WhiteRecords, index: int) -> WhiteRecords:
     def rest(several: tuple[T, ...]) -> tuple[T, ...]:
         return tuple(each for i, each in enumerate(several) if i not in out)
 
-    sound = None if data.sound is None else np.delete(data.sound, samples)
     freed = None if data.freed is None else np.delete(data.freed, samples, axis=0)
     fewer = replace(data, records=rest(data.records), levels=rest(data.levels), kept=np.delete(data.kept, samples),
-                    sound=sound, freed=freed)  # fmt: skip
+                    sound=np.delete(data.sound, samples), freed=freed)  # fmt: skip
     return replace(base, replays=rest(base.replays), data=fewer)
 
 
