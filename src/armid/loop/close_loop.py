@@ -401,7 +401,7 @@ def predicting_best(levels: Sequence[SearchLevel]) -> list[SearchLevel]:
     if len(earned) < 2 or not earned[-1].best.dwarfs_noise:
         return earned
     alike = predicted_alike([level.best for level in earned])
-    smallest = next(i for i, level in enumerate(earned) if any(level.best is f for f in alike))
+    smallest = next(i for i, level in enumerate(earned) if level.best in alike)
     return earned[: smallest + 1]
 
 

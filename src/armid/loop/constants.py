@@ -274,7 +274,6 @@ class Trend:
         return FARTHEST_TREND * slope_of(self.fit, self.moves) * order_of(self.fit.records)
 
     def undone(self, train: Sequence[Record]) -> tuple[Record, ...]:
-        """Return the train records as they would be without it."""
         measured = iter([[p.measured for p in r.pieces] for r in self.fit.records.replays])
         found = []
         for record in train:

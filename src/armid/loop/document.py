@@ -297,7 +297,6 @@ def equations_section(equations: Mapping[str, str]) -> Section:
 
 
 def parts_of(found: ClosedLoop) -> Parts:
-    """Return what is stored of a closed loop."""
     report, details = report_of(found), details_of(found)
     return Parts(report, details, figures_of(found, report, details))
 

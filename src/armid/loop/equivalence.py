@@ -79,12 +79,9 @@ def sensitivity_of(fit: Fit, key: EffectKey) -> Array:
     words (a torque and an inertia in one proportion) have one sensitivity, while the changes from null to value differ
     by what other parameters have to make up for.
     """
-    space, away = fit.records.space, np.zeros(fit.n_free)
-    for i, name in enumerate(fit.values):
-        null, place = fit.model.parameters[name].null, space.index(name)
-        if key.owns(name) and null is not None:
-            away[i] = fit.z[i] - (null - space.low[place]) / (space.high[place] - space.low[place])
-    return beyond_others(fit, key, fit.jacobian @ away)
+    direction, (places, away) = np.zeros(fit.n_free), fit.strengths_of(key)
+    direction[places] = away
+    return beyond_others(fit, key, fit.jacobian @ direction)
 
 
 def change_by(fit: Fit, key: EffectKey) -> Array:

@@ -143,16 +143,20 @@ class Fit:
         A Wald test; a residual that is no noise scatters with its correlation in time, see `WhitenedData.trust`, and
         the estimate with the measured starts.
         """
-        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
-        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
-        null = np.array([nulls[i] for i in places], dtype=np.float64)
-        free = np.flatnonzero(space.free)[places]
-        away = self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
+        places, away = self.strengths_of(key)
         weighed = self.jacobian * np.sqrt(self.records.data.trust(self.residual))[:, np.newaxis]
         covariance = np.linalg.inv(weighed.T @ weighed + BOX * np.eye(self.n_free))
         moved = self.answer @ self.start_slopes
         covariance = (covariance + moved @ moved.T)[np.ix_(places, places)]
         return not places or bool(away @ np.linalg.solve(covariance, away) > chdtri(len(places), OPEN))
+
+    def strengths_of(self, key: EffectKey) -> tuple[list[int], Array]:
+        """Return the places of an effect's strengths among the free parameters, and how far each is from its null."""
+        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
+        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
+        null = np.array([nulls[i] for i in places], dtype=np.float64)
+        free = np.flatnonzero(space.free)[places]
+        return places, self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""
@@ -333,7 +337,7 @@ def predicted_alike(fits: Sequence[Fit]) -> list[Fit]:
         with np.errstate(invalid="ignore"):
             error = np.sqrt(len(parts)) * np.std(behind, axis=1, ddof=1)
         near = (behind.sum(axis=1) <= error) & np.isfinite(table).all(axis=1)
-        kept += [f for f, is_near in zip(fits, near, strict=True) if is_near and not any(f is k for k in kept)]
+        kept += [f for f, is_near in zip(fits, near, strict=True) if is_near and f not in kept]
     return kept
 
 

@@ -283,7 +283,6 @@ def information_at_fit(fit: Fit, tolerances: Mapping[str, float]) -> Information
 
 
 def interval_of(fit: Fit, information: Information) -> dict[str, tuple[float, float]]:
-    """Return the 95 % interval of each free parameter of a model, SI."""
     return {n: (v - float(h), v + float(h))
             for (n, v), h in zip(fit.values.items(), information.half_width, strict=True)}  # fmt: skip
 
@@ -387,7 +386,6 @@ def record_entries(before: Residuals | None, after: Residuals | None) -> list[di
 
 
 def of_output(replay: Replay, candidate: Array) -> dict[str, Any]:
-    """Return the errors on one output of one record, for JSON."""
     errors = record_errors(replay, candidate)
     outputs = {replay.record.output: errors}
     return errors_entry(JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)) or {}

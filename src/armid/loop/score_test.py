@@ -175,9 +175,7 @@ def at_null(records: WhiteRecords, candidate: Array, key: EffectKey) -> Array:
 
 def moved_start(records: WhiteRecords, current: Fit, activation: Activation, answer: Array, share: float) -> Array:
     """Return the extended candidate at a strength, with the linear answer of the free parameters to it, (n_free,)."""
-    shares = dict(zip(current.values, np.clip(current.z - share * answer, 0.01, 0.99), strict=True))
-    added = activation.at(share)
-    space = records.space
-    z = [shares[n] if n in shares else (added[n] - space.low[i]) / (space.high[i] - space.low[i])
-         for n, i in ((n, space.index(n)) for n in space.free_names)]  # fmt: skip
+    known = dict(zip(current.values, np.clip(current.z - share * answer, 0.01, 0.99), strict=True))
+    shares = records.shares(free_values(records, activation.at(share)))
+    z = [known.get(name, own) for name, own in zip(records.space.free_names, shares, strict=True)]
     return np.asarray(np.clip(np.array(z), 1e-3, 1.0 - 1e-3))

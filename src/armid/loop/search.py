@@ -88,7 +88,6 @@ class Search:
     enough: Callable[[SearchLevel], bool] = lambda _: False
 
     def start(self) -> Fit:
-        """Return the declared model at its estimate."""
         if frozenset() not in self.fits:
             records = self.library.problem(())
             starts = spread_starts(records) if records.space.free.any() else ()
@@ -141,12 +140,12 @@ class Search:
         self.extend(last.best)
         while self.reach_further(size):
             self.extend(last.best)
-        if last.best.is_noise and not (self.of_size(size) and promising(last.best, self.of_size(size)[0])):
+        if last.best.is_noise and not any(far_behind(last.best, f) > PROMISING for f in self.of_size(size)[:1]):
             self.note_round(size, "the size of what is left is that of the noise, and no candidate lowers it clearly")
             return None
         for parent in parents(last.fits)[1:]:
             self.extend(parent)
-        if not self.of_size(size) or not promising(self.of_size(size - 1)[0], self.of_size(size)[0]):
+        if not any(far_behind(self.of_size(size - 1)[0], f) > PROMISING for f in self.of_size(size)[:1]):
             self.note_round(size, f"no candidate lowers n ln(chi2) by more than {PROMISING:g}")
             return None
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
@@ -163,7 +162,7 @@ class Search:
         fits, n_more = self.of_size(size), size - len(smaller.active)
         # An exchange may have found a better model of the size before.
         smaller = self.of_size(size - 1)[0] if n_more == 1 else smaller
-        self.library.say(f"judging {shown(fits[0].active)}")
+        self.library.say(f"judging {' + '.join(fits[0].names)}")
         new = [s.n_shapes for s in self.scores_at(smaller) if s.key in fits[0].active and s.key not in smaller.active]
         compared = compare(smaller, fits[0], len(self.library.candidates) ** n_more, max(new, default=1), n_more)
         self.note_round(size, compared.why)
@@ -259,7 +258,7 @@ class Search:
         """Make the fits that are not known yet, side by side; one that diverges whatever its start is left out."""
         new = {active: trial for active, trial in tried.items() if active not in self.fits}
         for active in new:
-            self.library.say(f"fitting {shown(sorted(active))}")
+            self.library.say(f"fitting {' + '.join(key.public for key in sorted(active))}")
         found = self.library.each(unless_diverged, new.values())
         self.fits |= {active: fit for active, fit in zip(new, found, strict=True) if fit and np.isfinite(fit.chi2)}
         for size in {len(active) for active in new}:
@@ -339,16 +338,8 @@ def parents(fits: Sequence[Fit]) -> list[Fit]:
     return found
 
 
-def shown(active: Iterable[EffectKey]) -> str:
-    return " + ".join(key.public for key in active)
-
-
 def far_behind(fit: Fit, best: Fit) -> float:
     return float(max(fit.independent, best.independent) * np.log(fit.chi2 / best.chi2))
-
-
-def promising(smaller: Fit, larger: Fit) -> bool:
-    return far_behind(smaller, larger) > PROMISING
 
 
 def refitted(current: Fit, found: Score, library: Library, limit: float) -> Fit:

@@ -96,7 +96,6 @@ class Fault:
         return other.file == record.file and (self.kind not in OF_SENSOR or other.output == record.output)
 
     def undone(self, record: Record, value: float, plant: Plant) -> Record:
-        """Return the record as it would be without the fault."""
         measured = self.measured(record.measured, record, value)
         pieces, whole = (tuple(self.undone_piece(p, measured, value, plant) for p in some)
                          for some in (record.pieces, record.whole_pieces))  # fmt: skip
@@ -254,7 +253,7 @@ def with_shared_starts(replays: Sequence[Replay], inside: Sequence[int]) -> tupl
 
 
 def of_file(base: WhiteRecords, index: int) -> list[int]:
-    """Return the records that are outputs of the same file."""
+    """Return the records that are outputs of the same file as one."""
     return [i for i, r in enumerate(base.data.records) if r.file == base.data.records[index].file]
 
 
@@ -436,7 +435,6 @@ def disagreeing_record(fits: Sequence[Fit]) -> Suspect | None:
 
 
 def without_record(base: WhiteRecords, index: int) -> WhiteRecords:
-    """Return a problem without the file of one record."""
     data, out = base.data, of_file(base, index)
     samples = np.concatenate([np.arange(data.edges[i], data.edges[i + 1]) for i in out])
 
