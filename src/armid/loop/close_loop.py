@@ -180,8 +180,6 @@ def close_loop(
     if implausible:
         verdicts = (IMPLAUSIBLE, UNEXPLAINED)
     advice = advice_for(found.contest, found.largest, campaign.gyro_range, threads, told)
-    first, data = model.plant.outputs[0].name, library.data
-    noise = float(np.mean([n.rms for n, r in zip(data.levels, data.records, strict=True) if r.output in ("", first)]))
     every = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
@@ -192,7 +190,7 @@ def close_loop(
     together = known_together(named, library)
     steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
     said = (*(s.sentence for s in screened if s.kind in (*GROSS, "start")), *next_steps_of(found, suspects))
-    return ClosedLoop(there, noise, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
+    return ClosedLoop(there, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
                       () if withdrawn else found.rivals, advice, said, together, tuple(suspects), every, library,
                       search, found.missing, term)  # fmt: skip
 

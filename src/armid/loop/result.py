@@ -158,7 +158,6 @@ class ClosedLoop(Result):
 
     kind: ClassVar[Kind] = LOOP
     campaign: Campaign
-    noise_rms: float
     verdict: str
     also: tuple[str, ...]
     before: Judgement
@@ -190,13 +189,15 @@ class ClosedLoop(Result):
     @property
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit and the noise of its train records."""
-        data = self.before.train.data
-        found: dict[str, list[float]] = {}
-        for replay, level in zip(self.before.train.replays, data.levels, strict=True):
-            found.setdefault(self.campaign.plant.outputs[replay.place].name, []).append(level.rms)
-        units = {o.name: o.unit for o in self.campaign.plant.outputs}
-        return {name: {"unit": unit, "noise_rms": float(np.mean(found[name]))} for name, unit in units.items()
-                if name in found}  # fmt: skip
+        train = self.before.train
+        pairs = [(r.place, level.rms) for r, level in zip(train.replays, train.data.levels, strict=True)]
+        each = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
+        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in each if rms}
+
+    @property
+    def noise_rms(self) -> float:
+        """Noise of the train records of the first output, its unit; NaN where none holds it."""
+        return float(self.outputs.get(self.campaign.plant.outputs[0].name, {"noise_rms": np.nan})["noise_rms"])
 
     @property
     def parameters(self) -> dict[str, float]:
