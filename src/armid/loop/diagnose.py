@@ -323,17 +323,15 @@ def dependence_tests(seen: Residuals) -> Iterator[Finding]:
             edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, N_BINS + 1)))
             place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
             for output, samples in outputs.items():
-                yield structure(seen, "dependence", f"{name} in {output}" if len(outputs) > 1 else name, place, samples)
+                yield structure(seen, f"{name} in {output}" if len(outputs) > 1 else name, place, samples)
     parts = [np.arange(n) * N_BINS // max(n, 1) for n in np.diff(seen.data.edges)]
     bins = np.concatenate([p + i * N_BINS for i, p in enumerate(parts)])
     for output, samples in outputs.items():
         where = f"time in the record of {output}" if len(outputs) > 1 else "time in the record"
-        yield structure(seen, "dependence", where, bins, samples)
+        yield structure(seen, where, bins, samples)
 
 
-def structure(
-    seen: Residuals, kind: str, where: str, place: NDArray[np.int64], samples: NDArray[np.bool_]
-) -> Finding:  # fmt: skip
+def structure(seen: Residuals, where: str, place: NDArray[np.int64], samples: NDArray[np.bool_]) -> Finding:
     """Test a residual for a part that is constant in each bin; place: the bin of each sample, (n_samples,).
 
     samples: which of them are looked at, (n_samples,).
@@ -347,7 +345,7 @@ def structure(
         # Neighbours tell the same: of the residual's own scatter only the independent samples count.
         square *= seen.data.independent(seen.residual) / len(seen.residual)
     known = seen.data.n_noise(otherwise=np.inf)
-    return Finding(kind, where, square / rank, chance(square / rank, rank, known))
+    return Finding("dependence", where, square / rank, chance(square / rank, rank, known))
 
 
 def square_along(columns: Array, values: Array) -> tuple[float, int]:

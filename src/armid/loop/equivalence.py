@@ -1,6 +1,6 @@
 """Effects that these records cannot tell apart."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -121,26 +121,19 @@ def substitutes(fit: Fit, library: Library) -> list[Substitute]:
     """
     changes = {key: change_by(fit, key) for key in fit.active}
     bases = {key: basis_of_others(fit, key) for key in fit.active}
-    each = library.each(lambda c: list(places_of(fit, library, c, changes, bases)), library.joinable(fit.active))
+
+    def places_of(candidate: EffectKey) -> list[Substitute]:
+        """Return the effects of the fit that a candidate moves the records like."""
+        records = library.problem((*fit.active, candidate), fit.values)
+        grid, _ = activation_grid(records, candidate)
+        near = [(key, likest(changes[key], responses(fit, records, grid, without=key), bases[key]))
+                for key in fit.active]  # fmt: skip
+        return [Substitute(key, candidate, best[1], fit.values | grid[best[0]].at(float(np.clip(best[2], 0.01, 1.0))))
+                for key, best in near if best is not None]  # fmt: skip
+
+    each = library.each(places_of, library.joinable(fit.active))
     found = sorted(chain.from_iterable(each), key=lambda r: -r.correlation)
     return [r for place in fit.active for r in [r for r in found if r.place == place][:MOST_SUBSTITUTES]]
-
-
-def places_of(
-    fit: Fit, library: Library, candidate: EffectKey, changes: Mapping[EffectKey, Array],
-    bases: Mapping[EffectKey, Array],
-) -> Iterator[Substitute]:  # fmt: skip
-    """Yield the effects of a fit that a candidate moves the records like.
-
-    changes: by each effect, (n_samples,); bases: of what the other parameters can absorb, (n_samples, rank).
-    """
-    records = library.problem((*fit.active, candidate), fit.values)
-    grid, _ = activation_grid(records, candidate)
-    for key in fit.active:
-        best = likest(changes[key], responses(fit, records, grid, without=key), bases[key])
-        if best is not None:
-            activation, correlation, amplitude = grid[best[0]], best[1], float(np.clip(best[2], 0.01, 1.0))
-            yield Substitute(key, candidate, correlation, fit.values | activation.at(amplitude))
 
 
 def likest(change: Array, moved: Array, basis: Array) -> tuple[int, float, float] | None:
