@@ -6,7 +6,7 @@ model with the two. An effect at its null is skipped by the engine, so that it c
 candidates and 1.5 s of motion with no effect in the model, 0.4 ms with 38.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, product
@@ -425,25 +425,17 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
     if good and n >= FEWEST_SPARED:
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut.
-        for rough in rough_steps(model, manoeuvre, spread, runs[2 * n]):
-            tried = replace(schedule, rough=rough)
+        sound = spread[~runs[2 * n].failed]
+        states = simulate(model, manoeuvre, sound, Schedule(SUBSTEPS[-1]), states=True).states
+        ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
+        for share in SHARES:
+            tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))
             run = simulate(model, manoeuvre, spread, tried)
             found = judged(run, runs[2 * n])
             if found[2] and run.n_steps < n:
                 schedule, (error, is_hidden, _) = tried, found
                 break
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
-
-
-def rough_steps(model: Model, manoeuvre: Manoeuvre, spread: Array, run: Simulation) -> Iterator[Array]:
-    """Yield from where on a step is called rough, as `Schedule.rough`, ever smaller shares of the range of each state.
-
-    run: of the candidates, which says those that have not diverged.
-    """
-    states = simulate(model, manoeuvre, spread[~run.failed], Schedule(SUBSTEPS[-1]), states=True).states
-    ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
-    for share in SHARES:
-        yield np.where(ranges > 0.0, share * ranges, np.inf)
 
 
 # Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
