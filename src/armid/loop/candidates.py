@@ -6,7 +6,7 @@ model with the two. An effect at its null is skipped by the engine, so that it c
 candidates and 1.5 s of motion with no effect in the model, 0.4 ms with 38.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, product
@@ -109,15 +109,14 @@ def relative_error(error: float) -> float:
 class Library:
     """Hold the declared model, the candidates that apply to it, and what is known of the parameters.
 
-    candidates: key -> effect under its compiled name; originals: key -> effect as registered. bundles: keys that are
-    compiled together. overrides, bounds, fixed: as `space_of` takes them, of the declared model and of candidates
-    alike. tolerances: of the constants, relative. misfit: rms residual of the best model so far in units of the noise,
-    at least 1. say: called with a sentence before something that takes long.
+    candidates: as registered. bundles: keys that are compiled together. overrides, bounds, fixed: as `space_of` takes
+    them, of the declared model and of candidates alike. tolerances: of the constants, relative. misfit: rms residual of
+    the best model so far in units of the noise, at least 1. say: called with a sentence before something that takes
+    long.
     """
 
     declared: Model
     candidates: Mapping[EffectKey, Effect]
-    originals: Mapping[EffectKey, Effect]
     data: WhitenedData
     bundles: tuple[Active, ...]
     overrides: Mapping[str, Override]
@@ -144,8 +143,7 @@ class Library:
 
     def public_model(self, active: Active) -> Model:
         """Return the declared model with some candidates added, under their public names, in the order given."""
-        added = [self.originals[k.declared] for k in active]
-        return Model(self.declared.plant, (*self.declared.effects, *added))
+        return Model(self.declared.plant, (*self.declared.effects, *(self.candidates[k.declared] for k in active)))
 
     def problem(self, active: Active, near: Mapping[str, float] | None = None) -> WhiteRecords:
         """Return the least-squares problem of the declared model with some candidates, on all train records.
@@ -160,7 +158,9 @@ class Library:
             space = self.space(model, active)
             known = [self._problems.get(frozenset((k,))) or self._problems.get(frozenset((k.declared,)))
                      for k in active]  # fmt: skip
-            alone = [p.replays for p in known if p is not None and is_even(p.replays) and p.replays[0].model is model]
+            # Where all samples are cut alike, the schedule does not depend on the candidates' states.
+            alone = [p.replays for p in known if p is not None and p.replays[0].model is model
+                     and all(c.schedule.rough is None for r in p.replays for c in r.calibrations)]  # fmt: skip
             if len(alone) < max(len(active), 2):
                 # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
                 replays = self.replays(model, space, near or {}, self.misfit, on_one=bool(active))
@@ -219,7 +219,7 @@ class Library:
         return self._models[keys]
 
     def composed(self, keys: Active) -> Model:
-        return Model(self.declared.plant, (*self.declared.effects, *(self.candidates[k] for k in keys)))
+        return Model(self.declared.plant, (*self.declared.effects, *(compiled(k, self.candidates[k]) for k in keys)))
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""
@@ -287,20 +287,23 @@ def library_of(
     for name in (*bounds, *fixed):
         Space(names, (), none, none, none).index(name)
     present = {e.name for e in declared.effects}
-    originals = {
+    applicable = {
         EffectKey(effect.name, "" if form is effect else form.form): form
         for effect in candidates.values() if effect.name not in present
         for form in effect.every_form if joined(declared, form) is not None
     }  # fmt: skip
-    compiled = {key: replace(effect, name=key.compiled, forms=()) for key, effect in originals.items()}
 
     def for_each_form(given: Mapping[str, T]) -> dict[str, T]:
         """Repeat what is given for a parameter for every form of its effect that has a parameter of that name."""
-        names = {f"{k.compiled}.{p.name}": f"{k.name}.{p.name}" for k, e in originals.items() for p in e.parameters}
+        names = {f"{k.compiled}.{p.name}": f"{k.name}.{p.name}" for k, e in applicable.items() for p in e.parameters}
         return dict(given) | {own: given[public] for own, public in names.items() if public in given}
 
-    return Library(declared, compiled, originals, data, bundled(declared, compiled), for_each_form(overrides),
+    return Library(declared, applicable, data, bundled(declared, applicable), for_each_form(overrides),
                    for_each_form(bounds), for_each_form(fixed), threads, say, tolerances or {})  # fmt: skip
+
+
+def compiled(key: EffectKey, effect: Effect) -> Effect:
+    return replace(effect, name=key.compiled, forms=())
 
 
 def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Active, ...]:
@@ -308,7 +311,8 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
 
     Those without states of their own come first, so that the most used bundles stay the fastest.
     """
-    ordered = sorted(effects.items(), key=lambda pair: (len(pair[1].states), pair[1].name))
+    each = [(key, compiled(key, effect)) for key, effect in effects.items()]
+    ordered = sorted(each, key=lambda pair: (len(pair[1].states), pair[1].name))
     if 0 < len(ordered) <= BUNDLE and joined(declared, *(effect for _, effect in ordered)) is not None:
         return (tuple(key for key, _ in ordered),)
     bundles: list[tuple[Model, list[EffectKey]]] = []
@@ -392,11 +396,6 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
 
 
-def is_even(replays: Sequence[Replay]) -> bool:
-    """Tell whether all samples are cut alike, so that the schedule does not depend on the candidates' states."""
-    return all(c.schedule.rough is None for r in replays for c in r.calibrations)
-
-
 def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:
     """Return the coarsest of few schedules whose error on the candidates stays within half of the standard one.
 
@@ -410,10 +409,12 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
         """Return the error of a simulation, whether the noise hides it, and whether it is accurate enough."""
         # Steps with which nothing is simulated have no error to be judged by.
         error = np.inf if finer.failed.all() else difference(run, finer, model) * 16 / 15
-        is_hidden = rms is not None and bool((rms_difference(run, finer) * 16 / 15 <= MARGIN * rms).all())
+        both = ~(run.failed | finer.failed)
+        square = np.mean((run.outputs[:, both] - finer.outputs[:, both]) ** 2, axis=-1)
+        largest = np.sqrt(np.max(square, axis=1, initial=0.0)) * 16 / 15
+        is_hidden = rms is not None and bool((largest <= MARGIN * rms).all())
         good = (error <= MARGIN * allowed or is_hidden) and not finer.failed.all()
-        good = good and not (run.failed & ~finer.failed).any()
-        return error, is_hidden, good
+        return error, is_hidden, good and not (run.failed & ~finer.failed).any()
 
     runs = {n: simulate(model, manoeuvre, spread, Schedule(n)) for n in SUBSTEPS[:2]}
     for n in SUBSTEPS:
@@ -424,32 +425,17 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
     if good and n >= FEWEST_SPARED:
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut.
-        for rough in rough_steps(model, manoeuvre, spread, runs[2 * n]):
-            tried = replace(schedule, rough=rough)
+        sound = spread[~runs[2 * n].failed]
+        states = simulate(model, manoeuvre, sound, Schedule(SUBSTEPS[-1]), states=True).states
+        ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
+        for share in SHARES:
+            tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))
             run = simulate(model, manoeuvre, spread, tried)
             found = judged(run, runs[2 * n])
             if found[2] and run.n_steps < n:
                 schedule, (error, is_hidden, _) = tried, found
                 break
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
-
-
-def rough_steps(model: Model, manoeuvre: Manoeuvre, spread: Array, run: Simulation) -> Iterator[Array]:
-    """Yield from where on a step is called rough, as `Schedule.rough`, ever smaller shares of the range of each state.
-
-    run: of the candidates, which says those that have not diverged.
-    """
-    states = simulate(model, manoeuvre, spread[~run.failed], Schedule(SUBSTEPS[-1]), states=True).states
-    ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
-    for share in SHARES:
-        yield np.where(ranges > 0.0, share * ranges, np.inf)
-
-
-def rms_difference(a: Simulation, b: Simulation) -> Array:
-    """Return the largest rms difference of a candidate that both simulations hold, of each output, (n_outputs,)."""
-    good = ~(a.failed | b.failed)
-    square = np.mean((a.outputs[:, good] - b.outputs[:, good]) ** 2, axis=-1)
-    return np.asarray(np.sqrt(np.max(square, axis=1, initial=0.0)))
 
 
 # Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.

@@ -12,7 +12,6 @@ from armid.estimation.advice import Advice, Rival, advise
 from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import Estimates, with_fitted_starts
-from armid.estimation.mends import Suspicion
 from armid.estimation.screen import screen
 from armid.loop.candidates import (
     CONSTANT,
@@ -35,10 +34,10 @@ from armid.loop.constants import (
     measurements,
     trends_of,
 )
-from armid.loop.diagnose import diagnose, diagnosed, holdout_residuals, is_significant, train_residuals
+from armid.loop.diagnose import holdout_residuals, is_significant, train_residuals
 from armid.loop.empirical import Term, empirical_term
-from armid.loop.equivalence import WITHIN, EffectGroup, Likeness, RivalModel, group_of, rival_models
-from armid.loop.fit import Fit, criterion, dwarfs_noise, predicted_alike, with_own_starts, with_standard_accuracy
+from armid.loop.equivalence import WITHIN, EffectGroup, group_of, rival_models
+from armid.loop.fit import Fit, behind, criterion, predicted_alike, with_standard_accuracy
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
     CARRIES_NOT,
@@ -74,6 +73,9 @@ from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
+LibraryFor = Callable[[Sequence[Record]], Library]
+# What is decided, who is suspected, and the train records as they are taken.
+Settled = tuple["Decision", list[Suspect], tuple[Record, ...]]
 MOST_ADVICE, MOST_RIVALS = 5, 4
 # Models of each size whose predictions are compared before a name is claimed.
 MOST_COMPARED = 4
@@ -146,11 +148,17 @@ def close_loop(
         told(f"going on from {len(estimates)} fits of {progress}")
 
     def library_for(records: Sequence[Record]) -> Library:
+        """Return the candidates with records, of which those in motion start where the declared model fits best."""
         data = replace(whitened(records, model.plant), estimates=estimates)
-        return with_starts_fitted(library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {},
-                                             threads, told, within))  # fmt: skip
+        library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told,
+                             within)  # fmt: skip
+        posed = library.problem(())
+        return library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
 
-    screened = screened_train(model, campaign, bounds or {}, fixed or {})
+    own_bounds = {n: b for n, b in (bounds or {}).items() if n in model.parameters}
+    own_fixed = {n: v for n, v in (fixed or {}).items() if n in model.parameters}
+    space = space_of(model, campaign.parameters, own_bounds, own_fixed)
+    screened = screen(replace(campaign, records=campaign.train), model, space)
     implausible = any(s.kind in GROSS for s in screened)
     found, suspects, train = settled(library_for, campaign.train, implausible)
     found = with_curve(found) if curve and not implausible else found
@@ -166,14 +174,12 @@ def close_loop(
     if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
         steps = tuple(replace(step, claimed=False) for step in steps)
     withdrawn = Withdrawn(steps, after) if steps and is_denied(before, after) else None
-    verdicts = verdicts_of(before, after, steps, withdrawn, found.refused, found.rivals)
+    verdicts = verdicts_of(before, after, steps, withdrawn, found)
     if any(s.role == "train" for s in suspects):
         verdicts = (DISAGREES, *(v for v in verdicts if v not in (NO_DISCREPANCY, EXPLAINED)))
     if implausible:
         verdicts = (IMPLAUSIBLE, UNEXPLAINED)
     advice = advice_for(found.contest, found.largest, campaign.gyro_range, threads, told)
-    first, data = model.plant.outputs[0].name, library.data
-    noise = float(np.mean([n.rms for n, r in zip(data.levels, data.records, strict=True) if r.output in ("", first)]))
     every = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
@@ -184,25 +190,13 @@ def close_loop(
     together = known_together(named, library)
     steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
     said = (*(s.sentence for s in screened if s.kind in (*GROSS, "start")), *next_steps_of(found, suspects))
-    return ClosedLoop(there, noise, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
+    return ClosedLoop(there, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
                       () if withdrawn else found.rivals, advice, said, together, tuple(suspects), every, library,
                       search, found.missing, term)  # fmt: skip
 
 
-def screened_train(
-    model: Model, campaign: Campaign, bounds: Mapping[str, tuple[float, float]], fixed: Mapping[str, float]
-) -> tuple[Suspicion, ...]:
-    """Return the mistakes in the train records; the gross ones (sign, unit, clock, exchanged files) end a search."""
-    train, own = replace(campaign, records=campaign.train), model.parameters
-    space = space_of(model, campaign.parameters, {n: b for n, b in bounds.items() if n in own},
-                     {n: v for n, v in fixed.items() if n in own})  # fmt: skip
-    return screen(train, model, space)
-
-
-def settled(
-    library_for: Callable[[Sequence[Record]], Library], train: tuple[Record, ...], implausible: bool
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
-    """Suspect the records, then decide; return what was decided, who is suspected, and the train records as taken.
+def settled(library_for: LibraryFor, train: tuple[Record, ...], implausible: bool) -> Settled:
+    """Suspect the records, then decide.
 
     A fault of one record that leaves noise, or next to nothing of what was more, is undone, unless one effect or
     constants do clearly better on all records; where several faults of it do as well, the record is left out. So it is
@@ -215,8 +209,8 @@ def settled(
     declared = search.start()
     if implausible:
         return Decision(search, library, declared, declared, declared, ()), [], train
-    mended = mended_records(declared, library) if is_significant(declared) else []
-    trends = trends_of(declared, library) if is_significant(declared) else []
+    lacks = is_significant(declared)
+    mended, trends = (mended_records(declared, library), trends_of(declared, library)) if lacks else ([], [])
     if mended or trends:
         # Of constants and effects only those count that come down to this.
         limit = max([*(m.chi2 for m in mended[:1]), *(t.chi2 for t in trends[:1])]) + WITHIN
@@ -246,9 +240,7 @@ def settled(
     return suspected_again(library_for, decided, train)
 
 
-def suspected_again(
-    library_for: Callable[[Sequence[Record]], Library], found: "Decision", train: tuple[Record, ...]
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:
+def suspected_again(library_for: LibraryFor, found: "Decision", train: tuple[Record, ...]) -> Settled:
     """Suspect the records where what was found leaves more than noise, as `settled` does."""
     if found.constants is None and is_significant(found.largest):
         apart = disagreeing_record([found.declared, found.largest])
@@ -262,9 +254,8 @@ def suspected_again(
 
 
 def decided_without_fault(
-    library_for: Callable[[Sequence[Record]], Library], mended: Sequence[Mended], library: Library,
-    train: tuple[Record, ...],
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:  # fmt: skip
+    library_for: LibraryFor, mended: Sequence[Mended], library: Library, train: tuple[Record, ...]
+) -> Settled:
     """Return what is decided on records without the best of some faults, as `settled` does."""
     best, plant, measured = mended[0], library.declared.plant, library.data.records
     faulty = measured[best.index]
@@ -282,9 +273,8 @@ def decided_without_fault(
 
 
 def decided_without_trend(
-    library_for: Callable[[Sequence[Record]], Library], trends: Sequence[Trend], library: Library,
-    train: tuple[Record, ...],
-) -> tuple["Decision", list[Suspect], tuple[Record, ...]]:  # fmt: skip
+    library_for: LibraryFor, trends: Sequence[Trend], library: Library, train: tuple[Record, ...]
+) -> Settled:
     """Return what is decided on records without the best of some trends, as `settled` does."""
     best, *others = trends
     alike = [t for t in others if t.chi2 < best.chi2 + WITHIN]
@@ -331,7 +321,7 @@ class Decision:
     groups: Sequence[EffectGroup]
     claimed: frozenset[str] = frozenset()
     refused: EffectGroup | None = None
-    rivals: tuple[RivalModel, ...] = ()
+    rivals: tuple[Fit, ...] = ()
     members: Sequence[Fit] = ()
     contest: Sequence[Rival] = ()
     missing: Missing | None = None
@@ -365,10 +355,10 @@ def decide(search: Search) -> Decision:
                         [group_beside(constants, search)], constants=constants, equal=[constants])  # fmt: skip
     named, groups, refused = largest_named(predicting_best(levels), search)
     rivals = rival_models(named, search.of_size(len(named.active)))
-    members = [f for g in groups for n in g.all_names[1:] if (f := search.model_with(n, named)) is not None]
-    contest = contest_of(groups, refused, search, last) or contest_of_models(named, rivals)
+    members = [f for g in groups for n in g.rivals if (f := search.model_with(n, named)) is not None]
+    contest = contest_of([*groups, refused], search, last) or contest_of_models(named, rivals)
     return Decision(search, library, declared, named, last, groups, claimed_names(named, search), refused, rivals,
-                    [*members, *(r.fit for r in rivals)], contest,
+                    [*members, *rivals], contest,
                     equal=beside if len(named.active) == 1 else ())  # fmt: skip
 
 
@@ -380,9 +370,8 @@ def with_curve(found: Decision) -> Decision:
     missing, term = empirical_term(found.chosen, found.search)
     if term is None:
         return replace(found, missing=missing)
-    names = dict.fromkeys(EffectKey(f"{UNNAMED}{d.port}").public for d in term.others)
-    curves = EffectGroup(term.fit.active[-1].public, tuple(Likeness(n, 0.0, 1.0) for n in names), ())
-    contest = contest_of(found.groups, None, found.search, found.largest)
+    curves = EffectGroup(term.fit.names[-1], tuple(EffectKey(f"{UNNAMED}{port}").public for port in term.others))
+    contest = contest_of(found.groups, found.search, found.largest)
     return Decision(term.search, term.search.library, found.declared, term.fit, found.largest,
                     [*found.groups, curves], missing=missing, term=term, contest=contest)  # fmt: skip
 
@@ -391,13 +380,12 @@ def steps_of(found: Decision, judged: Sequence[Judgement]) -> tuple[Step, ...]:
     """Return one step for each effect of the chosen model, or one for the constants that take their place."""
     if found.constants is not None:
         name, group = found.constants.name, found.groups[0]
-        return (Step(name, "", group.names[1:], False, True, found.constants.moved, judged[0], group),)
-    originals, others = found.library.originals, constants_beside(found.equal)
-    steps = []
+        return (Step(name, "", group.alike, False, True, found.constants.moved, judged[0], group),)
+    candidates, others, steps = found.library.candidates, constants_beside(found.equal), []
     for key, after, group in zip(found.chosen.active, judged, found.groups, strict=True):
-        constants = tuple(n for n in group.names if n.startswith(CONSTANT))
-        effects = tuple(n for n in group.names[1:] if n not in constants)
-        steps.append(Step(key.public, ", ".join(originals[key.declared].adds), effects, key.is_empirical,
+        constants = tuple(n for n in (group.name, *group.alike) if n.startswith(CONSTANT))
+        effects = tuple(n for n in group.alike if n not in constants)
+        steps.append(Step(key.public, ", ".join(candidates[key.declared].adds), effects, key.is_empirical,
                           key.public in found.claimed, (*constants, *others), after, group))  # fmt: skip
     return tuple(steps)
 
@@ -408,17 +396,11 @@ def predicting_best(levels: Sequence[SearchLevel]) -> list[SearchLevel]:
     There significance is had for nothing, and what wins on train may lose on what was left out.
     """
     earned = [level for level in levels if level.earned]
-    if len(earned) < 2 or not dwarfs_noise(earned[-1].best):
+    if len(earned) < 2 or not earned[-1].best.dwarfs_noise:
         return earned
     alike = predicted_alike([level.best for level in earned])
-    smallest = next(i for i, level in enumerate(earned) if any(level.best is f for f in alike))
+    smallest = next(i for i, level in enumerate(earned) if level.best in alike)
     return earned[: smallest + 1]
-
-
-def with_starts_fitted(library: Library) -> Library:
-    """Return the library whose records in motion start where the declared model fits best, others as they are."""
-    records = library.problem(())
-    return library.about(with_fitted_starts(records.replays, records.space), library.misfit)
 
 
 def largest_named(levels: Sequence[SearchLevel], search: Search) -> tuple[Fit, list[EffectGroup], EffectGroup | None]:
@@ -441,7 +423,7 @@ def inside_its_ranges(level: SearchLevel) -> Fit:
     A strength or a shape that ends at its bound says that the effect is not what it was declared to be.
     """
     best = level.best
-    near = (f for f in level.fits if criterion(f, best.independent) - criterion(best, best.independent) < WITHIN)
+    near = (f for f in level.fits if behind(f, best) < WITHIN)
     return next((f for f in near if not f.is_at_a_bound), best)
 
 
@@ -451,22 +433,22 @@ def claimed_names(named: Fit, search: Search) -> frozenset[str]:
     Those of a model that leaves noise; where the misfit dwarfs the noise, those that every model holds which predicts
     the parts left out as well as the best does.
     """
-    names = frozenset(key.public for key in named.active)
+    names = frozenset(named.names)
     if not names or not is_significant(named):
         return names
-    if not dwarfs_noise(named):
+    if not named.dwarfs_noise:
         return frozenset()
     sizes = range(len(named.active) + 1)
     models = [named, *(f for n in sizes for f in search.of_size(n)[:MOST_COMPARED] if f is not named)]
-    return names.intersection(*({k.public for k in f.active} for f in predicted_alike(models)))
+    return names.intersection(*(f.names for f in predicted_alike(models)))
 
 
 def is_denied(before: Judgement, after: Judgement) -> bool:
     """Tell whether held-out records are simulated clearly worse with what was added than without it."""
-    old, new = before.holdout_error, after.holdout_error
-    if old is None or new is None or after.holdout is None:
+    old, new = before.holdout, after.holdout
+    if old is None or new is None:
         return False
-    return new.rmse > DENIED * old.rmse and new.rmse > OVER_NOISE * after.holdout.noise_rms
+    return new.errors.rmse > DENIED * old.errors.rmse and new.errors.rmse > OVER_NOISE * new.noise_rms
 
 
 def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, members: Sequence[Fit]) -> Judgement:
@@ -474,55 +456,46 @@ def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, member
 
     biases: see `unseen_biases_of`. members: models that cannot be told from it, over which intervals reach.
     """
-    fit = with_own_starts(with_standard_accuracy(fit))
+    fit = with_standard_accuracy(fit)
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
-    diagnosis, unseen_diagnosis = diagnosed(fit), None if unseen is None else diagnose(unseen)
-    train_error = campaign_errors(seen.judged, fit.candidate)
-    assert train_error is not None
-    remains = diagnosis.significant or (unseen_diagnosis is not None and unseen_diagnosis.significant)
-    return Judgement(
-        fit, library.public_model(fit.active),
-        estimates(fit, library, remains, biases, members), seen, unseen, train_error,
-        None if unseen is None else campaign_errors(unseen.judged, fit.candidate), diagnosis, unseen_diagnosis,
-    )  # fmt: skip
+    remains = any(r.diagnosis.significant for r in (seen, unseen) if r is not None)
+    model = library.public_model(fit.active)
+    return Judgement(fit, model, estimates(fit, library, remains, biases, members), seen, unseen)
 
 
 def verdicts_of(
-    before: Judgement, after: Judgement, steps: Sequence[Step], withdrawn: Withdrawn | None,
-    refused: EffectGroup | None, rivals: Sequence[RivalModel],
-) -> tuple[str, ...]:  # fmt: skip
+    before: Judgement, after: Judgement, steps: Sequence[Step], withdrawn: Withdrawn | None, found: "Decision"
+) -> tuple[str, ...]:
     """Return the verdicts that hold, each in one word, the one to be told first before the others.
 
     A term without a name never explains; of what does not carry over nothing is explained.
     """
     denied = withdrawn is not None or after.fails_to_carry_over
-    found = [CARRIES_NOT] if denied else []
+    verdicts = [CARRIES_NOT] if denied else []
     is_constant = any(s.effect.startswith(NAMED) for s in steps)
     in_doubt = any(s.alternatives or s.group.unlike or (s.constants and not is_constant) for s in steps)
-    if refused is not None or rivals or in_doubt:
-        found.append(TOO_ALIKE)
+    if found.refused is not None or found.rivals or in_doubt:
+        verdicts.append(TOO_ALIKE)
     if not steps or withdrawn is not None:
-        found += [UNEXPLAINED] if before.diagnosis.significant and refused is None else []
+        verdicts += [UNEXPLAINED] if before.diagnosis.significant and found.refused is None else []
     elif after.significant or any(s.empirical for s in steps):
-        found.append(PARTLY)
-    return tuple(found) or (EXPLAINED if steps else NO_DISCREPANCY,)
+        verdicts.append(PARTLY)
+    return tuple(verdicts) or (EXPLAINED if steps else NO_DISCREPANCY,)
 
 
-def contest_of(groups: Sequence[EffectGroup], refused: EffectGroup | None, search: Search, best: Fit) -> list[Rival]:
+def contest_of(groups: Sequence[EffectGroup | None], search: Search, best: Fit) -> list[Rival]:
     """Return the models that differ in the effect of the first group of several, none where nothing is in doubt."""
-    in_doubt = [g for g in (*groups, *([refused] if refused is not None else [])) if g.alike or g.unlike]
-    named = [g for g in in_doubt if not g.name.startswith(SHOWN_AS)][:1]
-    names = [name for g in named for name in (g.name, *(r.name for r in (*g.alike, *g.unlike)))]
-    fits = [(name, search.model_with(name, best)) for name in names[:MOST_RIVALS]]
-    return [rival(name, fit, best) for name, fit in fits if fit is not None]
+    in_doubt = next((g for g in groups if g is not None and g.rivals and not g.name.startswith(SHOWN_AS)), None)
+    names = () if in_doubt is None else (in_doubt.name, *in_doubt.rivals)[:MOST_RIVALS]
+    return [rival(name, fit, best) for name in names if (fit := search.model_with(name, best)) is not None]
 
 
-def contest_of_models(named: Fit, rivals: Sequence[RivalModel]) -> list[Rival]:
+def contest_of_models(named: Fit, rivals: Sequence[Fit]) -> list[Rival]:
     """Return a model and its rivals that differ in more effects than one, none where there is no such rival."""
     if not rivals:
         return []
     mine = rival(" + ".join(key.compiled for key in named.active), named, named)
-    return [mine, *(rival(" + ".join(r.names), r.fit, named) for r in rivals[: MOST_RIVALS - 1])]
+    return [mine, *(rival(" + ".join(r.names), r, named) for r in rivals[: MOST_RIVALS - 1])]
 
 
 def rival(name: str, fit: Fit, best: Fit) -> Rival:

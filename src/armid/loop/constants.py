@@ -19,9 +19,9 @@ from armid.estimation.least_squares import LeastSquaresProblem, descend
 from armid.loop.candidates import ROUGHLY, Library
 from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import MOST as TOO_MANY
-from armid.loop.equivalence import WITHIN, EffectGroup, Likeness
+from armid.loop.equivalence import WITHIN, EffectGroup
 from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
-from armid.loop.score_test import free_values
+from armid.loop.score_test import candidate_at
 from armid.loop.search import Search, unless_diverged
 from armid.loop.suspects import FREED, Suspect, simulated_file, with_measured
 from armid.loop.whitening import WhiteRecords
@@ -197,9 +197,8 @@ def measurements(models: Sequence[ConstantModel]) -> list[str]:
 def group_beside(constants: ConstantModel, search: Search) -> EffectGroup:
     """Return the constants with the single effects that do as well, none where they are too many to say anything."""
     fits = [f for f in search.of_size(1) if f.chi2 < constants.chi2 + WITHIN]
-    near = dict.fromkeys(f.active[0].public for f in fits)
-    alike = tuple(Likeness(name, 0.0, 1.0) for name in near) if len(near) < TOO_MANY else ()
-    return EffectGroup(constants.name, alike, ())
+    near = tuple(dict.fromkeys(f.active[0].public for f in fits))
+    return EffectGroup(constants.name, near if len(near) < TOO_MANY else ())
 
 
 def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
@@ -231,8 +230,7 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
 
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:
     """Return the change of the whitened signal by a parameter, its size taken as 1, about a fit, (n_samples,)."""
-    candidate = np.asarray(records.space.complete(free_values(records, fit.values)[np.newaxis])[0])
-    both = np.tile(candidate, (2, 1))
+    both = np.tile(candidate_at(records, fit.values), (2, 1))
     both[:, records.space.index(name)] += np.array([STEP, -STEP]) * size
     upper, lower = replace(records, data=fit.records.data).whole_signals(both)
     return np.asarray((upper - lower) / (2.0 * STEP))
@@ -276,7 +274,6 @@ class Trend:
         return FARTHEST_TREND * slope_of(self.fit, self.moves) * order_of(self.fit.records)
 
     def undone(self, train: Sequence[Record]) -> tuple[Record, ...]:
-        """Return the train records as they would be without it."""
         measured = iter([[p.measured for p in r.pieces] for r in self.fit.records.replays])
         found = []
         for record in train:

@@ -1,20 +1,21 @@
 """Is there a discrepancy, and where: tests of a whitened residual against noise."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
-from armid.engine import along, simulate
+from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
+from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
 from armid.loop.candidates import Library, calibrated_replays
 from armid.loop.fit import Fit, beyond, decomposed
-from armid.loop.whitening import WhitenedData, WhiteRecords, whitened
+from armid.loop.whitening import WhitenedData, WhiteRecords, whitened, with_samples
 from armid.model import Model
 from armid.problem.problem import Replay
 from armid.record import Record
@@ -60,6 +61,16 @@ class Residuals:
     def model(self) -> Model:
         return self.replays[0].model
 
+    @cached_property
+    def errors(self) -> JointErrors:
+        errors = campaign_errors(self.judged, self.candidate)
+        assert errors is not None
+        return errors
+
+    @cached_property
+    def diagnosis(self) -> "Diagnosis":
+        return diagnose(self)
+
     @property
     def variance(self) -> float:
         """What tests of structure divide by: 1 for known noise, else the mean square of the residual itself."""
@@ -95,29 +106,17 @@ class Residuals:
 
     @cached_property
     def raw(self) -> list[Array]:
-        raw = [r.measured - r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
-        return raw if self.data.sound is None else [x * m for x, m in zip(raw, self.sound, strict=True)]
-
-    @property
-    def sound(self) -> list[Array]:
-        """1 for each sample that is data, else 0, by record."""
-        sound = self.data.sound
-        return self.data.by_record(np.ones(self.data.edges[-1]) if sound is None else sound)
+        """What is left of each record, not whitened, 0 where a sample is no data."""
+        pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
+        return [(r.measured - r.signal(self.candidate[np.newaxis])[0]) * sound for r, sound in pairs]
 
     @property
     def judged(self) -> tuple[Replay, ...]:
         """The replays whose errors count: where a sample is no data, the simulated one stands for it."""
-        return self.replays if self.data.sound is None else tuple(map(self.mended, self.replays, self.sound))
-
-    def mended(self, replay: Replay, sound: Array) -> Replay:
-        simulated, first, pieces = replay.signal(self.candidate[np.newaxis])[0], 0, []
-        for piece in replay.pieces:
-            here = slice(first, first + piece.n_samples)
-            measured = piece.measured.copy()
-            measured[piece.window] = np.where(sound[here] > 0.0, measured[piece.window], simulated[here])
-            pieces.append(replace(piece, measured=measured))
-            first += piece.n_samples
-        return replace(replay, pieces=tuple(pieces))
+        pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
+        return tuple(r if sound.all() else
+                     with_samples(r, np.where(sound > 0.0, r.measured, r.signal(self.candidate[np.newaxis])[0]))
+                     for r, sound in pairs)  # fmt: skip
 
     @cached_property
     def variables(self) -> dict[str, Array]:
@@ -136,12 +135,9 @@ class Residuals:
         """Samples before and after each one-way switch of the plant, name -> (n_samples,); empty without a switch."""
         found: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
-            parts = []
-            for replay in self.replays:
-                for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
-                    run = simulate(self.model, piece.manoeuvre, self.candidate[np.newaxis], calibration.schedule)
-                    parts.append(piece.manoeuvre.times()[piece.window] >= run.switch_times[name][0])
-            after = np.concatenate(parts)
+            runs = (zip(r.pieces, r.runs(self.candidate[np.newaxis]), strict=True) for r in self.replays)
+            after = np.concatenate([piece.manoeuvre.times()[piece.window] >= run.switch_times[name][0]
+                                    for piece, run in chain.from_iterable(runs)])  # fmt: skip
             found |= {f"before '{name}'": ~after, f"after '{name}'": after}
         return {n: samples for n, samples in found.items() if samples.any()}
 
@@ -189,7 +185,7 @@ def variable_names(model: Model) -> list[str]:
     return [*first, *(n for n in states if n not in first), *(i.name for i in plant.inputs), *drive]
 
 
-@lru_cache(maxsize=4)  # asked for by one test after the other; what they share is found once
+@lru_cache(maxsize=16)  # many ask about the same few models; what their tests share is found once
 def train_residuals(fit: Fit) -> Residuals:
     """Return what a fit leaves on its records, beyond the reach of their measured starts: these are known roughly."""
     residual, basis = fit.residual, fit.basis
@@ -199,15 +195,11 @@ def train_residuals(fit: Fit) -> Residuals:
     return Residuals(fit.records.data, fit.records.replays, fit.candidate, residual, basis)
 
 
-@lru_cache(maxsize=16)  # many ask about the same few models
-def diagnosed(fit: Fit) -> "Diagnosis":
-    return diagnose(train_residuals(fit))
-
-
 def is_significant(fit: Fit) -> bool:
     """Tell whether what a model leaves on train is more than noise; where its size alone says so, that is enough."""
-    whole = next(size_tests(train_residuals(fit)), None)
-    return (whole is not None and whole.p < CERTAIN) or diagnosed(fit).significant
+    seen = train_residuals(fit)
+    whole = next(size_tests(seen), None)
+    return (whole is not None and whole.p < CERTAIN) or seen.diagnosis.significant
 
 
 def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -> Residuals | None:
@@ -295,14 +287,13 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
     records = {r.name: (rows >= a) & (rows < b) for r, (a, b) in zip(seen.replays, pairwise(edges), strict=True)}
     square = np.repeat([level.rms**-2.0 for level in levels], lengths) * np.concatenate(seen.raw) ** 2
     square = seen.residual**2 if seen.doubted else square
-    sound = np.concatenate(seen.sound)
     counted = np.repeat([level.n_power / level.n_samples for level in levels], lengths)
     known, share = min(level.n_power for level in levels), 1.0 - seen.basis.shape[1] / n
     whole = {"all records": np.ones(n, dtype=np.bool_)}
     for kind in ("size", "record", "stage"):
         parts = {"size": whole, "record": records if len(records) > 1 else {}}.get(kind)
         for where, samples in (seen.stages if parts is None else parts).items():
-            ratio = float(np.sum(square[samples])) / max(float(sound[samples].sum()), 1.0) / share
+            ratio = float(np.sum(square[samples])) / max(float(seen.data.sound[samples].sum()), 1.0) / share
             yield Finding(kind, where, ratio, float(fdtrc(counted[samples].sum() * share, known, ratio)))
 
 
@@ -356,17 +347,15 @@ def dependence_tests(seen: Residuals) -> Iterator[Finding]:
             edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, N_BINS + 1)))
             place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
             for output, samples in outputs.items():
-                yield structure(seen, "dependence", f"{name} in {output}" if len(outputs) > 1 else name, place, samples)
+                yield structure(seen, f"{name} in {output}" if len(outputs) > 1 else name, place, samples)
     parts = [np.arange(n) * N_BINS // max(n, 1) for n in np.diff(seen.data.edges)]
     bins = np.concatenate([p + i * N_BINS for i, p in enumerate(parts)])
     for output, samples in outputs.items():
         where = f"time in the record of {output}" if len(outputs) > 1 else "time in the record"
-        yield structure(seen, "dependence", where, bins, samples)
+        yield structure(seen, where, bins, samples)
 
 
-def structure(
-    seen: Residuals, kind: str, where: str, place: NDArray[np.int64], samples: NDArray[np.bool_]
-) -> Finding:  # fmt: skip
+def structure(seen: Residuals, where: str, place: NDArray[np.int64], samples: NDArray[np.bool_]) -> Finding:
     """Test a residual for a part that is constant in each bin; place: the bin of each sample, (n_samples,).
 
     samples: which of them are looked at, (n_samples,).
@@ -380,7 +369,7 @@ def structure(
         # Neighbours tell the same: of the residual's own scatter only the independent samples count.
         square *= seen.data.independent(seen.residual) / len(seen.residual)
     known = seen.data.n_noise(otherwise=np.inf)
-    return Finding(kind, where, square / rank, chance(square / rank, rank, known))
+    return Finding("dependence", where, square / rank, chance(square / rank, rank, known))
 
 
 def square_along(columns: Array, values: Array) -> tuple[float, int]:

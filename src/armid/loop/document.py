@@ -11,7 +11,7 @@ from armid.estimation.constants import NAMED
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
 from armid.loop.candidates import SHOWN_AS
-from armid.loop.diagnose import SIGNIFICANCE, Diagnosis, Finding, Residuals, time_in_words
+from armid.loop.diagnose import SIGNIFICANCE, Finding, Residuals, time_in_words
 from armid.loop.figures import candidate_figure, figures_of, record_figure
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
@@ -56,7 +56,7 @@ from armid.report.document import (
     value_text,
 )
 from armid.report.result import Parts
-from armid.units import SHOWN, shown
+from armid.units import shown
 
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
 # A shift of a parameter by more than this share of its value, and of its interval, is told.
@@ -182,11 +182,10 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     of_those = report.get("noise_rms_holdout") if which == "holdout" else None
     noise, unit = shown(of_those or report["noise_rms"], report["unit"])
     alone = "" if which == "holdout" else "; no record was held out"
+    told, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
     if not report["effects"]:
-        others = others_text(after[which])
-        return f"Error on {on}: {now} {unit} RMSE, the noise is {noise:.3g} {unit}{alone}.{others}"
-    others = others_text(before[which], after[which])
-    return f"Error on {on}: {was} before, {now} {unit} RMSE after; the noise is {noise:.3g} {unit}{alone}.{others}"
+        told, errors = f"{now} {unit} RMSE,", [after[which]]
+    return f"Error on {on}: {told} the noise is {noise:.3g} {unit}{alone}.{others_text(*errors)}"
 
 
 def step_table(report: Mapping[str, Any]) -> Table:
@@ -298,7 +297,6 @@ def equations_section(equations: Mapping[str, str]) -> Section:
 
 
 def parts_of(found: ClosedLoop) -> Parts:
-    """Return what is stored of a closed loop."""
     report, details = report_of(found), details_of(found)
     return Parts(report, details, figures_of(found, report, details))
 
@@ -311,8 +309,8 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
     before, after = found.before, found.after
     records = [*record_entries(before.train, after.train), *record_entries(before.holdout, after.holdout)]
     diagnoses = {
-        name: {role: None if seen is None or told is None else diagnosis_sentences(told, seen) for role, told, seen in
-               (("train", judged.diagnosis, judged.train), ("holdout", judged.holdout_diagnosis, judged.holdout))}
+        name: {role: None if seen is None else diagnosis_sentences(seen)
+               for role, seen in (("train", judged.train), ("holdout", judged.holdout))}
         for name, judged in (("before", before), ("after", after))
     }  # fmt: skip
     return {
@@ -320,7 +318,7 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
         "conclusion": conclusion(found),
         "shifts": shift_sentences(before, after) if found.steps else [],
         "doubts": doubt_sentences(after),
-        "suspects": [suspect_sentence(s, SHOWN) for s in found.suspects],
+        "suspects": [suspect_sentence(s) for s in found.suspects],
         "diagnosis": diagnoses if found.steps else diagnoses | {"after": None},
         "missing": missing_sentences(found.missing) if found.missing is not None else [],
         "equations": {"before": str(before.model), "after": str(after.model)},
@@ -334,8 +332,9 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
 
 def conclusion(found: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
-    of_verdict = {IMPLAUSIBLE: implausible_sentence, DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence,
-                  TOO_ALIKE: doubtful}  # fmt: skip
+    if found.verdict == IMPLAUSIBLE:
+        return f"Nothing was searched for, as the records look wrong. {found.next_steps[0]}"
+    of_verdict = {DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful}
     if found.verdict in of_verdict:
         return of_verdict[found.verdict](found)
     if found.term is not None:
@@ -344,10 +343,9 @@ def conclusion(found: ClosedLoop) -> str:
         return constants_sentence(found)
     names = " + ".join(found.effects)
     unnamed = "" if all(s.claimed for s in found.steps) else " No name is claimed: others may predict as well."
-    where = "train and holdout" if found.campaign.holdout else "train; no record was held out to judge it"
     return {
         NO_DISCREPANCY: "What the declared model leaves is noise: nothing is missing that these records could show.",
-        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {where}.",
+        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(found)}.",
         PARTLY: f"With {names} the declared model does better, but a significant discrepancy remains.{unnamed}",
         UNEXPLAINED: f"The declared model lacks something, but no effect of the library earns its parameters: "
         f"{tried(found)}.",
@@ -360,15 +358,18 @@ def tried(found: ClosedLoop) -> str:
     return f"{len(sizes)} models of up to {max(sizes)} effects were tried" if sizes else "no candidate was worth a fit"
 
 
-def implausible_sentence(found: ClosedLoop) -> str:
-    return f"Nothing was searched for, as the records look wrong. {found.next_steps[0]}"
+def remains(found: ClosedLoop) -> str:
+    return f"what remains is {'more than ' if found.after.significant else ''}noise"
+
+
+def judged_on(found: ClosedLoop) -> str:
+    return "train and holdout" if found.campaign.holdout else "train; no record was held out to judge it"
 
 
 def disagreeing_sentence(found: ClosedLoop) -> str:
-    said = [suspect_sentence(s, SHOWN) for s in found.suspects if s.role == "train"]
-    rest = "what remains is more than noise" if found.after.significant else "what remains is noise"
+    said = [suspect_sentence(s) for s in found.suspects if s.role == "train"]
     added = f"with {' + '.join(found.effects)} " if found.effects else ""
-    return f"{' '.join(said)} Apart from that {added}{rest}."
+    return f"{' '.join(said)} Apart from that {added}{remains(found)}."
 
 
 def constants_sentence(found: ClosedLoop) -> str:
@@ -377,9 +378,8 @@ def constants_sentence(found: ClosedLoop) -> str:
     moved = sorted((n for n in step.constants), key=lambda n: -abs(shares[first_member(n)]))
     told = ", ".join(f"{n.removeprefix(NAMED)} {shares[first_member(n)]:+.1%}" for n in moved[:MOST_PORTS])
     others = f"; so would {' or '.join(step.alternatives)}" if step.alternatives else ""
-    remains = "what remains is more than noise" if found.after.significant else "what remains is noise"
-    where = "train and holdout" if found.campaign.holdout else "train; no record was held out to judge it"
-    return f"No effect is needed: with constants off within their tolerances ({told}) {remains} on {where}{others}."
+    return (f"No effect is needed: with constants off within their tolerances ({told}) {remains(found)} on "
+            f"{judged_on(found)}{others}.")  # fmt: skip
 
 
 def first_member(name: str) -> str:
@@ -398,9 +398,8 @@ def carried_sentence(found: ClosedLoop) -> str:
     if found.withdrawn is None:
         return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip
-    assert found.before.holdout_error is not None
-    assert judged.holdout_error is not None
-    worse = judged.holdout_error.rmse / found.before.holdout_error.rmse - 1.0
+    assert found.before.holdout is not None
+    worse = unseen.errors.rmse / found.before.holdout.errors.rmse - 1.0
     names = " + ".join(s.effect for s in found.withdrawn.steps)
     return (f"The train records ask for {names}, but the records held out are simulated {worse:.0%} worse with it "
             f"({missed}): it is withdrawn, and the declared model stands.")  # fmt: skip
@@ -410,19 +409,19 @@ def doubtful(found: ClosedLoop) -> str:
     if found.after.fit.constants:
         return constants_sentence(found)
     if found.refused is not None:
-        rivals = [r.name for r in (*found.refused.alike, *found.refused.unlike)]
+        rivals = found.refused.rivals
         return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
                 f"as well ({found.refused.name}, {', '.join(rivals[:6])}): none is named.")  # fmt: skip
     said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
     said += [f"{s.effect} cannot be told from {' or '.join(s.constants)} within tolerance"
              for s in found.steps if s.constants]  # fmt: skip
-    said += [f"{s.effect} fits hardly better than {' or '.join(r.name for r in s.group.unlike)}"
+    said += [f"{s.effect} fits hardly better than {' or '.join(s.group.unlike)}"
              for s in found.steps if s.group.unlike]  # fmt: skip
     names = " + ".join(found.effects)
     said += [f"{names} fits hardly better than {' + '.join(r.names)}" for r in found.rivals]
-    remains = "a significant discrepancy remains, and" if found.after.significant else "what remains is noise, but"
+    rest = "a significant discrepancy remains, and" if found.after.significant else "what remains is noise, but"
     judged = "" if found.campaign.holdout else " No record was held out to judge it."
-    return f"With {names} {remains} on these records {'; '.join(said)}.{judged}"
+    return f"With {names} {rest} on these records {'; '.join(said)}.{judged}"
 
 
 def partly_empirical(found: ClosedLoop) -> str:
@@ -444,7 +443,8 @@ def missing_sentences(missing: Missing) -> list[str]:
     return [*said, f"On what it depends, by the share that a curve predicts on parts left out of its fit: {curves}."]
 
 
-def diagnosis_sentences(diagnosis: Diagnosis, seen: Residuals) -> list[str]:
+def diagnosis_sentences(seen: Residuals) -> list[str]:
+    diagnosis = seen.diagnosis
     if not diagnosis.significant:
         return [f"What remains cannot be told from noise (least chance of {len(diagnosis.findings)} tests together "
                 f"{diagnosis.p:.2g}, {SIGNIFICANCE:g} would be significant)."]  # fmt: skip

@@ -11,7 +11,7 @@ from armid.errors import ArmidError
 from armid.loop.candidates import UNNAMED, EffectKey, Library, joined
 from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import WITHIN
-from armid.loop.fit import Fit, compare, criterion, dwarfs_noise, fit_from, predicted_alike
+from armid.loop.fit import Fit, behind, compare, criterion, fit_from, predicted_alike
 from armid.loop.missing_signal import (
     N_HEIGHTS,
     Dependence,
@@ -20,8 +20,8 @@ from armid.loop.missing_signal import (
     curve_variables,
     knows,
     missing_from,
-    posed_in,
 )
+from armid.loop.score_test import free_values
 from armid.loop.search import Search, unless_diverged
 from armid.model import Effect, Model, Parameter
 
@@ -40,15 +40,14 @@ MOST_REMOVING, MOST_PREDICTING = 3, 2
 class Term:
     """Hold a model with an empirical term, the last of its effects.
 
-    dependence: the curve it began from. search: with the term in its library. others: curves at other ports that would
-    do as well by the criterion.
+    dependence: the curve it began from. search: with the term in its library. others: ports at which another curve
+    would do as well by the criterion.
     """
 
     fit: Fit
     dependence: Dependence
-    missing: Missing
     search: Search
-    others: tuple[Dependence, ...]
+    others: tuple[str, ...] = ()
 
 
 def empirical_term(named: Fit, search: Search) -> tuple[Missing | None, Term | None]:
@@ -70,13 +69,13 @@ def empirical_term(named: Fit, search: Search) -> tuple[Missing | None, Term | N
         judged = compare(named, term.fit, n_extra=max(term.fit.n_free - named.n_free, 1))
         if not judged.earned or judged.left_out[1] >= judged.left_out[0] or not term.fit.needs(term.fit.active[-1]):
             continue
-        if not dwarfs_noise(named) or not any(f is named for f in predicted_alike([named, term.fit])):
+        if not named.dwarfs_noise or named not in predicted_alike([named, term.fit]):
             return missing, term
     return missing, None
 
 
 def terms(missing: Missing, search: Search) -> list[Term]:
-    """Fit the leading curves to what a model lacks, the best first; each knows those at other ports like it."""
+    """Fit the leading curves to what a model lacks, the best first."""
     predicting = sorted(missing.dependences, key=lambda d: -d.share)
     leading = tuple(dict.fromkeys([*missing.dependences[:MOST_REMOVING], *predicting[:MOST_PREDICTING]]))
     for dependence in leading:
@@ -85,28 +84,30 @@ def terms(missing: Missing, search: Search) -> list[Term]:
     tried = search.library.each(unless_diverged, [partial(term_of, d, missing, search) for d in leading])
     found = sorted((t for t in tried if t is not None),
                    key=lambda t: criterion(t.fit, missing.lacking.independent))  # fmt: skip
-
-    def others(term: Term) -> tuple[Dependence, ...]:
-        limit = criterion(term.fit, term.fit.independent) + WITHIN
-        near = [t.dependence for t in found if criterion(t.fit, term.fit.independent) < limit]
-        return tuple(d for d in near if d.port != term.dependence.port)
-
-    return [replace(t, others=others(t)) for t in found]
+    near = [{o.dependence.port: None for o in found if behind(o.fit, t.fit) < WITHIN} for t in found]
+    return [replace(t, others=tuple(port for port in ports if port != t.dependence.port))
+            for t, ports in zip(found, near, strict=True)]  # fmt: skip
 
 
 def term_of(dependence: Dependence, missing: Missing, search: Search) -> Term:
-    """Fit one curve together with all other parameters."""
-    lacking = missing.lacking
-    effect, heights = empirical_effect(search.library.declared, dependence)
+    """Fit one curve together with all other parameters.
+
+    Raises ArmidError where the term cannot be compiled with the others.
+    """
+    lacking, library = missing.lacking, search.library
+    effect, heights = empirical_effect(library.declared, dependence)
     key = EffectKey(effect.name)
-    library = with_candidate(search.library, key, effect)
-    records, flat = posed_in(library, lacking, (key,))
+    if key not in library.candidates:
+        raise ArmidError(f"a term at port {effect.name} cannot be composed with the candidates")
+    library = replace(library, candidates={**library.candidates, key: effect}, _models={}, _problems={})
+    records = library.problem((*lacking.active, key), lacking.values)
+    flat = free_values(records, lacking.values)
     guess = np.array([heights.get(n, v) for n, v in zip(records.space.free_names, flat, strict=True)])
     # The heights are a straight line's guess: where they are worse than none, the fit begins without.
     starts = np.array([np.clip(records.shares(v), 1e-3, 1.0 - 1e-3) for v in (guess, flat)])
     fit = fit_from(records, (*lacking.active, key), [starts[int(np.argmin(records.chi2(starts)))]])
     extended = replace(search, library=library, fits=dict(search.fits), scores=dict(search.scores))
-    return Term(fit, dependence, missing, extended, ())
+    return Term(fit, dependence, extended)
 
 
 def with_terms(library: Library) -> Library:
@@ -123,24 +124,8 @@ def with_terms(library: Library) -> Library:
         extended = joined(model, effect)
         if extended is not None:
             model, added[EffectKey(effect.name)] = extended, effect
-    return replace(
-        library, candidates={**library.candidates, **added}, originals={**library.originals, **added},
-        bundles=((*(library.bundles[0] if library.bundles else ()), *added), *library.bundles[1:]),
-        _models={}, _problems={},
-    )  # fmt: skip
-
-
-def with_candidate(library: Library, key: EffectKey, effect: Effect) -> Library:
-    """Return a library whose term at a port is a certain curve.
-
-    Raises ArmidError where the term cannot be compiled with the others.
-    """
-    if key not in library.candidates:
-        raise ArmidError(f"a term at port {effect.name} cannot be composed with the candidates")
-    return replace(
-        library, candidates={**library.candidates, key: effect}, originals={**library.originals, key: effect},
-        _models={}, _problems={},
-    )  # fmt: skip
+    bundles = ((*(library.bundles[0] if library.bundles else ()), *added), *library.bundles[1:])
+    return replace(library, candidates={**library.candidates, **added}, bundles=bundles, _models={}, _problems={})
 
 
 def hat(place, knot):

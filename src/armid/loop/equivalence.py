@@ -1,6 +1,6 @@
 """Effects that these records cannot tell apart."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.loop.candidates import CONSTANT, EffectKey, Library, activation_grid, declared_keys
-from armid.loop.fit import Fit, beyond, criterion, decomposed
+from armid.loop.fit import Fit, behind, beyond, decomposed
 from armid.loop.score_test import at_null, responses, square_beyond
 
 Array = NDArray[np.float64]
@@ -19,76 +19,52 @@ LIKELY, MOST_SUBSTITUTES = 0.9, 8
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """Hold an effect that would take another's place: how much worse the criterion is, how alike responses are."""
-
-    name: str
-    gap: float
-    correlation: float
-
-
-@dataclass(frozen=True)
 class EffectGroup:
-    """Hold the effect of a step with its rivals within the criterion.
+    """Hold the name of the effect of a step with those of its rivals within the criterion.
 
     alike: those with the same response. unlike: those with another one, that fit nearly as well.
     """
 
     name: str
-    alike: tuple[Likeness, ...]
-    unlike: tuple[Likeness, ...]
+    alike: tuple[str, ...]
+    unlike: tuple[str, ...] = ()
 
     @property
-    def names(self) -> tuple[str, ...]:
-        return (self.name, *(r.name for r in self.alike))
-
-    @property
-    def all_names(self) -> tuple[str, ...]:
-        return (*self.names, *(r.name for r in self.unlike))
+    def rivals(self) -> tuple[str, ...]:
+        return (*self.alike, *self.unlike)
 
     @property
     def too_big(self) -> bool:
         """Whether so many effects would do that naming them says nothing."""
-        return sum(not r.name.startswith(CONSTANT) for r in (*self.alike, *self.unlike)) >= MOST
+        return sum(not name.startswith(CONSTANT) for name in self.rivals) >= MOST
 
 
 def group_of(fit: Fit, key: EffectKey, others: Sequence[Fit]) -> EffectGroup:
     """Return the rivals of one effect of a model: models that differ in that effect alone, within the criterion."""
     kept = declared_keys(k for k in fit.active if k != key)
     response, sensitivity = response_of(fit, key), sensitivity_of(fit, key)
-    best: dict[str, Likeness] = {}
+    # name -> how much worse the criterion is, how alike the responses are
+    best: dict[str, tuple[float, float]] = {}
     for other in others:
         new = [k for k in other.active if k.declared not in kept]
         if other is fit or len(new) != 1 or len(other.active) != len(fit.active) or new[0].public == key.public:
             continue
-        gap = criterion(other, fit.independent) - criterion(fit, fit.independent)
-        name = new[0].public
-        if gap < WITHIN and (name not in best or gap < best[name].gap):
+        name, gap = new[0].public, behind(other, fit)
+        if gap < WITHIN and (name not in best or gap < best[name][0]):
             likeness = max(abs(response @ response_of(other, new[0])), abs(sensitivity @ sensitivity_of(other, new[0])))
-            best[name] = Likeness(name, float(gap), float(likeness))
-    rivals = sorted(best.values(), key=lambda r: r.gap)
-    alike = tuple(r for r in rivals if r.correlation > ALIKE)
-    return EffectGroup(key.public, alike, tuple(r for r in rivals if r not in alike))
+            best[name] = gap, float(likeness)
+    rivals = sorted(best, key=lambda name: best[name][0])
+    alike = tuple(name for name in rivals if best[name][1] > ALIKE)
+    return EffectGroup(key.public, alike, tuple(name for name in rivals if name not in alike))
 
 
-@dataclass(frozen=True, eq=False)
-class RivalModel:
-    """Hold another model of as many effects, two or more of them others, that fits nearly as well."""
-
-    names: tuple[str, ...]
-    gap: float
-    fit: Fit
-
-
-def rival_models(fit: Fit, others: Sequence[Fit]) -> tuple[RivalModel, ...]:
-    mine = {key.public for key in fit.active}
-    found: dict[frozenset[str], RivalModel] = {}
+def rival_models(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, ...]:
+    """Return the other models of as many effects, two or more of them others, that fit nearly as well."""
+    mine, found = set(fit.names), dict[frozenset[str], Fit]()
     for other in others:
-        names = tuple(key.public for key in other.active)
-        gap = criterion(other, fit.independent) - criterion(fit, fit.independent)
-        if len(names) == len(mine) and len(set(names) - mine) > 1 and gap < WITHIN:
-            found.setdefault(frozenset(names), RivalModel(names, float(gap), other))
-    return tuple(sorted(found.values(), key=lambda r: r.gap)[:MOST])
+        if len(other.names) == len(mine) and len(set(other.names) - mine) > 1 and behind(other, fit) < WITHIN:
+            found.setdefault(frozenset(other.names), other)
+    return tuple(sorted(found.values(), key=lambda other: behind(other, fit))[:MOST])
 
 
 def response_of(fit: Fit, key: EffectKey) -> Array:
@@ -103,12 +79,9 @@ def sensitivity_of(fit: Fit, key: EffectKey) -> Array:
     words (a torque and an inertia in one proportion) have one sensitivity, while the changes from null to value differ
     by what other parameters have to make up for.
     """
-    space, away = fit.records.space, np.zeros(fit.n_free)
-    for i, name in enumerate(fit.values):
-        null, place = fit.model.parameters[name].null, space.index(name)
-        if key.owns(name) and null is not None:
-            away[i] = fit.z[i] - (null - space.low[place]) / (space.high[place] - space.low[place])
-    return beyond_others(fit, key, fit.jacobian @ away)
+    direction, (places, away) = np.zeros(fit.n_free), fit.strengths_of(key)
+    direction[places] = away
+    return beyond_others(fit, key, fit.jacobian @ direction)
 
 
 def change_by(fit: Fit, key: EffectKey) -> Array:
@@ -148,26 +121,19 @@ def substitutes(fit: Fit, library: Library) -> list[Substitute]:
     """
     changes = {key: change_by(fit, key) for key in fit.active}
     bases = {key: basis_of_others(fit, key) for key in fit.active}
-    each = library.each(lambda c: list(places_of(fit, library, c, changes, bases)), library.joinable(fit.active))
+
+    def places_of(candidate: EffectKey) -> list[Substitute]:
+        """Return the effects of the fit that a candidate moves the records like."""
+        records = library.problem((*fit.active, candidate), fit.values)
+        grid, _ = activation_grid(records, candidate)
+        near = [(key, likest(changes[key], responses(fit, records, grid, without=key), bases[key]))
+                for key in fit.active]  # fmt: skip
+        return [Substitute(key, candidate, best[1], fit.values | grid[best[0]].at(float(np.clip(best[2], 0.01, 1.0))))
+                for key, best in near if best is not None]  # fmt: skip
+
+    each = library.each(places_of, library.joinable(fit.active))
     found = sorted(chain.from_iterable(each), key=lambda r: -r.correlation)
     return [r for place in fit.active for r in [r for r in found if r.place == place][:MOST_SUBSTITUTES]]
-
-
-def places_of(
-    fit: Fit, library: Library, candidate: EffectKey, changes: Mapping[EffectKey, Array],
-    bases: Mapping[EffectKey, Array],
-) -> Iterator[Substitute]:  # fmt: skip
-    """Yield the effects of a fit that a candidate moves the records like.
-
-    changes: by each effect, (n_samples,); bases: of what the other parameters can absorb, (n_samples, rank).
-    """
-    records = library.problem((*fit.active, candidate), fit.values)
-    grid, _ = activation_grid(records, candidate)
-    for key in fit.active:
-        best = likest(changes[key], responses(fit, records, grid, without=key), bases[key])
-        if best is not None:
-            activation, correlation, amplitude = grid[best[0]], best[1], float(np.clip(best[2], 0.01, 1.0))
-            yield Substitute(key, candidate, correlation, fit.values | activation.at(amplitude))
 
 
 def likest(change: Array, moved: Array, basis: Array) -> tuple[int, float, float] | None:

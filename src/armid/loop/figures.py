@@ -200,7 +200,7 @@ def correlation(residuals: Residuals) -> Array:
 
 def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
     best = found.term.dependence if found.term is not None else missing.dependences[0]
-    variables = [best.variable, *(v for v in missing.moved[0].variables if v != best.variable)][:MOST_VARIABLES]
+    variables = [best.variable, *(v for v in missing.segments[0].variables if v != best.variable)][:MOST_VARIABLES]
     columns = (len(variables) + 2) // 2
     size = (4.0 * columns, 6.4)
     figure, axes = pyplot().subplots(2, columns, figsize=size, squeeze=False, layout="constrained")
@@ -231,12 +231,12 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
     """Draw the signal of every record against one variable, with the curve where it is the one that was fitted."""
     model, signal = missing.lacking.records.replays[0].model, missing.signal_at(best.port)
     factor, name = shown(1.0, unit_of(variable, model))
-    for motion, values in zip(missing.moved if signal else (), signal.signals if signal else (), strict=True):
-        colour = COLOURS[motion.segment.group % len(COLOURS)]
-        axis.plot(factor * motion.variables[variable], values, ".", ms=3, color=colour)
+    for segment, values in zip(missing.segments if signal else (), signal.signals if signal else (), strict=True):
+        colour = COLOURS[segment.group % len(COLOURS)]
+        axis.plot(factor * segment.variables[variable], values, ".", ms=3, color=colour)
     if signal is not None and variable == best.variable and best.factor == "1":
         knots = np.linspace(best.first, best.last, len(best.heights))
-        seen = np.concatenate([m.variables[variable] for m in missing.moved])
+        seen = np.concatenate([m.variables[variable] for m in missing.segments])
         heights = np.linalg.lstsq(hats(seen, best.first, best.last), np.concatenate(signal.signals), rcond=None)[0]
         axis.plot(factor * knots, heights, "-", color="black", label="curve through it")
         axis.legend(fontsize="small")

@@ -15,7 +15,7 @@ from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.design import BOX
 from armid.estimation.information import start_changes
-from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, spread_starts
+from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound
 from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer
 from armid.loop.whitening import WhiteRecords
 from armid.model import Model
@@ -63,8 +63,18 @@ class Fit:
         return max(1.0, float(np.sqrt(self.chi2 / len(self.residual))))
 
     @property
+    def dwarfs_noise(self) -> bool:
+        """Whether it leaves more than ten times the noise."""
+        return self.chi2 > DWARFED**2 * len(self.residual)
+
+    @property
     def n_free(self) -> int:
         return len(self.z)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Public names of the effects."""
+        return tuple(key.public for key in self.active)
 
     @property
     def model(self) -> Model:
@@ -133,16 +143,20 @@ class Fit:
         A Wald test; a residual that is no noise scatters with its correlation in time, see `WhitenedData.trust`, and
         the estimate with the measured starts.
         """
-        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
-        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
-        null = np.array([nulls[i] for i in places], dtype=np.float64)
-        free = np.flatnonzero(space.free)[places]
-        away = self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
+        places, away = self.strengths_of(key)
         weighed = self.jacobian * np.sqrt(self.records.data.trust(self.residual))[:, np.newaxis]
         covariance = np.linalg.inv(weighed.T @ weighed + BOX * np.eye(self.n_free))
         moved = self.answer @ self.start_slopes
         covariance = (covariance + moved @ moved.T)[np.ix_(places, places)]
         return not places or bool(away @ np.linalg.solve(covariance, away) > chdtri(len(places), OPEN))
+
+    def strengths_of(self, key: EffectKey) -> tuple[list[int], Array]:
+        """Return the places of an effect's strengths among the free parameters, and how far each is from its null."""
+        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
+        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
+        null = np.array([nulls[i] for i in places], dtype=np.float64)
+        free = np.flatnonzero(space.free)[places]
+        return places, self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""
@@ -198,11 +212,11 @@ def fit_from(
 
 
 def with_standard_accuracy(fit: Fit) -> Fit:
-    """Return a fit whose records are simulated on the engine's standard accuracy, itself where they are already."""
+    """Return a fit about its own starts whose records are simulated on the engine's standard accuracy, or finer."""
     records = fit.records
     standard = calibrated_replays([r.record for r in records.replays], fit.model, records.space, fit.values)
     if not is_finer(standard, records.replays):
-        return fit
+        return with_own_starts(fit)
     # the pieces are those of the fit, whose constants may be others than the record's
     pairs = zip(records.replays, standard, strict=True)
     # nor coarser than what the fit was made with
@@ -213,7 +227,8 @@ def with_standard_accuracy(fit: Fit) -> Fit:
         ))
         for ours, theirs in pairs
     )  # fmt: skip
-    return replace(fit_from(replace(records, replays=replays), fit.active, [fit.z]), constants=fit.constants)
+    again = fit_from(replace(records, replays=replays), fit.active, [fit.z])
+    return with_own_starts(replace(again, constants=fit.constants))
 
 
 def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
@@ -232,14 +247,6 @@ def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
     return fit
 
 
-def fit_globally(records: WhiteRecords, active: Active) -> Fit:
-    """Return the least-squares estimate without a start, see `spread_starts`.
-
-    Raises ArmidError when every candidate diverges.
-    """
-    return fit_from(records, active, spread_starts(records) if records.space.free.any() else ())
-
-
 @dataclass(frozen=True)
 class Comparison:
     """Say why a model is preferred to a smaller one, or not.
@@ -255,7 +262,7 @@ class Comparison:
     @property
     def earned(self) -> bool:
         """Whether the larger model is significant, cheaper by the criterion, and no worse on what was left out."""
-        return self.p < FAMILYWISE and self.gain > 0.0 and self.left_out[1] <= self.left_out[0]
+        return not self.why
 
     @property
     def why(self) -> str:
@@ -270,11 +277,6 @@ class Comparison:
         return ""
 
 
-def dwarfs_noise(fit: Fit) -> bool:
-    """Tell whether what a model leaves is more than ten times the noise."""
-    return fit.chi2 > DWARFED**2 * len(fit.residual)
-
-
 def criterion(fit: Fit, independent: float) -> float:
     """Return n_eff ln(chi2) + k ln(n_eff), the Bayesian criterion with effective samples; smaller is better.
 
@@ -283,6 +285,11 @@ def criterion(fit: Fit, independent: float) -> float:
     chi2 counts in proportion to what remains: no term is added for ever to a residual that the library cannot explain.
     """
     return float(independent * np.log(fit.chi2) + fit.n_free * np.log(independent))
+
+
+def behind(fit: Fit, best: Fit) -> float:
+    """Return how much worse than that of another model its criterion is."""
+    return criterion(fit, best.independent) - criterion(best, best.independent)
 
 
 def compare(smaller: Fit, larger: Fit, n_candidates: int = 1, n_shapes: int = 1, n_extra: int = 1) -> Comparison:
@@ -307,7 +314,7 @@ def left_out(smaller: Fit, larger: Fit) -> tuple[float, float]:
     Where the misfit dwarfs the noise, records that are alike are left out together, and the worse grouping counts.
     Infinite where a fit without a part diverges on it.
     """
-    groupings = larger.records.data.groupings()[1:] if dwarfs_noise(smaller) else []
+    groupings = larger.records.data.groupings()[1:] if smaller.dwarfs_noise else []
     found = []
     for parts in (parts_to_judge(smaller, larger), *groupings):
         before, after = (float(sum(left_out_part(fit, part) for part in parts)) for fit in (smaller, larger))
@@ -330,7 +337,7 @@ def predicted_alike(fits: Sequence[Fit]) -> list[Fit]:
         with np.errstate(invalid="ignore"):
             error = np.sqrt(len(parts)) * np.std(behind, axis=1, ddof=1)
         near = (behind.sum(axis=1) <= error) & np.isfinite(table).all(axis=1)
-        kept += [f for f, is_near in zip(fits, near, strict=True) if is_near and not any(f is k for k in kept)]
+        kept += [f for f, is_near in zip(fits, near, strict=True) if is_near and f not in kept]
     return kept
 
 

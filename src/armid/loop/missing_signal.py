@@ -2,17 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
-from armid.engine import Schedule, along, simulate
+from armid.engine import Schedule, Simulation, along, simulate
 from armid.estimation.least_squares import WeightedRecords
-from armid.loop.candidates import Active, EffectKey, Library
+from armid.loop.candidates import EffectKey, Library
 from armid.loop.diagnose import variable_names
 from armid.loop.fit import Fit, beyond
-from armid.loop.score_test import free_values
-from armid.loop.whitening import WhiteRecords
+from armid.loop.score_test import candidate_at, free_values
 from armid.model import Effect, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space
@@ -38,7 +40,7 @@ class Segment:
     piece of theirs. knots: times at which a missing signal is sought [s], (n_knots,). residual: measured minus
     simulated, (n_samples,). jacobian: of the free parameters, (n_samples, n_free). gains: port -> change of the signal
     per unit of the missing signal at each knot (straight lines between knots), (n_samples, n_knots). group: number of
-    its file.
+    its file. variables, factors: of the simulated motion, at the knots, see `motions`.
     """
 
     replays: tuple[Replay, ...]
@@ -50,6 +52,8 @@ class Segment:
     jacobian: Array
     gains: dict[str, Array]
     group: int
+    variables: dict[str, Array] = field(default_factory=dict)
+    factors: dict[str, Array] = field(default_factory=dict)
 
     @property
     def piece(self) -> Piece:
@@ -62,13 +66,12 @@ class MissingSignal:
     """Hold what must be added at a port to bring the residual down.
 
     signals: one for each segment, [unit of the port], at its knots. share: share of the squared residual, beyond what
-    the free parameters can absorb, that it removes. strength: of the smoothing, chosen by generalised cross-validation.
+    the free parameters can absorb, that it removes.
     """
 
     port: str
     signals: tuple[Array, ...]
     share: float
-    strength: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,25 +95,16 @@ class Dependence:
 
 
 @dataclass(frozen=True, eq=False)
-class SegmentMotion:
-    """Hold the variables of the simulated motion at the knots of one segment: name -> (n_knots,)."""
-
-    segment: Segment
-    variables: dict[str, Array]
-    factors: dict[str, Array] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
 class Missing:
     """Hold what is known of the signal that a model lacks.
 
     lacking: the model. signals: what would have to be added at each port, the port that removes most of the residual
-    first. moved: the motion to which they belong. dependences: curves over one variable, the one that predicts left-out
+    first. segments: those to which they belong. dependences: curves over one variable, the one that predicts left-out
     records best first.
     """
 
     lacking: Fit
-    moved: tuple[SegmentMotion, ...]
+    segments: tuple[Segment, ...]
     signals: tuple[MissingSignal, ...]
     dependences: tuple[Dependence, ...]
 
@@ -124,23 +118,16 @@ def missing_from(lacking: Fit, library: Library) -> Missing:
     library: with the test signals (see `empirical.with_terms`). Each port costs a simulation for every knot of every
     piece.
     """
-    records, x = posed_in(library, lacking, ())
+    records = library.problem(lacking.active, lacking.values)
     model, levels = records.model, [level.rms for level in records.data.levels]
     ports = [p for p in model.plant.ports if EffectKey(f"{PROBE}{p}") in library.candidates]
-    whole = segments(model, records.space, x, records.replays, levels, ports)
+    whole = segments(model, records.space, free_values(records, lacking.values), records.replays, levels, ports)
+    whole = motions(model, candidate_at(records, lacking.values), whole)
     # Pieces spread evenly over all, as many as the knots allow.
     most = max(1, int(MOST_KNOTS / np.mean([len(s.knots) for s in whole])))
     shown = [whole[i] for i in np.unique(np.linspace(0, len(whole) - 1, min(most, len(whole))).astype(int))]
-    moved = motions(model, records.space.complete(x[np.newaxis])[0], whole)
     signals = sorted((missing_signal(shown, port) for port in whole[0].gains), key=lambda s: -s.share)
-    kept = tuple(m for m in moved if any(m.segment is s for s in shown))
-    return Missing(lacking, kept, tuple(signals), tuple(dependences(moved)))
-
-
-def posed_in(library: Library, lacking: Fit, added: Active) -> tuple[WhiteRecords, Array]:
-    """Return the problem of a fit, with effects added at rest, in another library, and its free parameters, SI."""
-    records = library.problem((*lacking.active, *added), lacking.values)
-    return records, free_values(records, lacking.values)
+    return Missing(lacking, tuple(shown), tuple(signals), tuple(dependences(whole)))
 
 
 def segments(
@@ -213,20 +200,19 @@ class Probe:
     known: Mapping[str, float]
     name: str
 
-    def rows(self, size: float | Array, centre: float | Array, width: float) -> Array:
-        """Return a candidate of the model with the test signal for each size or centre, (n, n_parameters)."""
+    def run(self, segment: Segment, size: float | Array, centre: float | Array, width: float) -> Simulation:
+        """Simulate a segment without the test signal, then with it for each size or centre."""
         sizes, centres = np.broadcast_arrays(np.atleast_1d(size), np.atleast_1d(centre))
         names = list(self.model.parameters)
-        rows = np.tile([self.known.get(n, 0.0) for n in names], (len(sizes), 1))
+        rows = np.tile([self.known.get(n, 0.0) for n in names], (len(sizes) + 1, 1))
         rows[:, [i for i, n in enumerate(names) if n.startswith(PROBE) and n.endswith(".width")]] = width
-        rows[:, names.index(f"{self.name}.size")], rows[:, names.index(f"{self.name}.centre")] = sizes, centres
-        return rows
+        rows[1:, names.index(f"{self.name}.size")], rows[1:, names.index(f"{self.name}.centre")] = sizes, centres
+        return simulate(self.model, segment.piece.manoeuvre, rows, segment.schedule)
 
     def fitting_size(self, segment: Segment) -> float | None:
         """Return the largest power of ten whose effect on the output is still small, None where none has any."""
         knots = segment.knots
-        rows = self.rows(np.append(0.0, SIZES), float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
-        run = simulate(self.model, segment.piece.manoeuvre, rows, segment.schedule)
+        run = self.run(segment, SIZES, float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
         signals, size = run.joint(self.model.plant.sizes), self.model.plant.sizes[0]
         moved = np.abs(signals[1:] - signals[0]).max(axis=1)
         small = np.isfinite(moved) & (moved <= MOVES * size) & (moved > 0.0)
@@ -234,9 +220,7 @@ class Probe:
 
     def gain(self, segment: Segment, size: float) -> Array:
         """Return d signal / d missing signal at each knot, over the levels, (n_samples, n_knots)."""
-        width = float(segment.knots[1] - segment.knots[0])
-        rows = self.rows(np.append(0.0, np.full(len(segment.knots), size)), np.append(0.0, segment.knots), width)
-        run = simulate(self.model, segment.piece.manoeuvre, rows, segment.schedule)
+        run = self.run(segment, size, segment.knots, float(segment.knots[1] - segment.knots[0]))
         pairs, correction = zip(segment.replays, segment.levels, strict=True), segment.piece.correction
         outputs = run.outputs if correction is None else correction.corrected(run.outputs)
         seen = ((outputs[r.place][:, r.pieces[segment.index].window], level) for r, level in pairs)
@@ -257,8 +241,6 @@ def missing_signal(whole: Sequence[Segment], port: str) -> MissingSignal:
     sensitivities to the free parameters of all segments together, D takes second differences; s by generalised
     cross-validation (Golub, Heath, Wahba 1979, doi:10.1080/00401706.1979.10489751).
     """
-    from scipy.linalg import block_diag
-
     basis = np.concatenate([s.jacobian for s in whole])
     if basis.shape[1]:
         left, values, _ = np.linalg.svd(basis, full_matrices=False)
@@ -267,15 +249,15 @@ def missing_signal(whole: Sequence[Segment], port: str) -> MissingSignal:
     g = beyond(basis, np.asarray(block_diag(*(s.gains[port] for s in whole))))
     scale = np.sqrt(np.mean(np.sum(g**2, axis=0))) or 1.0
     rough = np.asarray(block_diag(*(np.diff(np.eye(len(s.knots)), 2, axis=0) for s in whole)))
-    strength, signal = smoothest(g.T @ g / scale**2, g.T @ r / scale, rough, float(r @ r), len(r))
+    signal = smoothest(g.T @ g / scale**2, g.T @ r / scale, rough, float(r @ r), len(r))
     rest = r - g @ signal / scale
     edges = np.cumsum([len(s.knots) for s in whole])[:-1]
     share = 1.0 - float(rest @ rest) / float(r @ r)
-    return MissingSignal(port, tuple(np.split(signal / scale, edges)), share, strength)
+    return MissingSignal(port, tuple(np.split(signal / scale, edges)), share)
 
 
-def smoothest(normal: Array, slope: Array, rough: Array, total: float, n: int) -> tuple[float, Array]:
-    """Return strength and solution with the least generalised cross-validation score, n |rest|^2 / (n - freedom)^2.
+def smoothest(normal: Array, slope: Array, rough: Array, total: float, n: int) -> Array:
+    """Return the solution with the least generalised cross-validation score, n |rest|^2 / (n - freedom)^2.
 
     normal, slope: G^T G and G^T r of the residual's least-squares problem; total: |r|^2; n: samples.
     In c = L^-T b with L L^T = D^T D + a little, the smoothing is plain ridge: one decomposition serves all strengths.
@@ -294,11 +276,11 @@ def smoothest(normal: Array, slope: Array, rough: Array, total: float, n: int) -
         rest = outside + float(np.sum((1.0 - kept) ** 2 * squares))
         scores.append(n * rest / (n - min(float(kept.sum()), 0.9 * n)) ** 2)
     strength = float(STRENGTHS[int(np.argmin(scores))])
-    return strength, np.linalg.solve(lower.T, vectors @ (along / (values + strength)))
+    return np.asarray(np.linalg.solve(lower.T, vectors @ (along / (values + strength))))
 
 
-def motions(model: Model, candidate: Array, whole: Sequence[Segment]) -> list[SegmentMotion]:
-    """Return the variables of each segment on which a missing signal may depend.
+def motions(model: Model, candidate: Array, whole: Sequence[Segment]) -> list[Segment]:
+    """Return the segments with the variables of the motion on which a missing signal may depend, and their factors.
 
     candidate: whole, SI, (n_parameters,). Variables that never move, and those that order the samples as an earlier one
     does, are left out.
@@ -318,7 +300,8 @@ def motions(model: Model, candidate: Array, whole: Sequence[Segment]) -> list[Se
         rank = np.argsort(np.argsort(every)).astype(float)
         if all(abs(np.corrcoef(rank, other)[0, 1]) < SAME_VARIABLE for other in ranks.values()):
             ranks[name] = rank
-    return [SegmentMotion(s, {n: t[n] for n in ranks}, factors(t, model)) for s, t in zip(whole, tables, strict=True)]
+    return [replace(s, variables={n: t[n] for n in ranks}, factors=factors(t, model))
+            for s, t in zip(whole, tables, strict=True)]  # fmt: skip
 
 
 def curve_variables(model: Model) -> list[str]:
@@ -346,28 +329,29 @@ N_HEIGHTS, N_BLOCKS = 8, 4
 RIDGE, STRAIGHT = 1e-9, 1e-4
 
 
-def dependences(moved: Sequence[SegmentMotion]) -> list[Dependence]:
-    ports, pairs = moved[0].segment.gains, [(v, f) for v in moved[0].variables for f in moved[0].factors if v != f]
-    found = [dependence(moved, port, variable, factor) for port in ports for variable, factor in pairs]
+def dependences(whole: Sequence[Segment]) -> list[Dependence]:
+    pairs = [(v, f) for v in whole[0].variables for f in whole[0].factors if v != f]
+    found = [dependence(whole, port, variable, factor) for port in whole[0].gains for variable, factor in pairs]
     return sorted(found, key=lambda d: -d.removed)
 
 
-def dependence(moved: Sequence[SegmentMotion], port: str, variable: str, factor: str) -> Dependence:
+def dependence(segments: Sequence[Segment], port: str, variable: str, factor: str) -> Dependence:
     """Fit one curve, and again without each record (or block of time), to see what it predicts there."""
-    values = np.concatenate([m.variables[variable] for m in moved])
+    values = np.concatenate([s.variables[variable] for s in segments])
     first, last = float(values.min()), float(values.max())
-    weights = [hats(m.variables[variable], first, last) * m.factors[factor][:, np.newaxis] for m in moved]
-    design = np.concatenate([np.hstack([m.segment.jacobian, m.segment.gains[port] @ w])
-                             for m, w in zip(moved, weights, strict=True)])  # fmt: skip
-    residual = np.concatenate([m.segment.residual for m in moved])
-    groups = np.concatenate([np.full(len(m.segment.residual), m.segment.group) for m in moved])
+    weights = [hats(s.variables[variable], first, last) * s.factors[factor][:, np.newaxis] for s in segments]
+    design = np.concatenate([np.hstack([s.jacobian, s.gains[port] @ w])
+                             for s, w in zip(segments, weights, strict=True)])  # fmt: skip
+    residual = np.concatenate([s.residual for s in segments])
+    groups = np.concatenate([np.full(len(s.residual), s.group) for s in segments])
     if len(np.unique(groups)) == 1:
         groups = np.arange(len(groups)) * N_BLOCKS // len(groups)
-    n_free = moved[0].segment.jacobian.shape[1]
-    parts = [NormalEquations.of(design[groups == n], residual[groups == n], n_free) for n in np.unique(groups)]
-    whole, before, after = NormalEquations.total(parts), 0.0, 0.0
+    n_free = segments[0].jacobian.shape[1]
+    each = [(design[groups == n], residual[groups == n]) for n in np.unique(groups)]
+    parts = [NormalEquations(d.T @ d, d.T @ r, float(r @ r), n_free) for d, r in each]
+    whole, before, after = reduce(add, parts), 0.0, 0.0
     for i, left_out in enumerate(parts):
-        others = NormalEquations.total([*parts[:i], *parts[i + 1 :]])
+        others = reduce(add, [*parts[:i], *parts[i + 1 :]])
         before += left_out.without_curve.rest(others.without_curve.solution)
         after += left_out.rest(others.solution)
     free_alone = whole.without_curve.rest(whole.without_curve.solution)
@@ -394,14 +378,9 @@ class NormalEquations:
     square: float
     n_free: int
 
-    @staticmethod
-    def of(design: Array, residual: Array, n_free: int) -> "NormalEquations":
-        return NormalEquations(design.T @ design, design.T @ residual, float(residual @ residual), n_free)
-
-    @staticmethod
-    def total(parts: Sequence["NormalEquations"]) -> "NormalEquations":
-        return NormalEquations(sum((p.gram for p in parts), np.zeros(1)), sum((p.slope for p in parts), np.zeros(1)),
-                               sum(p.square for p in parts), parts[0].n_free)  # fmt: skip
+    def __add__(self, other: "NormalEquations") -> "NormalEquations":
+        square = self.square + other.square
+        return NormalEquations(self.gram + other.gram, self.slope + other.slope, square, self.n_free)
 
     @property
     def without_curve(self) -> "NormalEquations":

@@ -15,7 +15,7 @@ from armid.estimation.least_squares import held_by_bound
 from armid.loop.candidates import Library
 from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.empirical import Term
-from armid.loop.equivalence import EffectGroup, RivalModel
+from armid.loop.equivalence import EffectGroup
 from armid.loop.fit import Fit
 from armid.loop.missing_signal import Missing
 from armid.loop.score_test import Score, rest_of, score
@@ -80,34 +80,38 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Hold one model and what it leaves.
-
-    train, holdout: what it leaves on the records, their errors and what was found there; holdout None where there are
-    no such records.
-    """
+    """Hold one model and what it leaves on the records; holdout: None where there are no such records."""
 
     fit: Fit
     model: Model
     estimates: tuple[Estimate, ...]
     train: Residuals
     holdout: Residuals | None
-    train_error: JointErrors
-    holdout_error: JointErrors | None
-    diagnosis: Diagnosis
-    holdout_diagnosis: Diagnosis | None
+
+    @property
+    def train_error(self) -> JointErrors:
+        return self.train.errors
+
+    @property
+    def holdout_error(self) -> JointErrors | None:
+        return None if self.holdout is None else self.holdout.errors
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        return self.train.diagnosis
 
     @property
     def significant(self) -> bool:
-        return self.diagnosis.significant or (self.holdout_diagnosis is not None and self.holdout_diagnosis.significant)
+        return self.diagnosis.significant or (self.holdout is not None and self.holdout.diagnosis.significant)
 
     @property
     def fails_to_carry_over(self) -> bool:
         """Whether train is noise and held-out records are not, by more than the doubt of the prediction."""
-        if self.holdout is None or self.holdout_error is None or self.holdout_diagnosis is None:
+        unseen = self.holdout
+        if unseen is None or self.diagnosis.significant or not unseen.diagnosis.significant:
             return False
         # what differences tell of the noise is the least that it can be
-        is_larger = self.holdout_error.rmse > CARRIED * max(self.holdout.noise_rms, self.train_error.rmse)
-        return not self.diagnosis.significant and self.holdout_diagnosis.significant and is_larger
+        return unseen.errors.rmse > CARRIED * max(unseen.noise_rms, self.train_error.rmse)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +159,6 @@ class ClosedLoop(Result):
 
     kind: ClassVar[Kind] = LOOP
     campaign: Campaign
-    noise_rms: float
     verdict: str
     also: tuple[str, ...]
     before: Judgement
@@ -163,7 +166,7 @@ class ClosedLoop(Result):
     steps: tuple[Step, ...]
     withdrawn: Withdrawn | None
     refused: EffectGroup | None
-    rivals: tuple[RivalModel, ...]
+    rivals: tuple[Fit, ...]
     advice: tuple[Advice, ...]
     next_steps: tuple[str, ...]
     known_together: tuple[str, ...]
@@ -187,13 +190,15 @@ class ClosedLoop(Result):
     @property
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit and the noise of its train records."""
-        data = self.before.train.data
-        found: dict[str, list[float]] = {}
-        for replay, level in zip(self.before.train.replays, data.levels, strict=True):
-            found.setdefault(self.campaign.plant.outputs[replay.place].name, []).append(level.rms)
-        units = {o.name: o.unit for o in self.campaign.plant.outputs}
-        return {name: {"unit": unit, "noise_rms": float(np.mean(found[name]))} for name, unit in units.items()
-                if name in found}  # fmt: skip
+        train = self.before.train
+        pairs = [(r.place, level.rms) for r, level in zip(train.replays, train.data.levels, strict=True)]
+        each = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
+        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in each if rms}
+
+    @property
+    def noise_rms(self) -> float:
+        """Noise of the train records of the first output, its unit; NaN where none holds it."""
+        return float(self.outputs.get(self.campaign.plant.outputs[0].name, {"noise_rms": np.nan})["noise_rms"])
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -280,7 +285,6 @@ def information_at_fit(fit: Fit, tolerances: Mapping[str, float]) -> Information
 
 
 def interval_of(fit: Fit, information: Information) -> dict[str, tuple[float, float]]:
-    """Return the 95 % interval of each free parameter of a model, SI."""
     return {n: (v - float(h), v + float(h))
             for (n, v), h in zip(fit.values.items(), information.half_width, strict=True)}  # fmt: skip
 
@@ -332,13 +336,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
         "next_steps": list(found.next_steps),
         "known_together": list(found.known_together),
         "taken_as_exact": list(found.campaign.taken_as_exact),
-        "log": [
-            {
-                "n_effects": r.n_effects, "n_tried": r.n_tried, "refused": r.refused,
-                "leading": [{"effects": list(names), "chi2_per_sample": finite(value)} for names, value in r.leading],
-            }
-            for r in found.search.rounds
-        ],
+        "log": list(found.search.rounds),
     }  # fmt: skip
 
 
@@ -390,7 +388,6 @@ def record_entries(before: Residuals | None, after: Residuals | None) -> list[di
 
 
 def of_output(replay: Replay, candidate: Array) -> dict[str, Any]:
-    """Return the errors on one output of one record, for JSON."""
     errors = record_errors(replay, candidate)
     outputs = {replay.record.output: errors}
     return errors_entry(JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)) or {}

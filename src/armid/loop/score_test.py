@@ -24,9 +24,9 @@ UNSEEN = 12.0
 class Score:
     """Hold what a candidate would do to the residual of a fit.
 
-    drop: predicted fall of chi2. strength: predicted value of its leading parameter as a share of the way from the null
-    to the bound. p: chance of such a drop from noise alone, for one candidate, its grid of shapes counted. starts: free
-    parameters of the extended model from which to refit (shares of the range), best first. n_shapes: grid of shapes.
+    drop: predicted fall of chi2. p: chance of such a drop from noise alone, for one candidate, its grid of shapes
+    counted. starts: free parameters of the extended model from which to refit (shares of the range), best first.
+    n_shapes: grid of shapes.
     biases: by how much the effect could bias each free parameter unseen, relative to its value, (n_free,).
     share: length of its sensitivity after projection off the parameters' as a share of that before. alignment: cosine
     between what is left of it and what is left of the residual; its square is the share of the residual that an
@@ -36,7 +36,6 @@ class Score:
 
     key: EffectKey
     drop: float
-    strength: float
     p: float
     starts: tuple[Array, ...]
     n_shapes: int
@@ -81,7 +80,7 @@ def score(current: Fit, key: EffectKey, library: Library) -> tuple[Score, Array]
               for i in order for share in (max(amplitudes[i], 0.01), grid[i].share)]  # fmt: skip
     best = int(order[0])
     drop = float(drops[best])
-    # n_eff ln(chi2 / (chi2 - drop)), see `select.criterion`
+    # n_eff ln(chi2 / (chi2 - drop)), see `fit.criterion`
     left = max(current.chi2 - drop, 1e-9 * current.chi2)
     ratio = float(current.independent * np.log(current.chi2 / left))
     p = min(1.0, n_shapes * float(chdtrc(1, max(ratio, 0.0))))
@@ -90,9 +89,8 @@ def score(current: Fit, key: EffectKey, library: Library) -> tuple[Score, Array]
     length, whole = float(np.linalg.norm(free)), float(np.linalg.norm(moved[best]))
     product = length * float(np.linalg.norm(rest))
     alignment = float(free @ rest) / product if product > 0.0 else 0.0
-    found = Score(key, drop, float(amplitudes[best]), p, tuple(starts), n_shapes, biases,
-                  length / whole if whole > 0.0 else 0.0, alignment)  # fmt: skip
-    return found, amplitudes[best] * free
+    share = length / whole if whole > 0.0 else 0.0
+    return Score(key, drop, p, tuple(starts), n_shapes, biases, share, alignment), amplitudes[best] * free
 
 
 def is_same(one: Array, other: Array) -> bool:
@@ -107,7 +105,7 @@ def responses(
 
     without: an effect of the fit that is put to its null before.
     """
-    rest = np.asarray(records.space.complete(free_values(records, current.values)[np.newaxis])[0])
+    rest = candidate_at(records, current.values)
     population = np.tile(rest if without is None else at_null(records, rest, without), (len(grid) + 1, 1))
     for row, activation in zip(population[1:], grid, strict=True):
         for n, value in activation.at(activation.share).items():
@@ -162,6 +160,11 @@ def free_values(records: WhiteRecords, values: Mapping[str, float]) -> Array:
     return np.array([values.get(n, idle(declared[n])) for n in records.space.free_names])
 
 
+def candidate_at(records: WhiteRecords, values: Mapping[str, float]) -> Array:
+    """Return the whole candidate of a problem at some values, as `free_values` takes them, SI, (n_parameters,)."""
+    return np.asarray(records.space.complete(free_values(records, values)[np.newaxis])[0])
+
+
 def at_null(records: WhiteRecords, candidate: Array, key: EffectKey) -> Array:
     model, changed = records.model, candidate.copy()
     for i, name in enumerate(records.space.names):
@@ -172,9 +175,7 @@ def at_null(records: WhiteRecords, candidate: Array, key: EffectKey) -> Array:
 
 def moved_start(records: WhiteRecords, current: Fit, activation: Activation, answer: Array, share: float) -> Array:
     """Return the extended candidate at a strength, with the linear answer of the free parameters to it, (n_free,)."""
-    shares = dict(zip(current.values, np.clip(current.z - share * answer, 0.01, 0.99), strict=True))
-    added = activation.at(share)
-    space = records.space
-    z = [shares[n] if n in shares else (added[n] - space.low[i]) / (space.high[i] - space.low[i])
-         for n, i in ((n, space.index(n)) for n in space.free_names)]  # fmt: skip
+    known = dict(zip(current.values, np.clip(current.z - share * answer, 0.01, 0.99), strict=True))
+    shares = records.shares(free_values(records, activation.at(share)))
+    z = [known.get(name, own) for name, own in zip(records.space.free_names, shares, strict=True)]
     return np.asarray(np.clip(np.array(z), 1e-3, 1.0 - 1e-3))

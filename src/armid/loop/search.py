@@ -4,17 +4,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import compress
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import REACH, held_by_bound
+from armid.estimation.least_squares import REACH, held_by_bound, spread_starts
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
-from armid.loop.diagnose import diagnosed, is_significant
+from armid.loop.diagnose import is_significant, train_residuals
 from armid.loop.equivalence import substitutes
-from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, fit_globally, with_own_starts
+from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
 from armid.loop.whitening import WhiteRecords
 
@@ -70,25 +70,12 @@ class SearchLevel:
         return self.comparison is None or self.comparison.earned
 
 
-@dataclass(frozen=True)
-class Round:
-    """Say what one round of the search tried, what it reached, and why it was taken or refused.
-
-    n_tried: models that were fitted. leading: names and chi2 per sample of the best, best first. refused: the threshold
-    in words, "" where the best was taken.
-    """
-
-    n_effects: int
-    n_tried: int
-    leading: tuple[tuple[tuple[str, ...], float], ...]
-    refused: str
-
-
 @dataclass(eq=False)
 class Search:
     """Extend models until nothing earns its parameters.
 
-    fits: every model that was fitted, by its effects. scores: of the candidates at each of them. rounds: the log.
+    fits: every model that was fitted, by its effects. scores: of the candidates at each of them. rounds: the log, as
+    report.json holds it.
     limit: chi2 to which a model must be able to come, else it is given up. enough: asked of each level that earned its
     effects, whether to look no further. exchanged: models in which substitutes were tried.
     """
@@ -96,15 +83,16 @@ class Search:
     library: Library
     fits: dict[frozenset[EffectKey], Fit] = field(default_factory=dict)
     scores: dict[frozenset[EffectKey], list[Score]] = field(default_factory=dict)
-    rounds: list[Round] = field(default_factory=list)
+    rounds: list[dict[str, Any]] = field(default_factory=list)
     limit: float = np.inf
     enough: Callable[[SearchLevel], bool] = lambda _: False
     exchanged: set[Active] = field(default_factory=set)
 
     def start(self) -> Fit:
-        """Return the declared model at its estimate."""
         if frozenset() not in self.fits:
-            self.fits[frozenset()] = accurate(fit_globally(self.library.problem(()), ()), self.library)
+            records = self.library.problem(())
+            starts = spread_starts(records) if records.space.free.any() else ()
+            self.fits[frozenset()] = accurate(fit_from(records, (), starts), self.library)
         return self.fits[frozenset()]
 
     def further(self, level: SearchLevel, limit: float, to_noise: bool = True) -> Fit | None:
@@ -147,18 +135,18 @@ class Search:
         smaller: the model with which they are compared.
         """
         size = len(last.best.active) + 1
-        if last.best.active and (p := diagnosed(last.best).p) > QUIET:
+        if last.best.active and (p := train_residuals(last.best).diagnosis.p) > QUIET:
             self.note_round(size, f"what is left is noise (chance {p:.2g}; below {QUIET:g} the search goes on)")
             return None
         self.extend(last.best)
         while self.reach_further(size):
             self.extend(last.best)
-        if last.best.is_noise and not (self.of_size(size) and promising(last.best, self.of_size(size)[0])):
+        if last.best.is_noise and not any(far_behind(last.best, f) > PROMISING for f in self.of_size(size)[:1]):
             self.note_round(size, "the size of what is left is that of the noise, and no candidate lowers it clearly")
             return None
         for parent in parents(last.fits)[1:]:
             self.extend(parent)
-        if not self.of_size(size) or not promising(self.of_size(size - 1)[0], self.of_size(size)[0]):
+        if not any(far_behind(self.of_size(size - 1)[0], f) > PROMISING for f in self.of_size(size)[:1]):
             self.note_round(size, f"no candidate lowers n ln(chi2) by more than {PROMISING:g}")
             return None
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
@@ -175,17 +163,18 @@ class Search:
         fits, n_more = self.of_size(size), size - len(smaller.active)
         # An exchange may have found a better model of the size before.
         smaller = self.of_size(size - 1)[0] if n_more == 1 else smaller
-        self.library.say(f"judging {shown(fits[0].active)}")
+        self.library.say(f"judging {' + '.join(fits[0].names)}")
         new = [s.n_shapes for s in self.scores_at(smaller) if s.key in fits[0].active and s.key not in smaller.active]
         compared = compare(smaller, fits[0], len(self.library.candidates) ** n_more, max(new, default=1), n_more)
         self.note_round(size, compared.why)
         return SearchLevel(tuple(fits), compared)
 
     def note_round(self, size: int, refused: str) -> None:
-        """Note how a round ended."""
+        """Note how a round ended: the threshold that refused its best in words, "" where it was taken."""
         fits = self.of_size(size)
-        best = {tuple(k.public for k in f.active): f.chi2 / len(f.residual) for f in reversed(fits[: 2 * N_LOGGED])}
-        self.rounds.append(Round(size, len(fits), tuple(reversed(best.items()))[:N_LOGGED], refused))
+        best = {f.names: f.chi2 / len(f.residual) for f in reversed(fits[: 2 * N_LOGGED])}
+        leading = [{"effects": list(names), "chi2_per_sample": c} for names, c in reversed(best.items())][:N_LOGGED]
+        self.rounds.append({"n_effects": size, "n_tried": len(fits), "refused": refused, "leading": leading})
 
     def scores_at(self, fit: Fit) -> list[Score]:
         active = frozenset(fit.active)
@@ -274,7 +263,7 @@ class Search:
         """Make the fits that are not known yet, side by side; one that diverges whatever its start is left out."""
         new = {active: trial for active, trial in tried.items() if active not in self.fits}
         for active in new:
-            self.library.say(f"fitting {shown(sorted(active))}")
+            self.library.say(f"fitting {' + '.join(key.public for key in sorted(active))}")
         found = self.library.each(unless_diverged, new.values())
         self.fits |= {active: fit for active, fit in zip(new, found, strict=True) if fit and np.isfinite(fit.chi2)}
         for size in {len(active) for active in new}:
@@ -324,7 +313,7 @@ class Search:
 
     def model_with(self, name: str, best: Fit) -> Fit | None:
         """Return the best fit of the same size that holds an effect and differs from the best by no more than it."""
-        known = [f for f in self.of_size(len(best.active)) if name in {k.public for k in f.active}]
+        known = [f for f in self.of_size(len(best.active)) if name in f.names]
         near = [f for f in known if len(declared_keys(f.active) - declared_keys(best.active)) <= 1]
         return near[0] if near else None
 
@@ -354,16 +343,8 @@ def parents(fits: Sequence[Fit]) -> list[Fit]:
     return found
 
 
-def shown(active: Iterable[EffectKey]) -> str:
-    return " + ".join(key.public for key in active)
-
-
 def far_behind(fit: Fit, best: Fit) -> float:
     return float(max(fit.independent, best.independent) * np.log(fit.chi2 / best.chi2))
-
-
-def promising(smaller: Fit, larger: Fit) -> bool:
-    return far_behind(smaller, larger) > PROMISING
 
 
 def refitted(current: Fit, found: Score, library: Library, limit: float) -> Fit:

@@ -4,7 +4,7 @@ Each is undone in one record, by the size that fits best together with the free 
 suspect. One effect explains all records with one strength, a fault one record: where both do, the record is suspected.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.information import NORMAL_95, start_changes
 from armid.loop.candidates import Library
-from armid.loop.diagnose import diagnose, holdout_residuals, is_significant
+from armid.loop.diagnose import holdout_residuals, is_significant
 from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.search import start_of, unless_diverged
-from armid.loop.whitening import WhiteRecords
+from armid.loop.whitening import WhiteRecords, with_samples
 from armid.model import Model, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Piece, Record
 from armid.record.broken import broken_samples
+from armid.units import shown
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -95,7 +96,6 @@ class Fault:
         return other.file == record.file and (self.kind not in OF_SENSOR or other.output == record.output)
 
     def undone(self, record: Record, value: float, plant: Plant) -> Record:
-        """Return the record as it would be without the fault."""
         measured = self.measured(record.measured, record, value)
         pieces, whole = (tuple(self.undone_piece(p, measured, value, plant) for p in some)
                          for some in (record.pieces, record.whole_pieces))  # fmt: skip
@@ -106,15 +106,15 @@ class Fault:
 
         faulty: the record of that of its outputs in which the fault is, None: the first.
         """
-        each = [self.trimmed_output(r, value, plant) if self.touches(faulty or record, r) else r for r in record.each]
+        each = list(record.each)
+        for i, one in enumerate(record.each):
+            if self.touches(faulty or record, one):
+                there, (first, last) = self.undone(one, value, plant), self.lost(one, value)
+                ends = [(first - p.start_index, one.measured.size - last - p.start_index) for p in there.pieces]
+                pieces = [replace(p, window=slice(max(p.window.start, low), min(p.window.stop, high)))
+                          for p, (low, high) in zip(there.pieces, ends, strict=True)]  # fmt: skip
+                each[i] = replace(there, pieces=tuple(p for p in pieces if p.n_samples > 0))
         return replace(each[0], others=tuple(each[1:]))
-
-    def trimmed_output(self, record: Record, value: float, plant: Plant) -> Record:
-        there, (first, last) = self.undone(record, value, plant), self.lost(record, value)
-        low, high = first, record.measured.size - last
-        pieces = [replace(p, window=slice(max(p.window.start, low - p.start_index),
-                                          min(p.window.stop, high - p.start_index))) for p in there.pieces]  # fmt: skip
-        return replace(there, pieces=tuple(p for p in pieces if p.n_samples > 0))
 
     def lost(self, record: Record, value: float) -> tuple[int, int]:
         """Return how many samples at either end of a record have no measured value once its times are mended."""
@@ -212,8 +212,7 @@ def leaves_of(model: Model, key: str) -> set[str]:
 def with_record(base: WhiteRecords, index: int, fault: Fault, value: float) -> WhiteRecords:
     """Return a problem in which one record, or its whole file, is replaced by itself without a fault."""
     faulty, edges = base.data.records[index], base.data.edges
-    sound = np.ones(edges[-1]) if base.data.sound is None else base.data.sound.copy()
-    records, replays = list(base.data.records), list(base.replays)
+    sound, records, replays = base.data.sound.copy(), list(base.data.records), list(base.replays)
     inside = of_file(base, index)
     for i in inside:
         old = records[i]
@@ -232,13 +231,7 @@ def with_measured(base: WhiteRecords, index: int, changes: Sequence[Array]) -> W
     """Return a problem in which the outputs of the file of one record were measured so much larger."""
     replays, inside = list(base.replays), of_file(base, index)
     for i, change in zip(inside, changes, strict=True):
-        pieces, first = [], 0
-        for piece in replays[i].pieces:
-            measured = piece.measured.copy()
-            measured[piece.window] += change[first : first + piece.n_samples]
-            pieces.append(replace(piece, measured=measured))
-            first += piece.n_samples
-        replays[i] = replace(replays[i], pieces=tuple(pieces))
+        replays[i] = with_samples(replays[i], replays[i].measured + change)
     return replace(base, replays=with_shared_starts(replays, inside))
 
 
@@ -260,28 +253,22 @@ def with_shared_starts(replays: Sequence[Replay], inside: Sequence[int]) -> tupl
 
 
 def of_file(base: WhiteRecords, index: int) -> list[int]:
-    """Return the records that are outputs of the same file."""
+    """Return the records that are outputs of the same file as one."""
     return [i for i, r in enumerate(base.data.records) if r.file == base.data.records[index].file]
 
 
 def residual_of(posed: WhiteRecords, index: int, z: Array) -> Array:
     """Return the whitened residual of the file of one record, the others' at 0, (n_samples,)."""
-    measured = [posed.replays[i].measured for i in of_file(posed, index)]
-    pairs = zip(measured, simulated_file(posed, index, z), strict=True)
-    return alone(posed, index, [x - y for x, y in pairs])
+    left = [np.zeros(r.record.n_samples) for r in posed.replays]
+    for i, simulated in zip(of_file(posed, index), simulated_file(posed, index, z), strict=True):
+        left[i] = posed.replays[i].measured - simulated
+    return posed.data.white(left)
 
 
 def simulated_file(posed: WhiteRecords, index: int, z: Array) -> list[Array]:
     """Return the simulated signals of the outputs of the file of one record, each (n_samples of it,)."""
     replays = [posed.replays[i] for i in of_file(posed, index)]
     return [signal[0] for signal in signals_of(replays, posed.space.complete(posed.values(z)[np.newaxis]))]
-
-
-def alone(posed: WhiteRecords, index: int, signals: Sequence[Array]) -> Array:
-    """Return signals of the outputs of the file of one record, those of others at 0, whitened, (n_samples,)."""
-    known = dict(zip(of_file(posed, index), signals, strict=True))
-    return posed.data.white([known[i] if i in known else np.zeros(r.record.n_samples)
-                             for i, r in enumerate(posed.replays)])  # fmt: skip
 
 
 def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Array]:
@@ -400,7 +387,7 @@ def suspect_held_out(
     if is_significant(fit):
         return best, None
     unseen = holdout_residuals(fit, tuple(records), library)
-    if unseen is None or not diagnose(unseen).significant:
+    if unseen is None or not unseen.diagnosis.significant:
         return best, None
     few = LEFT * (float(unseen.residual @ unseen.residual) - len(unseen.residual))
     base = WhiteRecords(unseen.replays, fit.records.space, unseen.data)
@@ -416,7 +403,7 @@ def suspect_held_out(
             left = holdout_residuals(fit, changed, library)
             assert left is not None
             chi2 = float(left.residual @ left.residual) - len(left.residual)
-            if chi2 < least and (chi2 < few or not diagnose(left).significant):
+            if chi2 < least and (chi2 < few or not left.diagnosis.significant):
                 suspect = Mended(fit, index, fault, value, deviation, chi2).suspect(record, plant, REPORTED)
                 least, best = chi2, changed
     return best, suspect
@@ -448,17 +435,15 @@ def disagreeing_record(fits: Sequence[Fit]) -> Suspect | None:
 
 
 def without_record(base: WhiteRecords, index: int) -> WhiteRecords:
-    """Return a problem without the file of one record."""
     data, out = base.data, of_file(base, index)
     samples = np.concatenate([np.arange(data.edges[i], data.edges[i + 1]) for i in out])
 
     def rest(several: tuple[T, ...]) -> tuple[T, ...]:
         return tuple(each for i, each in enumerate(several) if i not in out)
 
-    sound = None if data.sound is None else np.delete(data.sound, samples)
     freed = None if data.freed is None else np.delete(data.freed, samples, axis=0)
     fewer = replace(data, records=rest(data.records), levels=rest(data.levels), kept=np.delete(data.kept, samples),
-                    sound=sound, freed=freed)  # fmt: skip
+                    sound=np.delete(data.sound, samples), freed=freed)  # fmt: skip
     return replace(base, replays=rest(base.replays), data=fewer)
 
 
@@ -477,10 +462,9 @@ def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
     ]  # fmt: skip
 
 
-def suspect_sentence(suspect: Suspect, units: Mapping[str, tuple[str, float]]) -> str:
-    """Return a suspect in words; units: SI unit -> how it is shown and by what factor."""
-    shown, factor = units.get(suspect.unit, (suspect.unit, 1.0))
-    s, unit = suspect, "" if shown == "1" else f" {shown}"
+def suspect_sentence(s: Suspect) -> str:
+    factor, name = shown(1.0, s.unit)
+    unit = "" if name == "1" else f" {name}"
     if s.kind in ("gap", "clipped", "stuck", "spikes"):
         words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
         where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"

@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 from armid.estimation.information import MISFIT
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.model import Plant
-from armid.problem.problem import signals_of
+from armid.problem.problem import Replay, signals_of
 from armid.record import Record
 from armid.record.broken import sound_samples
 from armid.record.noise import correlation_sum, memory_of
@@ -151,15 +151,15 @@ class WhitenedData:
     """Hold records with their noise, the outputs of one file as a record each.
 
     levels: noise of each record. kept: which of all samples enter fits, (n_samples,). sound: 0 where a sample is no
-    data, else 1, (n_samples,); None where all are data. estimates: where those of fits are kept, None: nowhere. freed:
-    what the largest size of each fault that was undone in the records does to the whitened signal, (n_samples,
-    n_faults): its size is as unknown as a parameter; None for none.
+    data, else 1, (n_samples,). estimates: where those of fits are kept, None: nowhere. freed: what the largest size of
+    each fault that was undone in the records does to the whitened signal, (n_samples, n_faults): its size is as unknown
+    as a parameter; None for none.
     """
 
     records: tuple[Record, ...]
     levels: tuple[NoiseLevel, ...]
     kept: NDArray[np.bool_]
-    sound: Array | None = None
+    sound: Array
     estimates: Estimates | None = None
     freed: Array | None = None
 
@@ -189,7 +189,7 @@ class WhitenedData:
         triples = zip(self.levels, signals, self.lengths, strict=True)
         white = np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
         # What is no data weighs nothing, whoever asks.
-        return white if self.sound is None else white * self.sound
+        return white if self.sound.all() else white * self.sound
 
     def parts(self) -> list[NDArray[np.int64]]:
         """Return what is left out in turn, as numbers of samples: one manoeuvre with its repeats, or blocks of time.
@@ -217,7 +217,8 @@ class WhitenedData:
         # of each file the first output
         files = dict(reversed({r.file: r for r in reversed(self.records)}.items()))
         alike = dict(zip(files, alike_motions(list(files.values())), strict=True))
-        set_for = [str(sorted(set_constants(r).items())) for r in self.records]
+        # but for the constants of a record's own start
+        set_for = [str(sorted(c for c in r.constants.items() if not c[0].startswith("start_"))) for r in self.records]
         for labels in ([str(alike[r.file]) for r in self.records], set_for):
             names = list(dict.fromkeys(labels))
             if 1 < len(names) < len(found[0]):
@@ -277,18 +278,12 @@ def correlated(a: Array, b: Array) -> float:
     return float(np.corrcoef(a[:n], b[:n])[0, 1])
 
 
-def set_constants(record: Record) -> dict[str, float]:
-    """Return the constants of a record but for those of its own start."""
-    return {name: value for name, value in record.constants.items() if not name.startswith("start_")}
-
-
 def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
     """Return records with their noise; others: records of the same sensors whose rests tell of their noise too."""
     each = tuple(one for r in records for one in r.each)
     levels = noise_levels(each, plant, others)
     sound = np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
-    every = np.ones(len(sound), dtype=np.bool_)
-    return WhitenedData(each, levels, every, None if sound.all() else sound)
+    return WhitenedData(each, levels, np.ones(len(sound), dtype=np.bool_), sound)
 
 
 def soundness(record: Record, reach: int) -> Array:
@@ -298,6 +293,17 @@ def soundness(record: Record, reach: int) -> Array:
         broken[1:] |= broken[:-1]
     places = [np.arange(p.window.start, p.window.stop) + p.start_index for p in record.pieces]
     return np.where(broken[np.concatenate(places)], 0.0, 1.0)
+
+
+def with_samples(replay: Replay, values: Array) -> Replay:
+    """Return a replay in whose windows other values were measured, (n_samples,)."""
+    pieces, first = [], 0
+    for piece in replay.pieces:
+        measured = piece.measured.copy()
+        measured[piece.window] = values[first : first + piece.n_samples]
+        pieces.append(replace(piece, measured=measured))
+        first += piece.n_samples
+    return replace(replay, pieces=tuple(pieces))
 
 
 @dataclass(frozen=True, eq=False)
