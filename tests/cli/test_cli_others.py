@@ -71,12 +71,6 @@ def test_check_runs_the_contract(run, mine, name):
     assert "FAIL" not in ran.out
 
 
-def test_check_tells_what_does_not_hold(run, mine):
-    ran = run("check", f"{mine}:diverging")
-    assert ran.code == 1
-    assert "FAIL" in ran.out
-
-
 def test_bench_prints_one_table(run, root, monkeypatch):
     """Of one part, really measured; tests/bench measures each."""
     monkeypatch.syspath_prepend(root / "studies")
