@@ -118,13 +118,6 @@ def test_what_pymoo_s_loop_has_to_see_to_leaves_it_to_pymoo(posed) -> None:
     assert not can_run_directly(SearchAlgorithm(method, 100, archive=None))
 
 
-def test_a_budget_within_a_generation_is_cut_off_exactly(posed) -> None:
-    identifier = IDENTIFIERS["random"].with_options({"n_candidates": 40})
-    problem, meter = posed(budget=101)
-    assert search(problem, meter, identifier, 1, None) == "budget used"
-    assert meter.used == len(meter.log().F) == 101
-
-
 @pytest.mark.parametrize("name", ["bobyqa", "least_squares", "pso+bobyqa"])
 def test_no_thread_is_started(posed, monkeypatch, name) -> None:
     problem, meter = posed()
