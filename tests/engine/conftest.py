@@ -12,7 +12,6 @@ from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 @pytest.fixture(scope="session")
 def manoeuvres() -> dict[str, Manoeuvre]:
-    """The seven manoeuvres of the reference by name."""
     return {row["manoeuvre"]: manoeuvre_of(row) for row in index_rows()}
 
 
