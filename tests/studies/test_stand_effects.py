@@ -15,7 +15,6 @@ from stand import RefusalError
 from stand.arm import KNOWN, Arm
 from stand.effects import (
     Effects,
-    drive,
     flux,
     friction,
     read_effects,
@@ -36,7 +35,6 @@ def moved(effects: Effects, name: str = "lower", duration_s: float = 0.9) -> Tra
 
 
 def states(count: int = 200) -> list[dict[str, float]]:
-    """Draw states within what a stroke meets."""
     rng = np.random.default_rng(5)
     low, high = (-0.9, -3.0, -70.0), (0.7, 3.0, 70.0)
     return [dict(zip(("angle", "speed", "current"), map(float, rng.uniform(low, high)))) for _ in range(count)]
@@ -136,13 +134,6 @@ def test_listed_effects_move_as_those_of_the_package() -> None:
         assert np.abs(signal - expected).max() < 2e-3, effects
 
 
-def test_the_exponent_of_stribeck_shapes_how_it_fades() -> None:
-    for exponent in (1.0, 2.0):
-        effects = Effects(stribeck=40.0, stribeck_exponent=exponent, stribeck_tanh=1.0)
-        found = friction(ARM, effects, {"speed": 0.3})
-        assert found == pytest.approx(40.0 * math.exp(-(2.0**exponent)))
-
-
 def test_stribeck_can_fade_rationally() -> None:
     effects = Effects(stribeck=40.0, stribeck_speed=0.1, stribeck_rational=1.0, stribeck_tanh=1.0)
     assert friction(ARM, effects, {"speed": 0.3}) == pytest.approx(4.0)
@@ -171,12 +162,6 @@ def test_a_fading_motor_loses_torque_with_the_charge() -> None:
     assert passed["charge"][-1] == pytest.approx(np.trapezoid(np.abs(passed["current"]), dx=1e-3), rel=1e-3)
 
 
-def test_the_gain_of_the_drive_is_a_factor_of_its_torque_and_not_of_the_back_emf() -> None:
-    for now in states(20):
-        assert drive(ARM, Effects(drive_gain=0.07), now) == pytest.approx(1.07 * drive(ARM, Effects(), now))
-        assert flux(ARM, Effects(drive_gain=0.07), now) == flux(ARM, Effects(), now)
-
-
 @pytest.mark.parametrize(("speed", "current", "expected"), [(1, 9, 0.55), (-1, -9, 0.55), (1, -9, 2 - 1 / 0.55)])
 def test_a_braking_worm_has_the_efficiency_of_the_other_direction(speed: int, current: int, expected: float) -> None:
     now = {"angle": 0.0, "speed": float(speed), "current": float(current)}
@@ -193,24 +178,6 @@ def test_a_worm_rubs_less_the_faster_it_slides() -> None:
     assert found[0] == pytest.approx(1.0)
     assert sorted(found, reverse=True) == found
     assert relative_friction(-1.0) == found[3] == pytest.approx(0.4, abs=0.15)
-
-
-def test_a_worm_can_lose_exponentially_with_speed() -> None:
-    now = {"angle": 0.0, "speed": -1.0, "current": 9.0}
-    found = worm_efficiency(ARM, Effects(worm_speed=0.1, worm_fade=0.5), now)
-    assert found == pytest.approx(0.55 * (1.0 - 0.1 * math.exp(-2.0)))
-
-
-def test_heat_that_is_lost_again_ends_below_heat_that_is_kept() -> None:
-    kept, lost = (moved(Effects(winding_heating=4e-5, winding_cooling=rate)).states["heat"] for rate in (0.0, 2.0))
-    assert kept[-1] == kept.max()
-    assert 0.2 * kept[-1] < lost[-1] < 0.9 * kept[-1]
-
-
-def test_a_stop_in_the_tray_stiffens_it() -> None:
-    soft, hard = (moved(Effects(rocking_hz=5.0, rocking_stop=stop)).states for stop in (0.0, 0.003))
-    stretch = [np.abs(states["shell_angle"] - states["angle"]).max() for states in (soft, hard)]
-    assert stretch[1] < 0.8 * stretch[0]
 
 
 def test_play_in_the_tray_lets_the_shell_lag() -> None:
