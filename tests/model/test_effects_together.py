@@ -44,7 +44,6 @@ class Whole:
         return np.array(list((nominal | known | self.own).values()))
 
     def alone(self, *effects: Effect) -> Model:
-        """Return the plant with some effects."""
         return Model(self.model.plant, effects)
 
     def values(self, model: Model, candidate: Array) -> Array:
@@ -60,7 +59,6 @@ class Whole:
 
     @cached_property
     def still(self) -> Array:
-        """The signal with all effects at their nulls."""
         return self.moved(self.candidate(self.model)[np.newaxis])[0]
 
     def misses(self, *effects: Effect) -> float:
