@@ -13,7 +13,6 @@ from armid.study.analyses.analysis import (
     held,
     histories,
     outcomes,
-    published_values,
     remaining_share,
     wide_runs,
 )
@@ -65,12 +64,6 @@ def test_groups_are_the_positions_of_runs_and_failed_runs_count_their_budget(mad
     assert sum(len(rows) for of in evidence.groups.values() for rows in of.values()) == len(evidence.runs)
     failed = int(np.flatnonzero(evidence.runs["status"] != "done")[0])
     assert (evidence.used[failed], evidence.n_free[failed]) == (3000.0, 4)
-
-
-def test_mean_errors_of_table_1_as_the_paper_prints_them(table1_cases):
-    published = published_values({"cases": table1_cases})
-    means = 100.0 * published.groupby("parameter")["relative_error"].mean()
-    assert means.round(3).to_dict() == {"p0": 0.487, "k": 0.421, "eta3": 0.171, "n": 0.899}
 
 
 def test_an_analysis_of_a_user_gets_the_columns_that_its_contract_shows(made):
