@@ -86,7 +86,6 @@ def read_whatever(toml, csv):
 
 
 def assert_sound(campaign):
-    """Check what every later stage takes for granted."""
     assert isinstance(campaign, Campaign)
     assert np.isfinite([campaign.plant.scales.effort, campaign.plant.scales.speed]).all()
     for record in campaign.records:
@@ -128,7 +127,6 @@ VALUES = st.recursive(
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Return the path to every part of a table."""
     keys = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else []
     return [p for key in keys for p in ((*path, key), *places(value[key], (*path, key)))]
 
@@ -150,7 +148,6 @@ def mutated(draw: st.DrawFn, table: dict[str, Any]) -> dict[str, Any]:
 
 
 def change(draw: st.DrawFn, holder: Any, key: Any) -> None:
-    """Change one part of a table or a list in place."""
     what = draw(st.sampled_from(["replace", "replace", "out", "in", "twice"]))
     if what == "replace":
         holder[key] = draw(VALUES)
@@ -163,7 +160,6 @@ def change(draw: st.DrawFn, holder: Any, key: Any) -> None:
 
 
 def written(value: Any) -> str:
-    """Return a value as TOML writes it in one line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -177,5 +173,4 @@ def written(value: Any) -> str:
 
 
 def toml_of(table: dict[str, Any]) -> bytes:
-    """Return a file of TOML."""
     return "".join(f"{written(str(k))} = {written(v)}\n" for k, v in table.items()).encode()

@@ -144,12 +144,6 @@ def test_spellings_of_csv(write, encode):
     np.testing.assert_array_equal(read_campaign(folder).records[0].measured, plain)
 
 
-def test_rad_per_second_needs_no_factor(write, arm_columns):
-    speed = arm_columns["angular_velocity_deg_s"] * DEGREE
-    folder = write(lower={"time_s": arm_columns["time_s"], "angular_velocity_rad_s": speed})
-    np.testing.assert_array_equal(read_campaign(folder).records[0].measured, speed[100:])
-
-
 def test_a_record_may_lie_deeper_or_be_linked_inside(write):
     folder = write()
     (folder / "deep").mkdir()
