@@ -122,13 +122,6 @@ def test_own_plants_and_effects_can_be_named(write_two):
         read_campaign(folder, plants={"driven_axis": PLANTS["driven_axis"]})
 
 
-def test_further_columns_are_kept_on_the_grid(write, arm_columns):
-    columns = {**arm_columns, "current_A": arm_columns["time_s"] * 10}
-    record = read_campaign(write(lower=columns)).records[0]
-    assert list(record.columns) == ["current_A"]
-    np.testing.assert_array_equal(record.columns["current_A"], columns["current_A"][100:])
-
-
 @pytest.mark.parametrize("encode", [
     lambda text: b"\xef\xbb\xbf" + text,
     lambda text: text.replace(b"\n", b"\r\n"),
