@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +124,8 @@ def test_friction_agrees_with_the_test_stand(
             check(simulate(rubbing_arm, manoeuvres[name], candidates, found.schedule), stood, allowed)
 
 
+ARM = Arm()
+EFFORT_PER_SQUARE = 2.0 * ARM.torque_constant * ARM.excitation * ARM.ratio_motor * ARM.eta1 * ARM.eta2 * ARM.eta3
 # Effect -> its parameters, those of the test stand, and how near the two are [rad/s]: shapes as well that are fixed
 # unless they are set free. The stand smooths the seals' sign otherwise, and the hold of a sampled control is its mean
 # lateness here, not a staircase. At the stop of 0.01 rad of a tray of 6 Hz the spring is twice as stiff.
@@ -133,11 +136,17 @@ ON_STAND = {
     "viscous": ({"slope": 15.0}, {"viscous": 15.0}, 1e-9),
     "quadratic_drag": ({"c": 15.0}, {"drag": 15.0}, 1e-9),
     "seal_friction": ({"force": 250.0, "width": 0.01}, {"seal_friction": 250.0, "seal_width": 0.01}, 1e-3),
+    "presliding": ({"level": 60.0, "way": 60.0 / 2e4, "width": 5e-4}, {"dahl": 60.0}, 1e-5),
     "torque_offset": ({"level": 15.0}, {"torque_offset": 15.0}, 1e-9),
+    "cogging": ({"sine": 30.0, "waves": 24.0, "second": -0.4}, {"cogging": 30.0, "cogging_second": -0.4}, 1e-9),
     "tilt": ({"angle": np.deg2rad(2.0)}, {"tilt_deg": 2.0}, 1e-9),
     "worm_direction": ({"loss": 0.3, "width": 0.005}, {"worm_loss": 0.3}, 1e-4),
     "worm_speed": ({"loss": 0.1, "fade": 0.5, "width": 0.005}, {"worm_speed": 0.1, "worm_fade": 0.5}, 1e-4),
     "drive_gain": ({"error": 0.05}, {"drive_gain": 0.05}, 1e-9),
+    "torque_constant_droop": ({"sharpness_squared": (EFFORT_PER_SQUARE * 200.0**2) ** -2},
+                              {"torque_droop": 200.0, "droop_exponent": 4.0}, 1e-9),
+    "dead_zone": ({"zone": 40.0}, {"drive_dead_zone": 40.0}, 1e-8),
+    "drive_lag": ({"time_constant": 0.02}, {"actuator_lag": 0.02}, 1e-9),
     "flux_saturation": ({"sharpness": 1.0 / 150.0}, {"flux_saturation": 150.0}, 1e-9),
     "brush_drop": ({"drop": 1.0, "width": 0.5}, {"brush_drop": 1.0}, 1e-6),
     "winding_heating": ({"rise": 6e-5, "cooling": 2.0}, {"winding_heating": 6e-5, "winding_cooling": 2.0}, 1e-6),
@@ -146,6 +155,7 @@ ON_STAND = {
     "line_loss": ({"c": 2e4}, {"line_loss": 2e4}, 1e-9),
     "tachometer_lag": ({"time_constant": 0.005}, {"tachometer_lag": 0.005}, 1e-9),
     "tachometer_offset": ({"offset": np.deg2rad(2.0)}, {"tachometer_offset_deg_s": 2.0}, 1e-9),
+    "tachometer_ripple": ({"sine": 0.05, "order": 1.0}, {"tachometer_ripple": 0.05}, 1e-9),
     "controller_delay": ({"delay": 0.0, "period": 0.016}, {"controller_period": 0.016}, 0.02),
     "gyro_lag": ({"time_constant": 1.0 / (80.0 * np.pi)}, {"gyro_bandwidth_hz": 40.0}, 1e-9),
     "gyro_bias": ({"bias": np.deg2rad(0.3)}, {"gyro_bias_deg_s": 0.3}, 1e-9),
@@ -155,19 +165,28 @@ ON_STAND = {
          "hardening": ((2.0 * np.pi * 6.0) ** 2 * 0.01) ** -2},
         {"rocking_hz": 6.0, "rocking_damping": 0.05, "rocking_stop": 0.01}, 1e-6),
 }  # fmt: skip
+FORMS_ON_STAND = {
+    "lugre": ({"level": 60.0, "way": 60.0 / 2e4, "excess": 0.5, "fade": 0.15, "damping": 0.01, "width": 5e-4},
+              {"lugre": 60.0, "lugre_damping": 200.0}, 1e-5),
+    "bouc_wen": ({"level": 60.0, "way": 60.0 / 2e4, "unloading": 0.5, "width": 5e-4}, {"bouc_wen": 60.0}, 1e-5),
+    "arctangent": ({"sharpness_squared": 150.0**-2}, {"flux_atan": 150.0}, 1e-9),
+}  # fmt: skip
 
 
 @pytest.mark.slow
-def test_effects_move_the_arm_as_on_the_test_stand(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+@pytest.mark.parametrize("told", [ON_STAND, FORMS_ON_STAND], ids=["effects", "forms"])
+def test_effects_move_the_arm_as_on_the_test_stand(told, arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
     """All effects in one model, which other tests compile as well: an effect at its null adds nothing."""
-    model = Model(arm.plant, tuple(applicable(EFFECTS, arm.plant).values()))
+    forms = [form for name in ("presliding", "flux_saturation") for form in EFFECTS[name].forms]
+    alone = [replace(form, name=form.form, forms=()) for form in forms]
+    model = Model(arm.plant, tuple(applicable(EFFECTS, arm.plant).values()) if told is ON_STAND else tuple(alone))
     rest = {n: next((v for v in (p.null, p.fixed, p.nominal) if v is not None), p.low)
             for n, p in model.parameters.items()} | {"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4}  # fmt: skip
-    each = [rest | {f"{name}.{n}": v for n, v in values.items()} for name, (values, *_) in ON_STAND.items()]
+    each = [rest | {f"{name}.{n}": v for n, v in values.items()} for name, (values, *_) in told.items()]
     population = np.array([list(candidate.values()) for candidate in (rest, *each)])
     for stroke in ("lower", "raise"):
         declared, *signals = simulate(model, manoeuvres[stroke], population, Schedule(16)).output
-        for (name, (_, on_stand, near)), signal in zip(ON_STAND.items(), signals, strict=True):
+        for (name, (_, on_stand, near)), signal in zip(told.items(), signals, strict=True):
             stood = stand_speed(stroke, population[0, :4], **on_stand)
             assert stood is not None
             missed, without = (np.abs(found - stood[0]).max() for found in (signal, declared))

@@ -20,31 +20,19 @@ def drawn(function, **known):
 
 
 @pytest.mark.parametrize("effect", FORMS)
-def test_nothing_is_added_at_null(effect):
+def test_nothing_is_added_at_null_and_rates_are_finite(effect):
     """Exactly: whatever the plant does and whatever the states are; a switch that waits for nothing has switched."""
     nulls = {p.name: p.null for p in effect.parameters if p.null is not None}
     closed = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
     for function in effect.adds.values():
         assert np.all(function(**drawn(function, **nulls, closed=closed, acting=1.0)) == 0.0)
+    for state in effect.states:
+        assert np.all(np.isfinite(state.rate(**drawn(state.rate, closed=closed))))
 
 
 def test_without_loss_of_heat_the_pressure_is_the_plant_s():
     known = {"deviation": 0.0, "loss_rate": 0.0}
     assert np.all(drive.deviation_rate(**drawn(drive.deviation_rate, **known)) == 0.0)
-
-
-def test_flux_follows_its_published_forms():
-    current, K, saturating = np.array([-150.0, -20.0, 0.0, 0.4, 60.0, 160.0]), 4.5e-5, 120.0
-    size = np.abs(current)
-    rational = K * size + drive.rational_flux(current, K, 1 / saturating)
-    np.testing.assert_allclose(rational, K * size / (1 + size / saturating), rtol=1e-13)
-    arctangent = K * size + drive.arctangent_flux(current, K, 1 / saturating**2)
-    np.testing.assert_allclose(arctangent, K * saturating * np.arctan(size / saturating), rtol=1e-13)
-
-
-def test_series_of_the_arctangent_meets_its_closed_form():
-    x = np.array([0.05, 0.0999999, 0.1000001, 0.2])
-    np.testing.assert_allclose(drive.missing_share(x**2), 1 - np.arctan(x) / x, rtol=1e-11)
 
 
 def test_worm_loses_at_standstill_and_nothing_at_speed():
@@ -114,36 +102,6 @@ def test_a_lag_is_a_time_behind_a_steady_acceleration(given):
     assert sensor.gyro_slope_rate(given, 0.7, -1.4 * at_least * acceleration, acceleration, 0.0) == pytest.approx(0.0)
     behind = sensor.lag_error(given, -1.4 * at_least * acceleration, 0.0)
     assert behind == pytest.approx(-1.4 * given * acceleration)
-
-
-def test_presliding_friction_builds_up_over_its_way():
-    """Moving one way, 1 - exp(-x/way) of the friction after a way x; the same in either direction."""
-    way, speed = 0.02, 0.5
-    for share in (0.0, 0.4, 0.9):
-        rate = friction.share_rate(speed, share, way, 1e-9)
-        assert rate == pytest.approx((1 - share) * speed / way)
-        assert friction.share_rate(-speed, -share, way, 1e-9) == pytest.approx(-rate)
-
-
-def settled(rate, **values):
-    """State at which a rate is 0, found by its two signs."""
-    low, high = -5.0, 5.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if rate(share=middle, **values) > 0.0 else (low, middle)
-    return middle
-
-
-@pytest.mark.parametrize("omega", [-0.7, 0.02, 0.3])
-def test_hysteresis_settles_at_its_friction(omega):
-    """LuGre at Coulomb and Stribeck friction, Dahl and Bouc-Wen at the level, each where it starts from in motion."""
-    bristles = {"way": 0.01, "excess": 0.6, "fade": 0.1, "width": 1e-9, "omega": omega}
-    found = settled(friction.bristle_rate, **bristles)
-    assert found == pytest.approx(np.sign(omega) * (1 + 0.6 * np.exp(-((omega / 0.1) ** 2))))
-    assert found == pytest.approx(friction.full_bristles(omega, 0.6, 0.1, 1e-9))
-    assert friction.bristle_torque(level=3.0, damping=0.01, share=found, **bristles) == pytest.approx(-3.0 * found)
-    for rate, more in ((friction.share_rate, {}), (friction.hysteresis_rate, {"unloading": 0.6, "exponent": 2.0})):
-        assert settled(rate, omega=omega, way=0.01, width=1e-9, **more) == pytest.approx(np.sign(omega))
 
 
 def test_a_coupling_transmits_nothing_within_its_play():

@@ -26,8 +26,8 @@ SIZES = {
     "base_compliance": 1e-4, "slipping_ripple": 50.0, "sway": 30.0, "dahl": 40.0, "lugre": 40.0, "bouc_wen": 40.0,
     "cogging": 30.0, "torque_droop": 200.0, "drive_dead_zone": 40.0, "actuator_lag": 0.02, "drive_compliance": 2e-6,
 }  # fmt: skip
-# What the package has not; tests/engine/test_oracles.py and test_stand_effects hold the others to it.
-NAMELESS = ("asymmetric_friction", "worm_braking", "flux_atan", "flux_root", "tachometer_ripple", "cam_bump",
+# What the package has not; tests/engine/test_oracles.py holds the others to it.
+NAMELESS = ("asymmetric_friction", "worm_braking", "flux_root", "cam_bump",
             "motor_fade", "piston_stiction", "cable_spring", "pressure_friction", "base_compliance", "slipping_ripple",
             "sway")  # fmt: skip
 
