@@ -55,8 +55,9 @@ def test_agrees_with_the_reference_trajectories(run, references, tmp_path, numbe
     _, reference = table(folder / file)
     assert header == HEADER
     np.testing.assert_allclose(simulated[0], reference[0], atol=1e-12)
-    assert np.max(np.abs(simulated[1:3] - reference[1:3])) <= max(allowed, FINE.get(file, 0.0))
-    assert np.max(np.abs(simulated[3] - reference[3])) <= 1e-3
+    near = max(allowed, FINE.get(file, 0.0))
+    assert np.max(np.abs(simulated[1:3] - reference[1:3])) <= near
+    assert np.max(np.abs(simulated[3] - reference[3])) <= 500.0 * near
 
 
 def test_one_file_for_each_record_and_the_values_that_were_taken(run, paper_arm, paper_arm_folder, tmp_path):
