@@ -1,6 +1,5 @@
 """The campaigns of the test stand: format, reproducibility, independence and refusals."""
 
-import ast
 import shlex
 import subprocess
 import sys
@@ -44,27 +43,6 @@ def remade(tmp_path_factory: pytest.TempPathFactory) -> Path:
     words = [str(folder) if word == "studies/campaigns/paper_arm" else word for word in shlex.split(line)]
     subprocess.run([sys.executable, "-W", "error", *words[1:]], cwd=ROOT, check=True, capture_output=True)
     return folder
-
-
-def imports(file: Path) -> set[str]:
-    """Name the top-level packages that a file imports anywhere."""
-    found = set()
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {each.name.split(".")[0] for each in node.names}
-        if isinstance(node, ast.ImportFrom):
-            assert node.level == 0
-            found.add(str(node.module).split(".")[0])
-        assert not (isinstance(node, ast.Name) and node.id == "__import__")
-    return found
-
-
-def test_the_stand_imports_nothing_of_the_package() -> None:
-    files = [STAND / "test_stand.py", *(STAND / "stand").rglob("*.py")]
-    used = set().union(*(imports(file) for file in files)) - sys.stdlib_module_names
-    assert len(files) > 10
-    assert used <= {"stand", "numpy", "scipy", "pandas", "matplotlib", "seaborn"}
-    assert not any("importlib" in imports(file) for file in files)
 
 
 def test_plotting_is_imported_only_to_plot() -> None:
