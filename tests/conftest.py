@@ -1,10 +1,12 @@
 """What several folders of tests share: the committed campaign, small campaigns of an axis, the test stand."""
 
 import os
+import shutil
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +16,14 @@ from hypothesis import HealthCheck, settings
 from numba.core import event
 from numpy.typing import NDArray
 
+from armid import errors
+from armid.cli.new import campaign_text, synthetic_records
 from armid.model import EFFECTS, Model
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space, space_of
-from armid.record import Campaign, read_campaign, write_table
+from armid.record import Campaign, read_campaign, write_campaign, write_table
+from commands import ended
+from input_texts import TABLE_STUDY
 
 # How fast inputs are made hangs on what else the machine does.
 settings.register_profile("armid", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -94,6 +100,60 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
         return (yield)
 
 
+@dataclass(frozen=True)
+class Ran:
+    """Hold what a command left: exit code, output, error output."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
+    """Return a function that runs a command in this process."""
+
+    def ran(*arguments: object) -> Ran:
+        code = ended(*arguments)
+        return Ran(code, *capsys.readouterr())
+
+    return ran
+
+
+@pytest.fixture
+def refused(run: Callable[..., Ran]) -> Callable[..., str]:
+    """Return a function that runs a command that has to be refused, and returns its one sentence."""
+
+    def sentence(*arguments: object) -> str:
+        ran = run(*arguments)
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err.startswith("armid: ")
+        assert ran.err.count("\n") == 1
+        assert len(ran.err) <= len("armid: ") + errors.LONGEST + 1
+        return ran.err
+
+    return sentence
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Callable[..., Path]]:
+    """Return a function that makes a file system of some size, which only root may do."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+
+    def mounted(size: str, *, read_only: bool = False) -> Path:
+        command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+        if shutil.which("mount") is None or subprocess.run(command, check=False, capture_output=True).returncode:
+            pytest.skip("a small file system cannot be mounted here")
+        if read_only:
+            (folder / "kept").write_text("kept")
+            subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
+        return folder
+
+    yield mounted
+    subprocess.run(["umount", str(folder)], check=False, capture_output=True)
+
+
 @pytest.fixture(scope="session")
 def every_command() -> dict[tuple[str, ...], Any]:
     """The words that call a command -> the command, of every command of armid."""
@@ -145,6 +205,24 @@ def lowering(paper_arm: Campaign) -> Campaign:
 def lowering_replays(lowering: Campaign, arm: Model, arm_space: Space) -> tuple[Replay, ...]:
     """The lowering ready to be simulated."""
     return replays(lowering.train, arm, arm_space)
+
+
+@pytest.fixture(scope="session")
+def synthetic_axis(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the campaign that `armid new` writes."""
+    folder = tmp_path_factory.mktemp("synthetic") / "axis"
+    return write_campaign(folder, campaign_text("axis"), synthetic_records())
+
+
+@pytest.fixture(scope="session")
+def table_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a study of Table I with its four runs in out; who writes into it works on a copy."""
+    from armid.study.runner import run_study
+
+    folder = tmp_path_factory.mktemp("tiny")
+    (folder / "tiny.toml").write_text(TABLE_STUDY, encoding="utf-8")
+    run_study(folder / "tiny.toml", jobs=1, out=folder / "out")
+    return folder
 
 
 def step_response(times: Array, mass: float = 2.0, slope: float = 5.0, drive: float = 8.0) -> Array:

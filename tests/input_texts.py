@@ -1,4 +1,4 @@
-"""Texts that several folders of tests write into files: a lowering of the arm, the head of a blind suite."""
+"""Texts that several folders of tests write into files: a lowering of the arm, the head of a blind suite, a study."""
 
 LOWERING = """\
 [[records]]
@@ -18,6 +18,36 @@ rest_s = 0.2
 margin = 0.1
 controls = 1
 [suite.ranges]
+p0 = [2.6e6, 3.5e6]
+k = [0.6, 1.1]
+eta3 = [0.45, 0.70]
+n = [0.9, 1.5]
+"""
+TABLE_STUDY = """\
+name = "tiny"
+question = "Does a report come out of a real store?"
+report = "table1"
+plant = "shell_transfer_arm"
+budget = 30
+seeds = 2
+fitness = "rmse"
+windows_s = [[0.0, 0.3]]
+
+[[identifiers]]
+name = "pso"
+label = "pso, the literal limit of the paper"
+options = { n_particles = 10 }
+
+[[identifiers]]
+name = "random"
+
+[[cases]]
+name = "row 1"
+truth = { p0 = 3.20e6, k = 1.00, eta3 = 0.62, n = 1.00 }
+published = { p0 = 3.2114e6, k = 1.0026, eta3 = 0.6213, n = 1.0124 }
+manoeuvres = [{ start_angle_deg = -48.0, target_angle_deg = 22.0, shell = true, supply_V = 28.0, duration_s = 0.3 }]
+
+[bounds]
 p0 = [2.6e6, 3.5e6]
 k = [0.6, 1.1]
 eta3 = [0.45, 0.70]

@@ -10,19 +10,17 @@ from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.core.algorithm import Algorithm
 
 import armid
-from armid.cli.new import INERTIA, campaign_text, synthetic_records
+from armid.cli.new import INERTIA
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS
-from armid.record import write_campaign
 from armid.report.result import MANIFEST, Result, Shown
 
 QUICK = {"effects": ["viscous"], "budget": 60}
 
 
 @pytest.fixture(scope="module")
-def axis(tmp_path_factory):
-    """The folder of a small campaign."""
-    return write_campaign(tmp_path_factory.mktemp("axis") / "axis", campaign_text("axis"), synthetic_records())
+def axis(synthetic_axis):
+    return synthetic_axis
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +29,6 @@ def found(axis):
 
 
 def annealing(value, low, high, budget, random, start=None, step=0.1):
-    """Walk downhill at random."""
     best, x = value(start), start
     for _ in range(10 * budget):
         tried = np.clip(x + step * (high - low) * random.standard_normal(len(low)), low, high)
@@ -127,7 +124,6 @@ def test_closing_the_loop(axis, tmp_path):
 
 
 def shows(result, folder):
-    """Check what every result has."""
     assert isinstance(result, Shown)
     assert 20 < len(repr(result)) < 2_000
     assert "<table" in result._repr_html_()

@@ -27,7 +27,6 @@ def test_all_is_true():
 
 
 def methods(thing):
-    """Yield the public methods and properties of a class."""
     for name, method in vars(thing).items() if inspect.isclass(thing) else ():
         function = method.fget if isinstance(method, property) else method
         if inspect.isfunction(function) and not name.startswith("_"):

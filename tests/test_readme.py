@@ -49,7 +49,6 @@ def blocks(readme):
 
 @pytest.fixture(scope="module")
 def commands(blocks):
-    """Every line of a block without a language."""
     return [line for language, text in blocks if not language for line in text.splitlines() if line]
 
 
@@ -84,17 +83,14 @@ def committed(root, folder):
     return [root / name for name in names] or [path for path in (root / folder).rglob("*") if path.is_file()]
 
 
-def test_begins_with_two_commands_to_copy(blocks):
+def test_begins_with_two_commands_to_copy(blocks, root):
     first, second = (text.strip().splitlines() for language, text in blocks[:2] if not language)
     assert len(first) == len(second) == 1
     assert "armid study studies/table1_short.toml" in first[0]
     assert second[0].endswith(f" && {TEST_COMMAND}")
     for line in (*first, *second):
         assert line.startswith("python3 -m venv .venv && .venv/bin/pip install -q -e ")
-
-
-def test_what_the_first_command_names_is_in_the_repository(blocks, root):
-    words = shlex.split(blocks[0][1])
+    words = shlex.split(first[0])
     assert (root / words[words.index("study") + 1]).is_file()
 
 
@@ -124,15 +120,12 @@ def test_every_option_exists_and_all_is_written_to_out(page, root):
         assert places or words[0] not in ("study", "new", "import", "close-loop", "simulate"), line
 
 
-def test_the_commands_run(commands, blocks, elsewhere, capsys):
+def test_the_commands_run_and_git_ignores_what_they_write(commands, root, elsewhere, capsys):
     ours = [line for line in commands if line.startswith("armid ") and not any(part in line for part in LEFT_OUT)]
     assert {line.split()[1] for line in ours} >= {"check", "identify"}
     for line in ours:
         assert ran(line + " --budget 160" * (" identify " in line), capsys)
     assert {path.name for path in elsewhere.iterdir()} == {"studies", "out"}
-
-
-def test_what_commands_write_is_ignored_by_git(root):
     assert "out/" in (root / ".gitignore").read_text().splitlines()
 
 
@@ -241,11 +234,15 @@ def ran(line, capsys):
     return captured.out
 
 
-def test_there_are_five_steps(tour):
+def test_there_are_five_steps_and_files_of_the_sizes_that_it_promises(tour):
     headings = re.findall(r"^## \d\. (.*)$", tour, re.MULTILINE)
     assert len(headings) == len(STEPS)
     for word, heading in zip(STEPS, headings, strict=True):
         assert word in heading
+    files = [text for language, text in FENCE.findall(tour) if language == "python"]
+    lines = sorted(len(text.strip().splitlines()) for text in files)
+    assert lines[0] <= lines[1] <= 10
+    assert lines[-1] <= 20
 
 
 @pytest.mark.slow
@@ -265,10 +262,3 @@ def test_every_snippet_runs_and_every_output_is_true(tour, elsewhere, capsys):
             printed = "".join(ran(line, capsys) for line in text.splitlines() if line)
             seen["command"] += len(text.splitlines())
     assert min(seen.values()) >= len(STEPS) - 1, seen
-
-
-def test_the_sizes_that_it_promises(tour):
-    files = {re.match(r"# (\S+)\n", text)[1]: text for language, text in FENCE.findall(tour) if language == "python"}
-    lines = sorted(len(text.strip().splitlines()) for text in files.values())
-    assert lines[0] <= lines[1] <= 10
-    assert lines[-1] <= 20

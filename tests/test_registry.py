@@ -91,46 +91,23 @@ def test_a_file_registers_all_four_kinds(own, attribute, kind, name):
     assert getattr(load_registry([f"{own}:{attribute}"]), kind)[name].name == name
 
 
-def test_what_is_registered_is_ready_to_use(own):
+def test_what_is_registered_is_ready_to_use_and_catalogues_stay_as_they_are(own):
     loaded = load_registry(f"{own}:{name}" for name in ("effect", "largest", "search", "plant"))
     assert isinstance(loaded.fitness["largest"], Fitness)
     assert isinstance(loaded.identifiers["search"], Identifier)
     assert isinstance(loaded.identifiers["search"].build(100), DE)
     assert "drag.c" in (Model(loaded.plants["my_axis"]) + loaded.effects["drag"]).parameters
-
-
-def test_a_file_is_run_once_and_catalogues_stay_as_they_are(own):
     assert load_plugin(f"{own}:effect")[2] is load_plugin(f"{own}:effect")[2]
-    load_registry([f"{own}:effect"])
     assert "drag" not in Registry().effects
 
 
 @pytest.mark.parametrize(("attribute", "sentence"), [
     ("coulomb", "effects: 'coulomb' is there already"), ("pso", "identifiers: 'pso' is there already"),
-    ("rmse", "fitness: 'rmse' is there already"),
+    ("rmse", "fitness: 'rmse' is there already"), ("effect", "effects: 'drag' is there already"),
 ])  # fmt: skip
-def test_a_name_that_is_ours_is_refused(own, attribute, sentence):
+def test_a_name_that_is_ours_or_that_of_another_plug_in_is_refused(own, attribute, sentence):
     with pytest.raises(ArmidError, match=sentence):
-        load_registry([f"{own}:{attribute}"])
-
-
-def test_a_name_of_two_plugins_is_refused(own):
-    with pytest.raises(ArmidError, match="effects: 'drag' is there already"):
-        load_registry([f"{own}:effect", f"{own}:effect"])
-
-
-@pytest.mark.parametrize(("plugin", "fragments"), [
-    ("own", ["'own'", "FILE.py:attribute"]), ("own.py", ["FILE.py:attribute"]), ("own.py:", ["FILE.py:attribute"]),
-    (":effect", ["FILE.py:attribute"]), ("missing.py:effect", ["there is no file missing.py"]),
-    ("{own}:efect", ["own.py has no 'efect'", "did you mean 'effect'"]), ("{own}:text", ["of type str", "Plant"]),
-    ("{own}:beside_it", ["of type module"]), ("README.md:effect", ["README.md is no Python file"]),
-])  # fmt: skip
-def test_a_plugin_that_is_none_is_refused(own, root, monkeypatch, plugin, fragments):
-    monkeypatch.chdir(root)
-    with pytest.raises(ArmidError) as refusal:
-        load_plugin(plugin.format(own=own))
-    for fragment in fragments:
-        assert fragment in str(refusal.value)
+        load_registry([f"{own}:effect", f"{own}:{attribute}"])
 
 
 @pytest.mark.parametrize(("text", "fragment"), [

@@ -53,15 +53,6 @@ def test_every_run_that_ended_well_is_there(exported, loaded):
         assert found["evals"] == run.used
 
 
-def test_each_run_starts_at_evaluation_1_and_logs_its_last(exported, loaded):
-    rows = loaded.load(monotonic=False, include_meta_data=True).to_pandas()
-    for _, run in rows.groupby("data_id"):
-        assert run["evaluations"].iloc[0] == 1
-        assert run["evaluations"].iloc[-1] == run["evals"].iloc[0]
-        assert run["raw_y"].iloc[-1] == run["best_y"].iloc[0]
-        assert (np.diff(run["raw_y"]) <= 0).all()
-
-
 def test_every_improvement_comes_back_bit_for_bit(exported, loaded):
     _, results, _ = exported
     rows = loaded.load(monotonic=False, include_meta_data=True).to_pandas()

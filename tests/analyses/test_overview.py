@@ -16,7 +16,7 @@ from armid.study.analyses.errors import (
     thinned,
     valley_figure,
 )
-from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
+from armid.study.analyses.fitness_quality import fitness_quality
 from armid.study.analyses.loops import loop_runs
 from armid.study.analyses.overview import main_table, reasons, runs_table
 from armid.study.analyses.success import success, success_figure, success_rates, wilson
@@ -56,7 +56,6 @@ def outcomes_with(errors):
 
 
 def closed_form(k, n, z=1.959963984540054):
-    """Wilson's interval as its paper gives it."""
     p, middle = k / n, (k / n + z**2 / (2 * n)) / (1 + z**2 / n)
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
     return middle - half, middle + half
@@ -104,10 +103,6 @@ def test_the_error_map_has_medians_in_the_orders_given(evidence):
     plt.close(figure)
 
 
-def test_numbers_of_the_error_map():
-    assert [brief(p) for p in (np.inf, 1.234, 3.2e-7, 0.0)] == ["failed", "1.2", "3e-07", "0"]
-
-
 def test_deviations_in_percent_of_the_valley_and_of_other_machines_first_three_parameters(evidence):
     ends = end_points(evidence.estimates)
     assert list(ends.columns) == ["variant", "setting", "p0", "eta3", "n"]
@@ -143,12 +138,6 @@ def test_the_ranks_of_fitnesses_by_hand():
     assert table.loc["similarity", "median_error"] == (2e-2 + 3e-1) / 2
     assert table.loc["similarity", "worst_error"] == np.inf
     assert np.isclose(table.loc["similarity", "median_misfit"], 0.01)
-
-
-def test_the_figure_of_fitnesses_has_a_mark_a_run():
-    figure = fitness_quality_figure(frame())
-    assert [len(line.get_xdata()) for line in figure.axes[0].lines] == [4, 4]
-    plt.close(figure)
 
 
 def report(effects, after, holdout=0.03):

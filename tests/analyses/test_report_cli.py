@@ -2,75 +2,30 @@
 
 import hashlib
 from pathlib import Path
+from shutil import copytree
 
 import pandas as pd
 import pytest
 
-from armid.cli.main import main
 from armid.report import files as write
 from armid.study.results import load_study
-from armid.study.runner import run_study
-
-STUDY = """\
-name = "tiny"
-question = "Does a report come out of a real store?"
-report = "table1"
-plant = "shell_transfer_arm"
-budget = 30
-seeds = 2
-fitness = "rmse"
-windows_s = [[0.0, 0.3]]
-
-[[identifiers]]
-name = "pso"
-options = { n_particles = 10 }
-
-[[identifiers]]
-name = "random"
-
-[[cases]]
-name = "row 1"
-truth = { p0 = 3.20e6, k = 1.00, eta3 = 0.62, n = 1.00 }
-published = { p0 = 3.2114e6, k = 1.0026, eta3 = 0.6213, n = 1.0124 }
-manoeuvres = [{ start_angle_deg = -48.0, target_angle_deg = 22.0, shell = true, supply_V = 28.0, duration_s = 0.3 }]
-
-[bounds]
-p0 = [2.6e6, 3.5e6]
-k = [0.6, 1.1]
-eta3 = [0.45, 0.70]
-n = [0.9, 1.5]
-"""
+from commands import ended
 
 
 @pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    """Folder of a study of four runs."""
-    folder = tmp_path_factory.mktemp("tiny")
-    (folder / "tiny.toml").write_text(STUDY, encoding="utf-8")
-    run_study(folder / "tiny.toml", jobs=1, out=folder / "out")
-    return folder / "out"
+def store(table_study, tmp_path_factory):
+    return copytree(table_study, tmp_path_factory.mktemp("reported") / "tiny") / "out"
 
 
 def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def refused(arguments, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    assert stopped.value.code == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    return error
-
-
 @pytest.fixture(scope="module")
 def reported(store):
     """The folder with its report, and the digest that its store had before."""
     before = digest(store / "study.sqlite")
-    with pytest.raises(SystemExit) as ended:
-        main(["report", str(store)])
-    assert ended.value.code == 0
+    assert ended("report", store) == 0
     return store, before
 
 
@@ -97,15 +52,11 @@ def test_its_numbers_are_those_of_the_store(reported):
     assert pd.read_csv(reported[0] / "running_time.csv")["n"].tolist() == [2, 2]
 
 
-def test_the_main_table_and_the_state_are_printed_and_a_users_analysis_is_a_section(
-    store, tmp_path, capsys, monkeypatch
-):
+def test_the_main_table_and_the_state_are_printed_and_a_users_analysis_is_a_section(store, run, tmp_path, monkeypatch):
     (tmp_path / "study.sqlite").write_bytes((store / "study.sqlite").read_bytes())
     (tmp_path / "mine.py").write_text("def best(runs):\n    return runs.groupby('identifier')[['value']].min()\n")
     monkeypatch.setattr(write, "save", lambda figure, *paths: [p.write_text("<svg/>") for p in paths])
-    with pytest.raises(SystemExit):
-        main(["report", str(tmp_path), "--plugin", f"{tmp_path / 'mine.py'}:best"])
-    printed = capsys.readouterr().out
+    printed = run("report", tmp_path, "--plugin", f"{tmp_path / 'mine.py'}:best").out
     for wanted in ("the paper's pso", "random", "noise-free", "Complete: 4 of 4 runs.", "wrote report.md and "):
         assert wanted in printed
     best = pd.read_csv(tmp_path / "own_best.csv").set_index("identifier")["value"]
@@ -122,21 +73,14 @@ def test_a_report_that_fails_leaves_nothing(store, tmp_path, monkeypatch):
 
     monkeypatch.setattr(write, "save", fails)
     with pytest.raises(RuntimeError, match="no room"):
-        main(["report", str(tmp_path)])
+        ended("report", tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["study.sqlite"]
 
 
-def test_no_store_is_refused_with_a_sentence(tmp_path, capsys):
-    assert "holds no result: study.sqlite of `armid study`" in refused(["report", str(tmp_path)], capsys)
-
-
-def test_export_of_a_real_store_loads(store, tmp_path, capsys):
+def test_export_of_a_real_store_loads(store, run, tmp_path):
     import iohinspector
 
-    with pytest.raises(SystemExit) as ended:
-        main(["export", "ioh", str(store), str(tmp_path / "ioh")])
-    assert ended.value.code == 0
-    assert "wrote 4 runs in 4 files" in capsys.readouterr().out
+    assert "wrote 4 runs in 4 files" in run("export", "ioh", store, tmp_path / "ioh").out
     manager = iohinspector.DataManager()
     manager.add_folder(str(tmp_path / "ioh"))
     rows = manager.load(monotonic=False, include_meta_data=True).to_pandas()
@@ -146,7 +90,7 @@ def test_export_of_a_real_store_loads(store, tmp_path, capsys):
     assert rows.groupby("data_id")["evaluations"].agg(["first", "last"]).to_numpy().tolist() == [[1, 30]] * 4
 
 
-def test_a_folder_that_holds_something_is_not_mixed_with(store, tmp_path, capsys):
+def test_a_folder_that_holds_something_is_not_mixed_with(store, refused, tmp_path):
     (tmp_path / "mine.txt").write_text("")
-    assert "is not empty" in refused(["export", "ioh", str(store), str(tmp_path)], capsys)
+    assert "is not empty" in refused("export", "ioh", store, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]

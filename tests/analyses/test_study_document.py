@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from made_results import BOX
 
 from armid.errors import ArmidError
 from armid.report.files import write_files
@@ -29,7 +30,6 @@ def written(results, folder):
 
 
 def small(make):
-    """Table I with two identifiers and two failed runs."""
     identifiers = {"pso": 3e-3, "pso+bobyqa": 1e-6}
     return make(report="table1", failed=2, seeds=2, noises=(0.0,), identifiers=identifiers)
 
@@ -150,7 +150,9 @@ def test_without_a_truth_there_are_values_and_costs_and_no_errors(made):
     )
 
 
-def test_twenty_cases_have_critical_differences_and_realisations_of_noise_their_bound(made, many_cases):
+def test_twenty_cases_have_critical_differences_and_realisations_of_noise_their_bound(made):
+    rng = np.random.default_rng(7)
+    many_cases = [{"name": f"case {i}", "truth": {n: rng.uniform(*box) for n, box in BOX.items()}} for i in range(24)]
     many = report_of(made(cases=many_cases, seeds=1, noises=(0.0,)))
     assert "critical_difference" in [f.name for f in many.figures]
     results = made(cases=many_cases[:2], seeds=25, noises=(0.3,))

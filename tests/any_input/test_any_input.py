@@ -38,40 +38,17 @@ def test_the_originals_read_also_as_they_are_written_here():
         assert read_whatever(toml, csv.encode()) is not None
 
 
-@many(120)
-@given(mutated(ARM))
-def test_any_value_for_the_arm(table):
-    read_whatever(toml_of(table), ARM_CSV.encode())
+@many(240)
+@given(st.one_of(st.tuples(mutated(ARM), st.just(ARM_CSV)), st.tuples(mutated(AXIS), st.just(AXIS_CSV))))
+def test_any_value_for_the_arm_and_for_an_axis(case):
+    table, csv = case
+    read_whatever(toml_of(table), csv.encode())
 
 
-@many(120)
-@given(mutated(AXIS))
-def test_any_value_for_an_axis(table):
-    read_whatever(toml_of(table), AXIS_CSV.encode())
-
-
-@many(120)
-@given(edits, edits)
-def test_edited_arm(toml, csv):
-    read_whatever(edited(ARM_TOML, toml), edited(ARM_CSV, csv))
-
-
-@many(120)
-@given(edits, edits)
-def test_edited_axis(toml, csv):
-    read_whatever(edited(AXIS_TOML, toml), edited(AXIS_CSV, csv))
-
-
-@many(120)
-@given(edits)
-def test_edited_numbers(csv):
-    read_whatever(AXIS_TOML.encode(), edited(AXIS_CSV, csv))
-
-
-@many(120)
-@given(edits)
-def test_edited_declarations(toml):
-    read_whatever(edited(ARM_TOML, toml), ARM_CSV.encode())
+@many(480)
+@given(st.sampled_from([(ARM_TOML, ARM_CSV), (AXIS_TOML, AXIS_CSV)]), edits, edits)
+def test_edited_text_of_the_arm_and_of_an_axis(texts, toml, csv):
+    read_whatever(edited(texts[0], toml), edited(texts[1], csv))
 
 
 @many(120)

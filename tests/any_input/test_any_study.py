@@ -62,7 +62,6 @@ def study_of(content: bytes) -> bool:
 
 
 def checked(file: Path) -> Study:
-    """Return a study whose first run is planned."""
     study = read_study(file)
     assert study.description()["name"] == study.name
     assert next(iter(study.plan())).run

@@ -1,16 +1,12 @@
-"""Commands run in this process, and files that plug-ins are read from."""
+"""A small campaign, files that plug-ins are read from, and commands in processes of their own."""
 
 import os
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-
-from armid.cli.main import main
-from armid.errors import LONGEST
 
 PLUGINS = '''\
 """Things of a user."""
@@ -81,43 +77,6 @@ def no_algorithm(budget):
 '''
 
 
-@dataclass(frozen=True)
-class Ran:
-    """Hold what a command left: exit code, output, error output."""
-
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
-    """Return a function that runs a command in this process."""
-
-    def ran(*arguments: object) -> Ran:
-        with pytest.raises(SystemExit) as left:
-            main([str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return Ran(int(left.value.code or 0), captured.out, captured.err)
-
-    return ran
-
-
-@pytest.fixture
-def refused(run: Callable[..., Ran]) -> Callable[..., str]:
-    """Return a function that runs a command that has to be refused, and returns its one sentence."""
-
-    def sentence(*arguments: object) -> str:
-        ran = run(*arguments)
-        assert (ran.code, ran.out) == (2, "")
-        assert ran.err.startswith("armid: ")
-        assert ran.err.count("\n") == 1
-        assert len(ran.err) <= len("armid: ") + LONGEST + 1
-        return ran.err
-
-    return sentence
-
-
 @pytest.fixture(scope="session")
 def small_folder(paper_arm_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The committed campaign with one lowering to train on and one to hold out: two records are drawn, not seven."""
@@ -132,7 +91,6 @@ def small_folder(paper_arm_folder: Path, tmp_path_factory: pytest.TempPathFactor
 
 @pytest.fixture(scope="session")
 def mine(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file of plug-ins."""
     file = tmp_path_factory.mktemp("plugins") / "mine.py"
     file.write_text(PLUGINS, encoding="utf-8")
     return file

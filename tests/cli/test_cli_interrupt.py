@@ -18,7 +18,6 @@ pty = pytest.importorskip("pty")
 
 
 def read_until(terminal, word, seconds=60.0):
-    """Return what a terminal showed until a word came."""
     shown, end = b"", time.monotonic() + seconds
     while word not in shown:
         assert time.monotonic() < end, shown

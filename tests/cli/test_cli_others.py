@@ -63,20 +63,6 @@ def test_a_user_s_things_are_listed(run, mine, what, name, line):
     assert line in run("list", what, "--plugin", f"{mine}:{name}").out
 
 
-@pytest.mark.parametrize("name", [pytest.param("cubic_drag", marks=pytest.mark.slow), "largest_miss", "evolution"])
-def test_check_runs_the_contract(run, mine, name):
-    ran = run("check", f"{mine}:{name}", *(("--on", "driven_axis") if name == "cubic_drag" else ()))
-    assert ran.code == 0
-    assert re.search(r"^(\d+) of \1 points hold$", ran.out, re.MULTILINE)
-    assert "FAIL" not in ran.out
-
-
-def test_check_tells_what_does_not_hold(run, mine):
-    ran = run("check", f"{mine}:diverging")
-    assert ran.code == 1
-    assert "FAIL" in ran.out
-
-
 def test_bench_prints_one_table(run, root, monkeypatch):
     """Of one part, really measured; tests/bench measures each."""
     monkeypatch.syspath_prepend(root / "studies")

@@ -2,12 +2,12 @@
 
 import json
 import logging
+from shutil import copytree
 from threading import Thread
 
 import pytest
-from click.testing import CliRunner
 
-from armid.cli.main import app, show_warning, tell_more
+from armid.cli.main import show_warning, tell_more
 from armid.cli.options import command
 from armid.report import files, html, style
 from armid.report.document import Column, Struck, Table, table
@@ -39,37 +39,11 @@ WIDE = table(
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    """A small study that was run."""
-    folder = tmp_path_factory.mktemp("study")
-    text = """
-name = "small"
-question = "Which is nearer?"
-plant = "shell_transfer_arm"
-report = "table1"
-seeds = 1
-budget = 40
-windows_s = [[0.0, 0.3]]
-bounds = { p0 = [2.6e6, 3.5e6], k = [0.6, 1.1], eta3 = [0.45, 0.70], n = [0.9, 1.5] }
-[[identifiers]]
-name = "pso"
-label = "pso, the literal limit of the paper"
-[[identifiers]]
-name = "de"
-[[cases]]
-name = "row 1"
-truth = { p0 = 3.20e6, k = 1.00, eta3 = 0.62, n = 1.00 }
-published = { p0 = 3.2114e6, k = 1.0026, eta3 = 0.6213, n = 1.0124 }
-manoeuvres = [{ start_angle_deg = -48.0, target_angle_deg = 22.0, shell = true, supply_V = 28.0, duration_s = 0.3 }]
-"""
-    (folder / "small.toml").write_text(text, encoding="utf-8")
-    ran = CliRunner().invoke(app, ["study", str(folder / "small.toml"), "--jobs", "1", "--out", str(folder / "out")])
-    assert ran.exit_code == 0, ran.output
-    return folder / "out"
+def study(table_study, tmp_path_factory):
+    return copytree(table_study, tmp_path_factory.mktemp("study") / "tiny") / "out"
 
 
 def not_drawn(figure, *paths):
-    """Take the place of what turns a figure into SVG or files."""
     style.pyplot().close(figure)
     for path in paths:
         path.write_text("<svg/>")
@@ -138,7 +112,7 @@ def test_the_answer_comes_first_and_is_that_of_the_page(run, study, small_folder
         pages = [path.read_text(encoding="utf-8") for path in out.iterdir() if path.suffix in (".md", ".html")]
         assert len(pages) == 2
         assert all(first in page for page in pages)
-    ran = run("study", study.parent / "small.toml", "--jobs", "1", "--out", study)
+    ran = run("study", study.parent / "tiny.toml", "--jobs", "1", "--out", study)
     assert ran.out.splitlines()[0].partition(":")[0] in ("Yes, reproduced and beaten", "Reproduced, not beaten", "No",
                                                          "Not reproduced by its own method, but beaten")  # fmt: skip
     assert run("report", study).out.splitlines()[0] == ran.out.splitlines()[0]
@@ -175,12 +149,6 @@ def test_the_doctor_tells_what_is_wrong(run, monkeypatch, tmp_path):
     ran = run("doctor")
     assert ran.code == 1
     assert "FAIL cache: " in ran.out
-
-
-def test_an_effect_is_tried_on_one_plant(refused, mine):
-    words = ("check", f"{mine}:cubic_drag")
-    assert "--on 'driven_axs' is no plant: did you mean 'driven_axis'?" in refused(*words, "--on", "driven_axs")
-    assert "--time-limit is 0" in refused(*words, "--time-limit", "0")
 
 
 def test_options_of_every_identifier_have_a_meaning(run):

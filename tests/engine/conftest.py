@@ -4,15 +4,14 @@ from collections.abc import Callable
 from functools import cache
 
 import pytest
-from arm_cases import box_of, index_rows, manoeuvre_of
 
+from arm_cases import box_of, index_rows, manoeuvre_of
 from armid.engine import Schedule, calibrate, probes
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 
 @pytest.fixture(scope="session")
 def manoeuvres() -> dict[str, Manoeuvre]:
-    """The seven manoeuvres of the reference by name."""
     return {row["manoeuvre"]: manoeuvre_of(row) for row in index_rows()}
 
 

@@ -5,11 +5,10 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from arm_cases import box_of, drawn
 from numpy.typing import NDArray
 
+from arm_cases import box_of, drawn
 from armid.engine import Schedule, calibrate, probes, simulate
-from armid.errors import ArmidError
 from armid.loop.candidates import quickly_calibrated
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
@@ -58,25 +57,10 @@ def test_the_error_is_honest(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> No
     assert 0.5 <= found.error / np.abs(run - finest).max() <= 2.0
 
 
-def test_an_axis_with_hard_drive_needs_more_steps() -> None:
-    axis = Model(PLANTS["driven_axis"])
-    times = 0.01 * np.arange(300)
-    slow, fast = (
-        calibrate(axis, Manoeuvre(0.01, 300, {"gravity_moment": g}, {"u": np.sin(times)}), np.array([[1.0]]), "fine")
-        for g in (1.0, 400.0)
-    )
-    assert slow.schedule.substeps < fast.schedule.substeps
-
-
 def test_what_cannot_be_reached_is_said() -> None:
     axis = Model(PLANTS["driven_axis"])
     coarse = Manoeuvre(10.0, 30, {"gravity_moment": 4000.0}, {"u": np.sin(np.arange(30.0))})
     assert not calibrate(axis, coarse, np.array([[1.0]]), "fine").reached
-
-
-def test_an_unknown_accuracy_is_refused(arm: Model) -> None:
-    with pytest.raises(ArmidError, match="accuracy 'finest' is unknown: standard or fine is expected"):
-        calibrate(arm, Manoeuvre(0.001, 60), drawn(arm, 1, 1), "finest")
 
 
 def test_long_steps_are_taken_where_candidates_could_try_them(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:

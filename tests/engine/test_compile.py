@@ -47,7 +47,6 @@ def result(process: subprocess.Popen[str]) -> dict[str, float]:
 
 
 def listing(folder: Path) -> dict[str, tuple[int, int]]:
-    """Every file of the cache with its size and time of change."""
     return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*")}
 
 
@@ -194,15 +193,12 @@ def packed_and_scalar(model: Model, manoeuvre: Manoeuvre, monkeypatch: pytest.Mo
     return len(re.findall(arithmetic + r"pd\s.*[yz]mm", text)), len(re.findall(arithmetic + r"sd\s", text))
 
 
-def test_an_axis_runs_in_packed_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = Model(PLANTS["driven_axis"]) + EFFECTS["coulomb"]
-    packed, scalar = packed_and_scalar(model, Manoeuvre(0.01, 9, inputs={"u": np.ones(9)}), monkeypatch)
-    assert packed > 100
-    assert packed > 4 * scalar
-
-
-@pytest.mark.slow
-def test_the_arm_runs_in_packed_instructions(rubbing_arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    packed, scalar = packed_and_scalar(rubbing_arm, Manoeuvre(0.001, 9), monkeypatch)
-    assert packed > 500
-    assert packed > 10 * scalar
+@pytest.mark.parametrize(("plant", "least", "times"), [
+    ("driven_axis", 100, 4), pytest.param("shell_transfer_arm", 500, 10, marks=pytest.mark.slow),
+])  # fmt: skip
+def test_models_run_in_packed_instructions(plant, least, times, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = Model(PLANTS[plant]) + EFFECTS["coulomb"] + EFFECTS["viscous"]
+    inputs = {"u": np.ones(9)} if plant == "driven_axis" else {}
+    packed, scalar = packed_and_scalar(model, Manoeuvre(0.001, 9, inputs=inputs), monkeypatch)
+    assert packed > least
+    assert packed > times * scalar

@@ -123,14 +123,6 @@ def test_a_mass_too_light_for_the_steps_gets_finer_ones(axis: Model) -> None:
     assert not simulate(axis, manoeuvre, candidates, found.schedule).failed.any()
 
 
-def test_an_axis_in_radians_obeys_the_same_equations(axis: Model) -> None:
-    turning = Model(PLANTS["driven_axis"].for_unit("rad/s"))
-    manoeuvre = Manoeuvre(INTERVAL, N_SAMPLES, {"gravity_moment": 3.0}, {"u": np.sin(7.0 * TIMES)})
-    found = simulate(turning, manoeuvre, [[MASS]], Schedule(4))
-    along = move(axis, np.sin(7.0 * TIMES), gravity_moment=3.0)
-    np.testing.assert_allclose(found.output, along.output, atol=1e-13)
-
-
 # Inputs that run straight between samples beside inputs that keep their last value.
 N_SWITCHED, OFF = 101, 40
 SWITCHED = INTERVAL * np.arange(N_SWITCHED)

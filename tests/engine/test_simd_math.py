@@ -56,7 +56,6 @@ def single(values: Array) -> Array:
 
 
 def without(inputs: Array, *conditions: Callable[[Array, Array], NDArray[np.bool_]]) -> Array:
-    """Leave out pairs of values."""
     for condition in conditions:
         inputs = inputs[:, ~condition(*inputs)]
     return inputs

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,13 +34,6 @@ def found() -> Callable[..., Identification]:
 def lowering_found(found: Callable[..., Identification], lowering: Campaign) -> Identification:
     """The lowering, identified in 160 simulations and judged on the holdout."""
     return found(lowering)
-
-
-@pytest.fixture(scope="session")
-def many_records(paper_arm: Campaign) -> Campaign:
-    """Twice the records of the committed campaign: 14."""
-    again = [replace(r, file=f"again_{r.file}") for r in paper_arm.records]
-    return replace(paper_arm, records=(*paper_arm.records, *again)).with_window(0.0, 0.7)
 
 
 @pytest.fixture(scope="session")

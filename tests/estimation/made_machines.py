@@ -28,9 +28,9 @@ def motion(rates: Callable[[Array, float], Array], u: Array, interval: float, st
     return np.array(states)
 
 
-def arm(x: Array, u: float, friction: float, law: Callable[[float], float] = float) -> Array:
+def arm(x: Array, u: float, friction: float) -> Array:
     """Rotary arm: inertia 0.04, m g l 0.5, damping 0.02."""
-    return np.array([x[1], (law(u) - 0.5 * np.sin(x[0]) - 0.02 * x[1] - friction * np.tanh(x[1] / 0.05)) / 0.04])
+    return np.array([x[1], (u - 0.5 * np.sin(x[0]) - 0.02 * x[1] - friction * np.tanh(x[1] / 0.05)) / 0.04])
 
 
 def axis(x: Array, u: float, friction: float) -> Array:
@@ -50,7 +50,6 @@ def swing(times: Array, pace: float, size: float) -> Array:
 
 
 def written(folder: Path, toml: str, columns_of: Columns, seed: int) -> Path:
-    """Write the campaign of a machine."""
     rng = np.random.default_rng(seed)
     tables = {file: columns_of(seconds, pace, rng) for file, (seconds, pace, _) in STROKES.items()}
     records = "".join(f'[[records]]\nfile = "{file}"\nrole = "{role}"\n' for file, (_, _, role) in STROKES.items())

@@ -1,7 +1,6 @@
 """A search run without pymoo's loop is the search that pymoo's loop runs: the same candidates, ends and errors."""
 
 import threading
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -116,18 +115,3 @@ def test_what_pymoo_s_loop_has_to_see_to_leaves_it_to_pymoo(posed) -> None:
     assert not can_run_directly(Mine(method, 100))
     assert not can_run_directly(SearchAlgorithm(method, 100, callback=Told()))
     assert not can_run_directly(SearchAlgorithm(method, 100, archive=None))
-
-
-def test_a_budget_within_a_generation_is_cut_off_exactly(posed) -> None:
-    identifier = IDENTIFIERS["random"].with_options({"n_candidates": 40})
-    problem, meter = posed(budget=101)
-    assert search(problem, meter, identifier, 1, None) == "budget used"
-    assert meter.used == len(meter.log().F) == 101
-
-
-@pytest.mark.parametrize("name", ["bobyqa", "least_squares", "pso+bobyqa"])
-def test_no_thread_is_started(posed, monkeypatch, name) -> None:
-    problem, meter = posed()
-    monkeypatch.setattr("armid.identifiers.search.Thread.start", partial(pytest.fail, "a thread was started"))
-    search(problem, meter, identifier_of(name, IDENTIFIERS), 1, None)
-    assert meter.used > 10

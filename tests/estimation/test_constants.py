@@ -15,8 +15,6 @@ ARM = PLANTS["shell_transfer_arm"]
 
 
 class Linear:
-    """A problem whose signal is linear in two parameters."""
-
     replays = ()
     space = SimpleNamespace(free_names=("a", "b"))
     span = np.array([2.0, 4.0])

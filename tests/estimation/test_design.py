@@ -45,15 +45,9 @@ def test_the_grid_of_the_arm_is_what_campaign_toml_could_say(paper_arm, arm):
         assert f.manoeuvre.n_samples == 1201
     assert {f.keys["shell"] for f in grid} == {True, False}
     assert {f.keys["supply_V"] for f in grid} == {28.0, 24.0}
-
-
-def test_what_was_recorded_is_there_once_and_first(paper_arm, arm):
-    grid = manoeuvre_grid(arm, paper_arm.train)
+    # what was recorded is there once and first, in the window of the records
     assert [f.repeats for f in grid if f.repeats] == ["lower.csv", "raise.csv", "short.csv"]
     assert [bool(f.repeats) for f in grid[:4]] == [True, True, True, False]
-
-
-def test_the_window_is_that_of_the_records(paper_arm, arm):
     short = paper_arm.with_window(0.1, 0.7)
     for f in manoeuvre_grid(arm, short.train)[::20]:
         assert (f.window, f.manoeuvre.n_samples) == (slice(100, 701), 701)
@@ -143,13 +137,9 @@ def test_recorded_inputs_are_changed(driven):
     np.testing.assert_allclose(fast[:201], u[::2])
     slow = grid["0.5 times as fast"].manoeuvre.inputs["u"]
     np.testing.assert_allclose(slow[::2], u[:201])
-
-
-def test_a_held_input_stays_held(driven):
-    campaign, told = driven
-    record = told(hold="zero")
-    grid = {f.name: f for f in manoeuvre_grid(Model(campaign.plant), [record])}
-    slow = grid["the inputs of move.csv 0.5 times as fast"].manoeuvre.inputs["u"]
+    # a held input stays held
+    held = {f.name: f for f in manoeuvre_grid(Model(campaign.plant), [told(hold="zero")])}
+    slow = held["the inputs of move.csv 0.5 times as fast"].manoeuvre.inputs["u"]
     np.testing.assert_array_equal(slow[:400:2], slow[1:400:2])
 
 
@@ -168,15 +158,11 @@ def test_an_axis_moves_no_further_and_no_faster_than_it_did(driven, axis_model):
 NOISE = 0.25 * np.pi / 180.0
 
 
-def with_noise(replay, rms=NOISE, effective_fraction=1.0):
-    noise = replace(replay.record.noise, rms=rms, effective_fraction=effective_fraction)
-    return replace(replay, record=replace(replay.record, noise=noise))
-
-
 @pytest.fixture(scope="module")
 def bought(paper_arm, arm, arm_space):
     """Offers after one lowering, by what they are ranked; the raising and the short stroke are among them."""
-    told = tuple(with_noise(r) for r in replays(paper_arm.train, arm, arm_space))
+    records = [replace(r, noise=replace(r.noise, rms=NOISE, effective_fraction=1.0)) for r in paper_arm.train]
+    told = replays(records, arm, arm_space)
     one = told[:1]
     information = information_at(one, arm_space, TRUTH)
     grid = manoeuvre_grid(arm, [r.record for r in told])
@@ -197,10 +183,7 @@ def test_they_are_the_intervals_of_a_record_that_was_made(bought, arm_space):
         np.testing.assert_allclose(repeated[file].before, information.deviation, rtol=1e-6)
     np.testing.assert_allclose(repeated["lower.csv"].after, information.deviation / np.sqrt(2.0), rtol=2e-3)
     assert repeated["lower.csv"].gain == pytest.approx(np.sqrt(2.0), rel=1e-3)
-
-
-def test_coloured_noise_buys_less(bought):
-    _, _, ranked = bought
+    # coloured noise buys less
     white = {o.feasible: o for o in ranked("volume")}
     for offer in ranked("volume", Level(NOISE, 0.1))[::10]:
         assert (offer.after >= white[offer.feasible].after).all()
@@ -222,9 +205,7 @@ def test_what_is_ranked_by_is_what_it_says():
     assert gain(before, after, "volume") == pytest.approx((412 * 3612 / (112 * 412)) ** 0.25)
     assert gain(before, after, "worst") == pytest.approx(np.sqrt(412 / 112))
     assert gain(before, after, "shrinkage") == pytest.approx(np.sqrt(3612 / 412))
-
-
-def test_what_was_not_determined_counts_with_its_box():
+    # what was not determined counts with its box
     seen = np.diag([100.0, 0.0])
     assert gain(seen, np.diag([100.0, 36.0]), "shrinkage") == pytest.approx(2.0)
     offer = Offer(None, np.array([0.1, np.inf]), np.array([0.1, 0.5]), 2.0)

@@ -10,17 +10,12 @@ import pytest
 from armid.errors import ArmidError
 from armid.estimation.examine import collinearity_index, examine, groups
 from armid.estimation.identifiability_document import (
-    deviation_text,
     draw_profile,
     interval_text,
-    offer_table,
     offer_text,
-    parameter_table,
-    profile_figure,
     profile_text,
     remarks,
     result_of,
-    sensitivity_figure,
     smooth,
 )
 from armid.estimation.information import information_at
@@ -29,10 +24,8 @@ from armid.estimation.profile import THRESHOLD
 from armid.model import EFFECTS
 from armid.problem.problem import replays
 from armid.problem.space import space_of
-from armid.report.style import save
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
-NOISE = 0.25 * np.pi / 180.0
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +36,6 @@ def one_stroke(lowering, arm, arm_space):
 
 @pytest.fixture(scope="module")
 def with_friction(lowering, arm):
-    """The same with friction that is not there."""
     model = arm + EFFECTS["coulomb"]
     return examine(lowering, model, space_of(model))
 
@@ -188,36 +180,11 @@ def test_the_numbers_for_other_programs(with_friction):
     assert offer["deviation"]["n"]["after"] < offer["deviation"]["n"]["before"]
 
 
-def test_tables(with_friction):
-    result = result_of(with_friction)
-    assert len(parameter_table(result).cells()) == 5
-    cells = [row[0].text for row in offer_table(result, most=3).cells()]
-    assert cells[0] == "none"
-    assert cells[-1].startswith("lower.csv once more")
-    assert len(cells) == 5
-
-
 def test_digits_follow_the_width():
     assert interval_text(1.39814, 1.40181) == "1.39814 to 1.40181"
     assert interval_text(90.4, 97.9) == "90.40 to 97.90"
     assert interval_text(100.0, 4000.0) == "100 to 4000"
     assert interval_text(1.0, 1.0) == "1.000000 to 1.000000"
-
-
-def test_deviations_are_percent_of_plant_parameters_only(with_friction):
-    assert deviation_text(with_friction, 0, 0.01 * with_friction.x[0]) == "1 %"
-    assert deviation_text(with_friction, 4, 2.5) == "2.5 N m"
-    assert deviation_text(with_friction, 0, np.inf) == "not determined"
-
-
-def test_figures_show_what_was_found(one_stroke, with_friction, paper_arm, arm, arm_space, tmp_path):
-    from matplotlib import pyplot as plt
-
-    save(profile_figure(with_friction), tmp_path / "profiles.png")
-    save(sensitivity_figure(one_stroke), tmp_path / "one.png")
-    save(sensitivity_figure(examine(paper_arm, arm, arm_space)), tmp_path / "several.png")
-    for name in ("profiles.png", "one.png", "several.png"):
-        assert plt.imread(tmp_path / name).std() > 0.05
 
 
 def test_a_profile_is_drawn_with_its_threshold_its_parabola_and_its_bound(with_friction):
@@ -250,7 +217,6 @@ def fisher_of(*columns):
 
 @pytest.fixture
 def basis():
-    """Six orthonormal columns."""
     return np.linalg.qr(np.random.default_rng(1).normal(size=(40, 6)))[0].T
 
 
@@ -296,12 +262,6 @@ def test_nothing_to_tell(basis):
     assert groups(fisher_of(a), ("p",)) == ()
     assert groups(np.zeros((2, 2)), ("p", "q")) == ()
     assert groups(fisher_of(a, 0.0 * b, a + 0.01 * b), ("p", "q", "r"))[0].names == ("p", "r")
-
-
-def test_one_stroke_of_the_arm(lowering_replays, arm_space):
-    x = estimate(lowering_replays, arm_space)
-    (group,) = groups(information_at(lowering_replays, arm_space, x).fisher, arm_space.free_names)
-    assert group.names == ("p0", "eta3", "n")
 
 
 def test_several_manoeuvres_tell_them_apart(paper_arm, arm, arm_space):

@@ -20,7 +20,6 @@ NOISE = 0.25 * DEGREE
 
 
 def with_noise(replay, rms, effective_fraction=1.0):
-    """Return a replay whose record tells another noise."""
     noise = replace(replay.record.noise, rms=rms, effective_fraction=effective_fraction)
     return replace(replay, record=replace(replay.record, noise=noise))
 
@@ -64,24 +63,6 @@ def test_more_noise_and_coloured_noise_widen(lowering_replays, arm_space):
     )
     np.testing.assert_allclose(loud.deviation, 3 * plain.deviation)
     np.testing.assert_allclose(coloured.deviation, 2 * plain.deviation)
-
-
-def test_a_coloured_gyro_widens(stand, arm, arm_space):
-    widths = []
-    for bandwidth in ("0", "20"):
-        options = ("--manoeuvres", "lower", "--repeats", "2", "--holdout", "", "--noise-bandwidth-hz", bandwidth)
-        read = read_campaign(stand(*options, "--quantisation-deg-s", "0.01"))
-        widths.append(information_at(replays(read.train, arm, arm_space), arm_space, TRUTH).half_width)
-    assert (widths[1] > 1.5 * widths[0]).all()
-
-
-def test_what_is_not_seen_is_not_determined(paper_arm, arm, arm_space):
-    before_the_switch = replays(paper_arm.with_window(0.0, 0.3).train[:1], arm, arm_space)
-    information = information_at(before_the_switch, arm_space, TRUTH)
-    assert np.isinf(information.deviation[1])
-    assert np.isfinite(information.deviation[[0, 2, 3]]).all()
-    assert np.isnan(information.correlation[1]).all()
-    assert all("k" not in pair[:2] for pair in collinear(information))
 
 
 @pytest.mark.slow
@@ -248,25 +229,3 @@ def test_agree_with_the_closed_form_of_an_axis(axis):
         expected = closed_form(replay, mass, slope) * (space.high - space.low)[space.free]
         found = sensitivities(replay, space, np.array([mass, slope]))
         np.testing.assert_allclose(found, expected, atol=within * np.max(np.abs(expected)))
-
-
-def test_agree_with_differences_of_another_step(several, arm_space):
-    for replay, step in ((replay, step) for replay in several for step in (1e-5, 1e-3)):
-        found = sensitivities(replay, arm_space, TRUTH)
-        moves = np.diag(step * (arm_space.high - arm_space.low))
-        signal = replay.signal(np.concatenate([TRUTH + moves, TRUTH - moves]))
-        other = (signal[:4] - signal[4:]).T / (2.0 * step)
-        # around the switch E the curvature of a step of 1e-3 shows
-        np.testing.assert_allclose(found, other, atol=(2e-3 if step < 1e-4 else 2e-2) * np.max(np.abs(other)))
-
-
-def test_where_nothing_is_free_there_is_no_interval(lowering, arm):
-    space = space_of(arm, fixed={"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4})
-    found = information_at(replays(lowering.train, arm, space), space, np.empty(0))
-    assert (found.names, found.deviation.shape, found.correlation.shape) == ((), (0,), (0, 0))
-
-
-def test_a_fixed_parameter_has_no_column(lowering_replays, arm_space):
-    some = sensitivities(lowering_replays[0], arm_space.with_fixed("eta3", 0.55), TRUTH[[0, 1, 3]])
-    whole = sensitivities(lowering_replays[0], arm_space, TRUTH)
-    np.testing.assert_allclose(some, whole[:, [0, 1, 3]], rtol=1e-9, atol=1e-12)

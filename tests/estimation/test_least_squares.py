@@ -8,7 +8,7 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import LeastSquaresProblem, descend, estimate, fit, refine, step_in_box
+from armid.estimation.least_squares import LeastSquaresProblem, descend, estimate, fit, refine
 from armid.problem.space import Space
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
@@ -97,17 +97,6 @@ def test_a_parameter_without_influence_stays_where_it_is():
         np.testing.assert_allclose(descend(problem, [np.array([0.9, 0.7])], 1e-10, central), [0.25, 0.7], atol=1e-8)
 
 
-def test_a_step_in_the_box_is_the_bounded_least_squares_step():
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        matrix, residual, z = rng.standard_normal((30, 3)), 4.0 * rng.standard_normal(30), rng.uniform(size=3)
-        found = step_in_box(matrix.T @ matrix, matrix.T @ residual, z, 0.0)
-        best = lsq_linear(matrix, residual, bounds=(-z, 1.0 - z), tol=1e-12)
-        # one pass over the box can miss the best of its faces, never the box
-        assert ((found >= 0.0) & (found <= 1.0)).all()
-        assert 0.5 * np.sum((matrix @ (found - z) - residual) ** 2) <= 1.1 * best.cost + 1e-9
-
-
 def clean(replays):
     """Return replays that measured the truth without noise."""
     found = []
@@ -135,11 +124,3 @@ def test_a_fixed_parameter_stays_and_weights_count(lowering_replays, arm_space):
     even = refine((good, bad), space, TRUTH[:3])
     np.testing.assert_allclose(heavy, TRUTH[:3], rtol=1e-5)
     assert np.abs(even / TRUTH[:3] - 1.0).max() > 1e-3
-
-
-def test_nothing_free_is_nothing_to_find(lowering_replays, arm_space):
-    space = arm_space
-    for name, value in zip(arm_space.names, TRUTH, strict=True):
-        space = space.with_fixed(name, value)
-    assert refine(lowering_replays, space, np.empty(0)).shape == (0,)
-    assert estimate(lowering_replays, space).shape == (0,)

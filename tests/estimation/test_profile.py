@@ -6,13 +6,8 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from armid.estimation.least_squares import estimate, fit, weighted_records
+from armid.estimation.least_squares import fit
 from armid.estimation.profile import THRESHOLD, profiles
-from armid.problem.problem import replays
-
-
-def test_the_threshold_is_that_of_one_degree_of_freedom():
-    assert pytest.approx(chi2.ppf(0.95, 1)) == THRESHOLD
 
 
 def seen_by(design, z, rng):
@@ -20,6 +15,7 @@ def seen_by(design, z, rng):
 
 
 def test_of_a_linear_model_it_is_the_parabola():
+    assert pytest.approx(chi2.ppf(0.95, 1)) == THRESHOLD
     rng = np.random.default_rng(3)
     design = 60.0 * rng.normal(size=(50, 3))
     design[:, 1] += 2.0 * design[:, 0]
@@ -102,15 +98,3 @@ def test_a_profile_that_finds_a_deeper_valley_starts_again_there():
     best, (p,) = profiles(records, np.array([0.1]))
     assert best[0] == pytest.approx(0.8, abs=1e-6)
     assert p.rise.min() >= 0.0
-
-
-def test_one_stroke_of_the_arm_is_next_to_a_parabola(lowering, arm, arm_space):
-    """The truth lies in each interval of one stroke, whose curve is next to a parabola for the arm without effects."""
-    (replay,) = replays(lowering.train, arm, arm_space)
-    records = weighted_records((replay,), arm_space)
-    best, found = profiles(records, records.shares(estimate((replay,), arm_space)))
-    for p, truth in zip(found, (3.05e6, 1.0, 0.55, 1.4), strict=True):
-        assert p.agrees
-        assert abs(truth - p.estimate) < 3.0 * p.deviation
-        for place, rise in zip(p.candidates, p.rise, strict=True):
-            assert records.chi2(records.shares(place))[0] - records.chi2(best)[0] == pytest.approx(rise, abs=1e-6)

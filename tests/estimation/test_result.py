@@ -1,6 +1,5 @@
 """The result as numbers for other programs, as words for people, as figures that are not blank."""
 
-import json
 import re
 import shutil
 from dataclasses import replace
@@ -27,30 +26,8 @@ from armid.problem.fitness import FITNESS
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
 from armid.record.table import read_table
-from armid.report.html import html
-from armid.report.markdown import markdown
 from armid.report.style import DPI, save
 from armid.report.terminal import show
-
-PARAMETER = {
-    "value",
-    "unit",
-    "low",
-    "high",
-    "bound_low",
-    "bound_high",
-    "bound_active",
-    "interval_holds",
-    "interval_doubt",
-}
-ERROR = {"rmse", "nrmse", "chi2_per_sample", "s", "s1", "s2", "unit", "span", "joint_nrmse", "outputs"}
-NEEDED = {"parameters", "error", "correlation", "unit", "budget", "used", "seed", "versions"}
-
-
-@pytest.fixture(scope="module")
-def partly_fixed(found, lowering, arm):
-    """The lowering with k fixed, coarse but enough to look at."""
-    return found(lowering, arm, space_of(arm, fixed={"k": 1.0}))
 
 
 @pytest.fixture
@@ -62,18 +39,6 @@ def shown(capsys):
         return capsys.readouterr().out
 
     return text
-
-
-def test_has_the_declared_keys(lowering_found):
-    result = result_of(lowering_found)
-    assert set(result) >= NEEDED
-    assert set(result["error"]) == {"train", "holdout"}
-    assert set(result["error"]["train"]) == set(result["error"]["holdout"]) == ERROR
-    assert list(result["parameters"]) == ["p0", "k", "eta3", "n"]
-    assert all(set(p) == PARAMETER for p in result["parameters"].values())
-    assert set(result["versions"]) >= {"python", "armid", "numpy", "numba", "pymoo"}
-    assert result["used"] == result["budget"] == 160
-    assert json.loads(json.dumps(result, allow_nan=False)) == result
 
 
 def test_everything_is_si(lowering_found):
@@ -101,23 +66,6 @@ def test_everything_is_si(lowering_found):
         assert {k: told_of_it[k] for k in numbers} == pytest.approx(numbers, rel=1e-12)
 
 
-def test_intervals_and_correlations_are_those_of_the_information(lowering_found):
-    result, information = result_of(lowering_found), lowering_found.information
-    for i, (name, p) in enumerate(result["parameters"].items()):
-        assert p["high"] - p["low"] == pytest.approx(2 * 1.959963985 * information.deviation[i])
-        assert p["low"] < p["value"] < p["high"]
-        assert result["correlation"][name][name] == pytest.approx(1.0)
-        assert result["correlation"][name]["n"] == pytest.approx(information.correlation[i, 3])
-
-
-def test_a_fixed_parameter_has_neither_interval_nor_bounds(partly_fixed, shown):
-    result = result_of(partly_fixed)
-    nothing = dict.fromkeys(("low", "high", "bound_low", "bound_high"))
-    assert result["parameters"]["k"] == {"value": 1.0, "unit": "1", "bound_active": False, **nothing}
-    assert set(result["correlation"]) == {"p0", "eta3", "n"}
-    assert "fixed" in shown(partly_fixed)
-
-
 def test_what_is_not_known_is_null(lowering_found, shown):
     lost = lowering_found.information.deviation.copy()
     lost[1] = np.inf
@@ -136,25 +84,6 @@ def test_what_is_not_known_is_null(lowering_found, shown):
     assert "k is not determined by these records." in remarks(worse)
     lost = replace(worse, train=replace(worse.train, rmse=np.nan))
     assert "Error (RMSE): not finite deg/s on the records fitted" in shown(lost)
-
-
-def test_tables_are_in_units_that_people_read(lowering_found, shown):
-    text = shown(lowering_found)
-    p0 = lowering_found.candidate[0]
-    assert f"{p0 / 1e6:.6g}" in text
-    assert "MPa" in text
-    assert f"{np.degrees(lowering_found.train.rmse):.4g}" in text
-    assert "RMSE, deg/s" in text
-
-
-def test_every_renderer_gives_the_answer_first(lowering_found, shown):
-    document = identify_document(result_of(lowering_found), details_of(lowering_found), {}, "armid report x")
-    first = document.answer[0]
-    assert first.startswith("Found, but no interval holds, since what the model leaves is more than the noise: p0 = ")
-    assert " ".join(shown(lowering_found).split()).startswith(" ".join(first.split()))
-    assert f"**{first}**" in markdown(document)
-    assert html(document).index(first) < html(document).index("<section")
-    assert html(document).count("<svg") == len(details_of(lowering_found)["records"])
 
 
 def test_remarks_name_bounds_pairs_divergence_and_noise(lowering_found):
@@ -254,13 +183,6 @@ def test_convergence(found, lowering, tmp_path, fitness):
     size, ink = saved(convergence_figure(found(lowering, fitness=fitness)), tmp_path / "convergence.png")
     assert size == pytest.approx((6.8, 4.2), abs=0.01)
     assert ink > 0.005
-
-
-def test_an_axis(found, write_axis, tmp_path):
-    result = found(read_campaign(write_axis(tmp_path / "axis")), fitness="rmse")
-    assert list(figures_of(result)) == ["fit", "convergence"]
-    size, _ = saved(fit_figure(result), tmp_path / "fit.png")
-    assert size == pytest.approx((6.8, 5.5), abs=0.01)
 
 
 def test_no_screen_is_needed_and_no_figure_stays_open(lowering_found, tmp_path):

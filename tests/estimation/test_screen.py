@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_machines import motion
 
 from armid.contract.check import check_campaign
 from armid.engine.simulate import Prepared
@@ -33,16 +34,18 @@ RECORD = '[[records]]\nfile = "{}"\nrole = "{}"\n'
 AXIS = ("slow.csv", "fast.csv", "other.csv")
 
 
-def change(column, function, *files):
-    """Return a mistake in a column of some files."""
+def rewritten(function, *files):
+    """Return a mistake in some files: a function of their columns."""
 
     def made(folder):
         for file in files:
-            columns = dict(read_table(folder / file, file).columns)
-            columns[column] = function(columns[column])
-            write_table(folder / file, columns)
+            write_table(folder / file, function(dict(read_table(folder / file, file).columns)))
 
     return made
+
+
+def change(column, function, *files):
+    return rewritten(lambda columns: columns | {column: function(columns[column])}, *files)
 
 
 def header(old, new, *files):
@@ -125,28 +128,18 @@ def pendulum(folder: Path, seed: int = 1, friction: float = 0.004) -> Path:
     )
     rng, interval = np.random.default_rng(seed), 0.004
     times = interval * np.arange(900)
-    for file, size, rate in zip(AXIS, (0.5, 0.35, 0.6), (2.0, 5.0, 3.1), strict=True):
-        drive, state, states = size * np.sin(rate * times) + 0.1, np.zeros(2), []
-        for now, after in zip(drive, np.append(drive[1:], drive[-1]), strict=True):
-            states.append(state)
-            state = step(state, now, after, interval, friction)
-        angle, speed = np.array(states).T
+
+    def rates(x, u):
+        return np.array([x[1], (u - 0.4 * np.sin(x[0]) - friction * x[1]) / 0.06])
+
+    for file, size, pace in zip(AXIS, (0.5, 0.35, 0.6), (2.0, 5.0, 3.1), strict=True):
+        drive = size * np.sin(pace * times) + 0.1
+        angle, speed = motion(rates, drive, interval, np.zeros(2)).T
         write_table(folder / file, {
             "time_s": times, "angular_velocity_deg_s": np.rad2deg(speed) + rng.normal(0, 0.3, times.size),
             "angle_deg": np.rad2deg(angle) + rng.normal(0, 0.05, times.size), "drive_N_m": drive,
         })  # fmt: skip
     return folder
-
-
-def step(state, now, after, interval, friction):
-    def rate(s, u):
-        return np.array([s[1], (u - 0.4 * np.sin(s[0]) - friction * s[1]) / 0.06])
-
-    k1 = rate(state, now)
-    k2 = rate(state + 0.5 * interval * k1, 0.5 * (now + after))
-    k3 = rate(state + 0.5 * interval * k2, 0.5 * (now + after))
-    k4 = rate(state + interval * k3, after)
-    return state + interval / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
 def constant(text):
@@ -378,20 +371,16 @@ def test_what_the_declared_model_misses_cannot_be_judged(campaign):
     assert (point.name, point.passed, point.sentence) == ("plausible (unjudged)", True, sentence)
 
 
-def test_check_and_identify_say_it(campaign, capsys):
+def test_check_and_identify_say_it(campaign, run):
     """Before anything is identified, and in the answer; check fails."""
-    from armid.cli.main import main
-
     folder = campaign("one")
     change(SPEED, np.negative, *ONE)(folder)
     words = "every train record: the measured rad/s signal: its sign looks inverted"
-    with pytest.raises(SystemExit, match="1"):
-        main(["check", str(folder)])
-    assert f"FAIL plausible (sign): {words}" in capsys.readouterr().out
+    ran = run("check", folder)
+    assert (ran.code, f"FAIL plausible (sign): {words}" in ran.out) == (1, True)
     with warnings.catch_warnings():
         warnings.simplefilter("default")
-        with pytest.raises(SystemExit, match="0"):
-            main(["identify", str(folder), "--budget", "80"])
-    told = capsys.readouterr()
+        told = run("identify", folder, "--budget", "80")
+    assert told.code == 0
     assert f"armid: warning: {words}" in told.err
     assert words in " ".join(told.out.split())

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from made_machines import write_arm, write_axis, write_link
-from test_screen import accusations, change, header, pendulum, said_of
+from test_screen import accusations, change, header, pendulum, rewritten, said_of
 
 from armid.estimation.screen import screen
 from armid.model import PLANTS, Model
@@ -37,13 +37,7 @@ def everywhere(column, function):
 def together(change_of):
     """Return a mistake in both columns of the link. change_of: hub and deflection -> what is written for them."""
 
-    def made(folder):
-        for file in FILES:
-            columns = dict(read_table(folder / file, file).columns)
-            columns[HUB], columns[TWIST] = change_of(columns[HUB], columns[TWIST])
-            write_table(folder / file, columns)
-
-    return made
+    return rewritten(lambda c: c | dict(zip((HUB, TWIST), change_of(c[HUB], c[TWIST]), strict=True)), *FILES)
 
 
 def clock(factor, file):
@@ -60,8 +54,7 @@ def drives_exchanged(folder):
 
 
 def without_speed(folder):
-    columns = dict(read_table(folder / "b.csv", "b.csv").columns)
-    write_table(folder / "b.csv", {name: values for name, values in columns.items() if name != SPEED})
+    rewritten(lambda columns: {name: values for name, values in columns.items() if name != SPEED}, "b.csv")(folder)
 
 
 # name: campaign, what is done to it, words of which the first sentence about the train records must hold one.

@@ -32,7 +32,6 @@ class Bowl(Problem):  # type: ignore[misc]
         self.batches: list[Array] = []
 
     def unit(self, X: Array) -> Array:
-        """Candidates as points of the unit cube."""
         return np.asarray((X - self.xl) / (self.xu - self.xl))
 
     def _evaluate(self, X: Array, out: dict[str, Any], *_: Any, **__: Any) -> None:
@@ -45,7 +44,6 @@ class Bowl(Problem):  # type: ignore[misc]
 
 
 def identifier(name: str, **options: Any) -> Identifier:
-    """An identifier of the catalogue or composed of some."""
     return identifier_of(name, IDENTIFIERS).with_options(options)
 
 
@@ -56,6 +54,5 @@ def asked_of(problem: Bowl) -> tuple[Array, Array]:
 
 
 def ran(name: str, problem: Problem, budget: int = 300, seed: int = 1, **options: Any) -> Result:
-    """The result of one run with pymoo's own termination."""
     algorithm = identifier(name, **options).build(budget)
     return minimize(problem, algorithm, ("n_eval", budget), seed=seed, copy_algorithm=False)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
@@ -14,11 +13,9 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 from searches import Bowl, asked_of, identifier, ran
 
-from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
 from armid.identifiers.chain import spread
 
-Array = NDArray[np.float64]
 OWN = IDENTIFIERS | {
     "mine": as_identifier("mine", NelderMead), "evolution": as_identifier("evolution", lambda budget: DE(pop_size=10)),
     "adapted": as_identifier("adapted", CMAES),
@@ -60,37 +57,6 @@ def test_a_swarm_in_a_chain_has_the_inertia_schedule_of_its_share() -> None:
     seed = int(np.random.default_rng(1).integers(1, 2**31 - 1))
     minimize(alone, identifier("pso", n_particles=8, velocity_limit=0.2).build(64), seed=seed)
     np.testing.assert_array_equal(asked_of(problem)[0][:64], asked_of(alone)[0])
-
-
-@pytest.mark.parametrize(("name", "options", "sentence"), [
-    ("pso+bobqya", {}, "identifier 'bobqya' is not known: did you mean 'bobyqa'?"),
-    ("psoo", {}, "identifier 'psoo' is not known: did you mean 'pso'?"),
-    ("pso+", {}, "identifier '' is not known"),
-    ("bobyqa+pso", {}, "identifier 'pso' is global, in a chain it is expected to be the first"),
-    ("multistart:pso", {}, "identifier 'pso' is global, multistart: expects a local one"),
-    ("multistart:pso+bobyqa", {}, "identifier 'pso' is global"),
-    ("multistart:multistart:bobyqa", {}, "'multistart:bobyqa' is global"),
-    ("pso+evolution", {}, "'evolution' takes no start x0, in a chain it is expected to be the first"),
-    ("multistart:evolution", {}, "'evolution' takes no start x0, multistart: expects one that does"),
-    ("pso+bobyqa", {"velocity_limit": 0.2}, "no option 'velocity_limit', did you mean 'pso.velocity_limit'?"),
-    ("pso+bobyqa", {"velocity_limt": 0.2}, "known: share; those of a phase carry its name, pso.OPTION, bobyqa.OPTION"),
-    ("multistart:bobyqa", {"tol": 1}, "has no option 'tol', those of a phase carry its name, bobyqa.OPTION"),
-    ("pso+bobyqa", {"pso.velocity_limt": 0.2}, "no option 'velocity_limt', did you mean 'velocity_limit'?"),
-    ("pso+bobyqa", {"psoo.c1": 0.2}, "'pso+bobyqa' has no option 'psoo.c1', did you mean 'pso.c1'?"),
-    ("pso+bobyqa", {"shares": 0.2}, "'pso+bobyqa' has no option 'shares', did you mean 'share'?"),
-    ("pso+bobyqa", {"share": 1.0}, "share is 1.0, expected 1 shares of the budget with a sum below 1"),
-    ("pso+bobyqa", {"share": "0.5:0.2"}, "share is '0.5:0.2', expected 1 shares"),
-    ("pso+bobyqa", {"share": "half"}, "share is 'half', expected a number above 0"),
-    ("pso+bobyqa", {"share": 0}, "share is 0, expected a number above 0 and at most 1"),
-    ("pso+bobyqa+sbplx", {"share": 0.5}, "share is 0.5, expected 2 shares"),
-    ("multistart:bobyqa", {"tolerance": 0.1}, "has no option 'tolerance', did you mean 'bobyqa.tolerance'?"),
-    ("multistart:bobyqa", {"bobyqa.tol": 0.1}, "'bobyqa' has no option 'tol'"),
-    ("mine+bobyqa", {"mine.size": 3}, "identifier 'mine' takes no options, 'size' was given"),
-])  # fmt: skip
-def test_refused_in_a_sentence(name: str, options: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(ArmidError) as refusal:
-        identifier_of(name, OWN).with_options(options).build(100)
-    assert sentence in str(refusal.value)
 
 
 def test_capabilities_of_the_composed_are_those_of_their_parts() -> None:

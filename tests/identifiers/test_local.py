@@ -10,7 +10,6 @@ from searches import Bowl, identifier, ran
 
 from armid.identifiers.least_squares import CENTRAL, FORWARD, slopes, stencil
 from armid.identifiers.nlopt import ALGORITHMS, Calls, optimised
-from armid.identifiers.search import Height, NoFitnessError, pulled
 
 Array = NDArray[np.float64]
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")
@@ -83,18 +82,6 @@ def test_where_all_fails_the_budget_is_the_end() -> None:
     result = ran("bobyqa", Bowl(fail_above=-1.0), 30)
     assert result.algorithm.evaluator.n_eval == 30
     assert result.X is None
-
-
-def test_a_start_on_the_bound_is_pulled_inside() -> None:
-    np.testing.assert_array_equal(pulled(np.array([0.0, 0.4, 1.0])), [0.001, 0.4, 0.999])
-
-
-def test_failures_get_a_finite_height_above_all_that_was_seen() -> None:
-    height = Height()
-    with pytest.raises(NoFitnessError):
-        height.of(np.inf)
-    assert [height.of(f) for f in (4.0, 1.0, 8.0)] == [1.0, 0.25, 2.0]
-    assert height.of(np.inf) == 2.0 * 2.0 - 0.25
 
 
 def quadratic(u: Array) -> Array:

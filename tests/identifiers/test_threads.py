@@ -30,15 +30,10 @@ def _none_is_left() -> Any:
 
 
 @pytest.mark.parametrize("name", IN_THREADS)
-def test_none_is_left_after_a_run_that_the_budget_ends(name: str) -> None:
+def test_none_is_left_after_a_run_that_the_budget_ends_or_that_is_dropped_in_the_middle(name: str) -> None:
     ran(name, Bowl(), 30)
     assert ours() == []
-
-
-@pytest.mark.parametrize("name", IN_THREADS)
-def test_none_is_left_when_it_is_dropped_in_the_middle(name: str) -> None:
-    problem = Bowl()
-    algorithm = identifier(name).build(300).setup(problem, seed=1, termination=("n_eval", 300))
+    algorithm = identifier(name).build(300).setup(Bowl(), seed=1, termination=("n_eval", 300))
     while not ours():
         algorithm.next()
     assert len(ours()) == 1
@@ -48,8 +43,6 @@ def test_none_is_left_when_it_is_dropped_in_the_middle(name: str) -> None:
 
 
 class Broken(Problem):  # type: ignore[misc]
-    """The bowl until something raises."""
-
     def __init__(self, error: BaseException, after: int) -> None:
         self.bowl, self.error, self.left = Bowl(), error, after
         super().__init__(n_var=3, n_obj=1, xl=self.bowl.xl, xu=self.bowl.xu)

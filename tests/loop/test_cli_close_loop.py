@@ -6,18 +6,11 @@ import shutil
 import pytest
 from few_candidates import CANDIDATES, COMMON, STROKES
 
-from armid.cli.main import main
 from armid.estimation.least_squares import descend
+from commands import ended
 
 TWO_LACKING = (*STROKES, "--effect", "coulomb=30", "tilt_deg=2")
 IN_ONE_THREAD = ("--candidates", ",".join(CANDIDATES), "--threads", 1)
-
-
-def run(*arguments):
-    """Return the exit code of a command."""
-    with pytest.raises(SystemExit) as left:
-        main(["close-loop", *map(str, arguments)])
-    return left.value.code
 
 
 @pytest.mark.slow
@@ -25,7 +18,7 @@ def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
     campaign = shutil.copytree(stand(*COMMON, "--effect", "supply_sag=0.010"), tmp_path / "campaign")
     with (campaign / "campaign.toml").open("a") as file:
         file.write("R = 0.001\n")
-    assert run(campaign, "--out", tmp_path / "out", *IN_ONE_THREAD[:2]) == 0
+    assert ended("close-loop", campaign, "--out", tmp_path / "out", *IN_ONE_THREAD[:2]) == 0
     printed = capsys.readouterr().out
     assert "supply_sag" in printed
     assert "verdict: explained" in printed
@@ -41,26 +34,8 @@ def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
     for wanted in ("Explained: The declared model lacked supply_sag", "+     supply_sag.supply = ", "armid close-loop ",
                    "What supply_sag would explain", "Error on the records held out"):  # fmt: skip
         assert wanted in page, wanted
-    with pytest.raises(SystemExit) as left:
-        main(["report", str(tmp_path / "out")])
-    assert left.value.code == 0
+    assert ended("report", tmp_path / "out") == 0
     assert (tmp_path / "out" / "report.html").read_text() == page
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "sentence"),
-    [
-        ("--candidates", "colomb", "effect 'colomb' is not known: did you mean 'coulomb'?"),
-        ("--without", "tillt", "effect 'tillt' is not known: did you mean 'tilt'?"),
-        ("--bounds", "p0=3", "is not of the form LOW:HIGH"),
-    ],
-)
-def test_bad_option_is_one_sentence_and_writes_nothing(paper_arm_folder, tmp_path, capsys, option, value, sentence):
-    assert run(paper_arm_folder, "--out", tmp_path / "out", option, value) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +49,7 @@ def whole(stand, tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("armid.loop.fit.descend", counted)
-        assert run(campaign, "--out", out, *IN_ONE_THREAD) == 0
+        assert ended("close-loop", campaign, "--out", out, *IN_ONE_THREAD) == 0
     assert not (out / "progress.jsonl").exists()
     return campaign, (out / "report.json").read_bytes(), len(made)
 
@@ -82,7 +57,7 @@ def whole(stand, tmp_path_factory):
 @pytest.mark.slow
 def test_the_result_is_the_same_on_any_number_of_threads(whole, tmp_path):
     campaign, report, _ = whole
-    assert run(campaign, "--out", tmp_path, *IN_ONE_THREAD[:-1], 3) == 0
+    assert ended("close-loop", campaign, "--out", tmp_path, *IN_ONE_THREAD[:-1], 3) == 0
     assert (tmp_path / "report.json").read_bytes() == report
     assert len(json.loads(report)["effects"]) == 2
 
@@ -100,7 +75,7 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_pat
 
     monkeypatch.setattr("armid.loop.fit.descend", counted)
     stop_at = n_whole - 5
-    assert run(campaign, "--out", tmp_path, *IN_ONE_THREAD) == 130
+    assert ended("close-loop", campaign, "--out", tmp_path, *IN_ONE_THREAD) == 130
     kept = tmp_path / "progress.jsonl"
     assert f"kept in {kept}: the same command goes on" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [kept]
@@ -111,7 +86,7 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_pat
 
     made.clear()
     stop_at = None
-    assert run(campaign, "--out", tmp_path, *IN_ONE_THREAD) == 0
+    assert ended("close-loop", campaign, "--out", tmp_path, *IN_ONE_THREAD) == 0
     assert len(made) == 5 + 1
     assert not kept.exists()
     assert (tmp_path / "report.json").read_bytes() == report

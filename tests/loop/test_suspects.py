@@ -25,7 +25,6 @@ def campaign(stand):
 
 @pytest.fixture(scope="module")
 def sound(campaign):
-    """The loop closed on the campaign as it is."""
     return close_loop(Model(ARM), campaign, CANDIDATES)
 
 

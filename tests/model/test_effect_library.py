@@ -48,14 +48,6 @@ def test_ranges_cover_what_a_real_arm_has_with_room():
         assert p.low <= weak <= p.high, name
 
 
-def test_every_effect_of_the_specification_is_there():
-    assert all(name == effect.name for name, effect in EFFECTS.items())
-    named = {name.split(".")[0] for name in MAGNITUDES}
-    also = {"torque_offset", "asymmetric_viscous", "output_lag", "load_friction", "cogging", "torque_constant_droop",
-            "dead_zone", "presliding"} | TWO_INERTIAS  # fmt: skip
-    assert named | also <= set(EFFECTS)
-
-
 @pytest.mark.parametrize("axis", [linear_axis, rotary_axis], ids=["linear", "rotary"])
 def test_what_is_not_of_the_arm_alone_fits_an_axis(axis):
     assert set(applicable(EFFECTS, axis)) == set(EFFECTS) - ARM_ONLY - TWO_INERTIAS
@@ -95,7 +87,6 @@ def test_an_effect_comes_in_the_form_that_fits():
 
 
 def level(level):
-    """A constant."""
     return level
 
 

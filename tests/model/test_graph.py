@@ -17,7 +17,6 @@ LEVEL = (Parameter("level", "effort", 0.0, 1.0, null=0.0),)
 
 
 def bound(model: Model, key: str) -> dict[str, str]:
-    """Argument -> key of a node."""
     return dict(model.graph.nodes[key].arguments)
 
 

@@ -36,23 +36,6 @@ def test_minus_takes_away_by_name_or_effect() -> None:
         Model(ARM) - "coulomb"
 
 
-def test_parameters_come_in_si() -> None:
-    parameters = (Model(ARM) + COULOMB + VISCOUS).parameters
-    assert (parameters["p0"].unit, parameters["p0"].low, parameters["p0"].high) == ("Pa", 2.6e6, 3.5e6)
-    level, slope = parameters["coulomb.level"], parameters["viscous.slope"]
-    assert (level.unit, level.low, level.high, level.null) == ("N m", 0.0, 500.0, 0.0)
-    assert (slope.unit, slope.high) == ("N m s/rad", 250.0)
-    assert parameters["coulomb.width"].fixed == pytest.approx(0.01)
-
-
-def test_constants_are_known_by_name() -> None:
-    model = Model(ARM)
-    values = dict(zip(model.constants, model.constant_values({"R": 0.5})))
-    assert (values["R"], values["U"]) == (0.5, 28.0)
-    with pytest.raises(ArmidError, match="'Rx'"):
-        model.constant_values({"Rx": 1.0})
-
-
 @pytest.mark.parametrize(("model", "file"), [
     (Model(ARM) + COULOMB + VISCOUS, "arm_with_friction.txt"),
     (Model(PLANTS["driven_axis"]) + EFFECTS["torque_offset"], "axis_with_offset.txt"),

@@ -11,7 +11,6 @@ from armid.errors import ArmidError
 from armid.loop.candidates import EffectKey, constant_effects
 from armid.model import PLANTS, Manoeuvre, Model, Scales
 from armid.model.plants import flexible_link as link
-from armid.model.plants import shell_transfer_arm as arm
 
 PLANT = PLANTS["shell_transfer_arm"]
 
@@ -39,58 +38,6 @@ def test_the_arm_offers_its_ports() -> None:
         "torque", "gravity", "inertia", "drive", "flux", "winding", "supply", "gas", "feedback", "command", "output",
     ]  # fmt: skip
     assert list(PLANTS["driven_axis"].ports) == ["torque", "drive", "output"]
-
-
-def test_inertia_is_that_of_equation_two() -> None:
-    by_hand = 2 * 2e-3 * 120**2 * 0.97**2 * 0.55 + 4e-3 * 60**2 * 0.97 * 0.55 + 1.2e-2 * 24**2 * 0.55 + 64.0
-    found = arm.total_inertia(2e-3, 4e-3, 1.2e-2, 64.0, 120.0, 60.0, 24.0, 0.97, 0.97, 0.55, 0.0)
-    assert found == pytest.approx(by_hand)
-
-
-def test_gravity_is_that_of_equation_four() -> None:
-    moment, angle = arm.gravity_moment(72.5, 118.0, 0.4106, 0.58, 1.0, 9.81), 0.7
-    along, upright = (f(moment, math.radians(5.0), 0.0) for f in (arm.gravity_level, arm.gravity_upright))
-    torque = arm.gravity_torque(along, math.cos(angle), upright, math.sin(angle))
-    assert torque == pytest.approx(118.0 * 9.81 * 0.58 * math.cos(angle + math.radians(5.0)))
-
-
-def test_the_shell_makes_the_difference_of_its_mass() -> None:
-    """45.5 kg at 0.85 m from the trunnion."""
-    loaded, empty = (arm.gravity_moment(72.5, 118.0, 0.4106, 0.58, shell, 1.0) for shell in (1.0, 0.0))
-    assert loaded - empty == pytest.approx(45.5 * 0.85, rel=1e-3)
-    loaded, empty = (arm.arm_inertia(31.1, 64.0, shell) for shell in (1.0, 0.0))
-    assert loaded - empty == pytest.approx(45.5 * 0.85**2, rel=1e-3)
-
-
-def test_the_threshold_circuit_has_a_soft_dead_zone_and_a_limit() -> None:
-    demand = np.array([0.0, 0.3, -0.5, 0.5, 0.6, -3.5, 28.5, 28.4, 90.0, -90.0])
-    expected = [0.0, 0.0, 0.0, 0.0, 0.1, -3.0, 28.0, 27.9, 28.0, -28.0]
-    np.testing.assert_allclose(arm.voltage(demand, 0.5, 28.0), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize(("start", "target", "sign"), [(-0.8, 0.4, 1.0), (0.4, -0.8, -1.0)])
-def test_the_open_loop_drives_towards_the_target(start: float, target: float, sign: float) -> None:
-    direction = arm.direction(start, target)
-    demand = arm.demand(0.0, 280.0, target, start, 70.0, 0.0, 0.0, 0.0, direction, 28.0, 0.5)
-    assert arm.voltage(demand, 0.5, 28.0) == pytest.approx(28.0 * sign)
-
-
-def test_the_closed_loop_is_proportional_and_derivative() -> None:
-    assert arm.demand(1.0, 280.0, 0.4, 0.3, 70.0, 0.2, 0.01, 0.5, 1.0, 28.0, 0.5) == pytest.approx(
-        280.0 * 0.1 - 70.0 * 0.21 + 0.5
-    )
-
-
-def test_the_current_brakes_when_its_sign_turns() -> None:
-    flux = arm.field_flux(4.5e-5, np.array([-30.0, 30.0]), 0.0)
-    assert np.all(flux > 0.0)
-    assert np.array_equal(np.sign(arm.motor_torque(20.0, flux, np.array([-30.0, 30.0]))), [-1.0, 1.0])
-
-
-def test_the_gas_starts_on_its_polytrope() -> None:
-    volume = 0.4e-3 - 1.9635e-3 * 0.06 * math.radians(7.0)
-    pressure = arm.start_pressure(3.05e6, 1.4, 0.4e-3, 1.9635e-3, 0.06, math.radians(-48.0), math.radians(-55.0))
-    assert pressure == pytest.approx(3.05e6 * (0.4e-3 / volume) ** 1.4)
 
 
 def test_a_speed_in_metres_makes_the_scales_those_of_a_force() -> None:

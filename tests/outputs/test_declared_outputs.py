@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from two_inertias import INTERVAL, NOISE_ANGLE, NOISE_SPEED, TRUTH, drive, oracle, two_inertias, write_drive
 
-from armid.cli.main import main
 from armid.contract.equations import check_effects, check_plant
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
@@ -15,6 +14,7 @@ from armid.model import EFFECTS, PLANTS, Manoeuvre, Model, Output
 from armid.model.effects.sensor import sensor_effects
 from armid.record import read_campaign
 from armid.record.table import read_table
+from commands import ended
 
 START = np.array([0.1, 0.5, 0.05, 0.4])
 STARTS = dict(zip(("start_motor", "start_motor_speed", "start_load", "start_load_speed"), START, strict=True))
@@ -95,9 +95,7 @@ def test_simulate_writes_every_output(tmp_path) -> None:
     folder = write_drive(tmp_path / "drive", more="".join(f"constants.{name} = 0.0\n" for name in STARTS))
     plugin = f"--plugin={Path(__file__).parent / 'two_inertias.py'}:two_inertias"
     values = [f"--set={name}={value}" for name, value in TRUTH.items()]
-    with pytest.raises(SystemExit) as ended:
-        main(["simulate", str(folder), plugin, *values, "--out", str(tmp_path / "out")])
-    assert not ended.value.code
+    assert ended("simulate", folder, plugin, *values, "--out", tmp_path / "out") == 0
     table = read_table(tmp_path / "out" / "b.csv", "b.csv").columns
     assert list(table) == ["time_s", "motor_speed_rad_s", "load_angle_deg", "deflection_rad",
                            "load_speed_rad_s"]  # fmt: skip

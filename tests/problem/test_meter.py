@@ -1,7 +1,6 @@
 """The meter alone, and the termination that looks at it."""
 
 import copy
-import pickle
 from types import SimpleNamespace
 
 import numpy as np
@@ -74,14 +73,6 @@ def test_what_was_recorded_is_a_copy() -> None:
     assert meter.log().X.max() == 1.0
     assert meter.best_x is not None
     assert (meter.best_f, meter.best_x.max()) == (1.0, 1.0)
-
-
-def test_survives_pickling() -> None:
-    meter = Meter(10, 0.5)
-    simulate(meter, [1.0, 0.7])
-    twin = pickle.loads(pickle.dumps(meter))
-    simulate(twin, [0.4])
-    assert (twin.used, twin.best_f, twin.reached, meter.used) == (3, 0.4, True, 2)
 
 
 def test_refuses_what_does_not_match() -> None:

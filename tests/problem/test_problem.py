@@ -92,16 +92,6 @@ def test_a_simulation_that_really_diverges(write_axis, axis_model, tmp_path):
     assert (problem.meter.used, problem.meter.n_failed) == (2, 1)
 
 
-def test_beyond_the_budget_nothing_is_simulated(arm_space, lowering_replays):
-    counted = Counted(lowering_replays[0])
-    problem = IdentificationProblem(arm_space, (counted,), FITNESS["rmse"], Meter(3))
-    values = problem.evaluate(np.tile(TRUTH, (5, 1)))[:, 0]
-    assert (values[:3] < 1.0).all()
-    assert (values[3:] == PENALTY).all()
-    assert problem.evaluate(TRUTH)[0] == PENALTY
-    assert (counted.simulated, problem.meter.used) == (3, 3)
-
-
 def by_hand(replay, x):
     """Return measured and simulated signal, residual, and the length of the window [s]."""
     simulated = replay.signal(x[np.newaxis])[0]
@@ -125,6 +115,7 @@ def test_records_join_as_declared(paper_arm, arm, arm_space):
     chi2 = sum(np.sum((r / record.noise.rms) ** 2) for record, r in zip(records, residuals))
     assert joined["similarity"] == pytest.approx(1 - degrees[:, 0] @ seconds / seconds.sum(), rel=1e-12)
     assert joined["numerical_similarity"] == pytest.approx(1 - degrees[:, 1] @ seconds / seconds.sum(), rel=1e-12)
+    assert joined["shape_similarity"] == pytest.approx(1 - degrees[:, 2] @ seconds / seconds.sum(), rel=1e-12)
     assert joined["rmse"] == pytest.approx(np.sqrt(np.mean(np.concatenate(residuals) ** 2)), rel=1e-12)
     assert joined["nrmse"] == pytest.approx(np.sqrt(relative @ n / n.sum()), rel=1e-12)
     assert joined["likelihood"] == pytest.approx(chi2, rel=1e-12)
@@ -138,13 +129,6 @@ def test_a_deep_copy_shares_records_and_meter(arm_space, lowering_replays):
     assert twin.meter is problem.meter
     result = minimize(problem, GA(pop_size=10), MeterTermination(problem.meter), seed=1, save_history=True)
     assert result.history[0].problem.replays is problem.replays
-
-
-def test_a_candidate_does_not_see_its_neighbours(problem):
-    X = np.random.default_rng(2).uniform(problem.xl, problem.xu, (37, 4))
-    together = problem.value(X)
-    np.testing.assert_array_equal(together, [problem.value(x)[0] for x in X])
-    np.testing.assert_array_equal(together[::-1], problem.value(X[::-1]))
 
 
 def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):

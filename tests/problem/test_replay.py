@@ -7,7 +7,7 @@ import pytest
 
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
-from armid.problem.problem import accuracy_for, replay_of, replays
+from armid.problem.problem import accuracy_for, replay_of
 from armid.problem.space import space_of
 from armid.record import read_campaign
 
@@ -58,9 +58,3 @@ def test_a_given_accuracy_wins(lowering, arm, arm_space):
     assert fine.engine_error < 2e-7
     with pytest.raises(ArmidError, match="'finest' is unknown: standard or fine"):
         replay_of(lowering.train[0], arm, arm_space, "finest")
-
-
-def test_threads_change_no_bit(lowering, arm, arm_space, lowering_replays):
-    two = replays(lowering.train, arm, arm_space, threads=2)
-    candidates = arm_space.complete(np.random.default_rng(1).uniform(arm_space.low, arm_space.high, (70, 4)))
-    np.testing.assert_array_equal(two[0].signal(candidates), lowering_replays[0].signal(candidates))

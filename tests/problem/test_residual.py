@@ -10,13 +10,11 @@ from armid.problem.fitness import FITNESS
 from armid.problem.meter import RESIDUALS, Meter
 from armid.problem.problem import IdentificationProblem, replays, residuals
 
-TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 ASKED = ["F", "G", "H", RESIDUALS]
 
 
 @pytest.fixture(scope="module")
 def several(paper_arm, arm, arm_space):
-    """Records whose windows and noises differ."""
     records = [paper_arm.with_window(0.0, end).train[i] for i, end in ((0, 0.3), (3, 0.5))]
     return replays(records, arm, arm_space)
 
@@ -49,10 +47,6 @@ def test_its_sum_of_squares_is_the_fitness(several, arm_space, X, name):
     expected = {"rmse": np.sqrt(total / vectors.shape[1]), "likelihood": total}[name]
     np.testing.assert_allclose(values, expected, rtol=1e-12)
     np.testing.assert_array_equal(values, problem.value(X))
-
-
-def test_only_rmse_and_likelihood_are_sums_of_squares():
-    assert {name for name, fitness in FITNESS.items() if fitness.weigh is not None} == {"rmse", "likelihood"}
 
 
 def test_pymoo_s_evaluator_gets_it_when_it_asks(several, arm_space, X):

@@ -1,9 +1,7 @@
 """Which parameters are searched, between which bounds."""
 
 import numpy as np
-import pytest
 
-from armid.errors import ArmidError
 from armid.model import EFFECTS
 from armid.problem.space import space_of
 from armid.record import Override
@@ -47,22 +45,3 @@ def test_complete_puts_the_fixed_values_in(arm_space):
     space = arm_space.with_fixed("k", 1.0)
     whole = space.complete(np.array([[3e6, 0.5, 1.4], [2.7e6, 0.6, 1.1]]))
     np.testing.assert_array_equal(whole, [[3e6, 1.0, 0.5, 1.4], [2.7e6, 1.0, 0.6, 1.1]])
-
-
-@pytest.mark.parametrize(("asked", "fragments"), [
-    ({"bounds": {"p1": (1.0, 2.0)}}, ["'p1'", "known: p0, k, eta3, n"]),
-    ({"fixed": {"eta": 1.0}}, ["'eta'", "did you mean 'eta3'"]),
-    ({"fixed": {"coulomb.level": 1.0}}, ["'coulomb.level'", "not in the model"]),
-    ({"bounds": {"p0": (3.0, 2.0)}}, ["'p0'", "3 and 2", "low < high"]),
-    ({"bounds": {"p0": (3.0, 3.0)}}, ["low < high"]),
-    ({"bounds": {"p0": (np.nan, 3.0)}}, ["finite"]),
-    ({"bounds": {"p0": (0.0, np.inf)}}, ["finite"]),
-    ({"fixed": {"p0": np.nan}}, ["'p0'", "finite"]),
-    ({"fixed": {"p0": -np.inf}}, ["'p0'", "finite"]),
-    ({"bounds": {"p0": (1.0, 2.0)}, "fixed": {"p0": 1.0}}, ["'p0'", "both", "one of them"]),
-])  # fmt: skip
-def test_refused(arm, asked, fragments):
-    with pytest.raises(ArmidError) as refusal:
-        space_of(arm, **asked)
-    for fragment in fragments:
-        assert fragment in str(refusal.value)

@@ -122,13 +122,6 @@ def test_own_plants_and_effects_can_be_named(write_two):
         read_campaign(folder, plants={"driven_axis": PLANTS["driven_axis"]})
 
 
-def test_further_columns_are_kept_on_the_grid(write, arm_columns):
-    columns = {**arm_columns, "current_A": arm_columns["time_s"] * 10}
-    record = read_campaign(write(lower=columns)).records[0]
-    assert list(record.columns) == ["current_A"]
-    np.testing.assert_array_equal(record.columns["current_A"], columns["current_A"][100:])
-
-
 @pytest.mark.parametrize("encode", [
     lambda text: b"\xef\xbb\xbf" + text,
     lambda text: text.replace(b"\n", b"\r\n"),
@@ -142,12 +135,6 @@ def test_spellings_of_csv(write, encode):
     file = folder / "lower.csv"
     file.write_bytes(encode(file.read_bytes()))
     np.testing.assert_array_equal(read_campaign(folder).records[0].measured, plain)
-
-
-def test_rad_per_second_needs_no_factor(write, arm_columns):
-    speed = arm_columns["angular_velocity_deg_s"] * DEGREE
-    folder = write(lower={"time_s": arm_columns["time_s"], "angular_velocity_rad_s": speed})
-    np.testing.assert_array_equal(read_campaign(folder).records[0].measured, speed[100:])
 
 
 def test_a_record_may_lie_deeper_or_be_linked_inside(write):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from armid.cli.main import main
 from armid.errors import ArmidError
 from armid.record import read_campaign
 from armid.record.importers import import_dfki, import_emps, velocity_of
+from commands import ended
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 NOT_AT_HAND = "the measured files are no part of the repository: ARMID_MEASURED names the folder that holds them"
@@ -30,7 +30,6 @@ def variables(amplitude=0.1):
 
 @pytest.fixture
 def emps(tmp_path):
-    """Return a folder with a synthetic set."""
     folder = tmp_path / "set"
     folder.mkdir()
     savemat(folder / "DATA_EMPS.mat", variables())
@@ -153,7 +152,6 @@ def write_dfki(folder, name, table):
 
 @pytest.fixture
 def dfki(tmp_path):
-    """Return a folder with a synthetic set."""
     folder = tmp_path / "set"
     folder.mkdir()
     for name, interval in zip(DFKI_RECORDS, (0.002, 0.003), strict=True):
@@ -183,13 +181,10 @@ def test_campaign_of_a_synthetic_pendulum(dfki, tmp_path):
 @pytest.mark.slow
 def test_nothing_free_is_identified_through_the_command(dfki, tmp_path, capsys):
     out = tmp_path / "out"
-    with pytest.raises(SystemExit) as left:
-        main(["import", "dfki", str(dfki), "--out", str(out), "--holdout", "ddp"])
-    assert left.value.code == 0
+    assert ended("import", "dfki", dfki, "--out", out, "--holdout", "ddp") == 0
     # the records are made with other constants than those from CAD, which the screen of records sees
-    with pytest.raises(SystemExit) as left, pytest.warns(UserWarning, match="fixed values that were given look wrong"):
-        main(["identify", str(out), "--fitness", "rmse", "--budget", "12000"])
-    assert left.value.code == 0
+    with pytest.warns(UserWarning, match="fixed values that were given look wrong"):
+        assert ended("identify", out, "--fitness", "rmse", "--budget", "12000") == 0
     held = read_campaign(out)
     assert ([r.file for r in held.train], [r.file for r in held.holdout]) == (["direct_collocation.csv"], ["ddp.csv"])
     text = capsys.readouterr().out

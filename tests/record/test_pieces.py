@@ -52,15 +52,12 @@ def test_steps_of_a_sensor_at_rest_do_not_average_out():
     assert deviation["start_position"] == pytest.approx(0.01 / np.sqrt(12))
 
 
-def test_a_clean_record_starts_exactly(write_axis, axis_columns):
+def test_a_clean_record_starts_exactly_and_a_machine_at_rest_needs_no_measured_start(write, write_axis, axis_columns):
+    assert read_campaign(write()).records[0].pieces[0].start_deviation == {}
     pieces = read_campaign(write_axis("restart_s = 1.0\n")).records[0].pieces
     for piece in pieces:
         assert piece.manoeuvre.constants["start_speed"] == axis_columns["velocity_m_s"][piece.start_index]
         assert set(piece.start_deviation) == {"start_position", "start_speed"}
-
-
-def test_a_machine_at_rest_has_no_measured_start(write):
-    assert read_campaign(write()).records[0].pieces[0].start_deviation == {}
 
 
 @pytest.mark.parametrize(("window", "expected"), [
@@ -79,7 +76,7 @@ def test_both_ends_count(write, window, expected):
     assert record.measured.size == record.pieces[0].measured.size == 1201
 
 
-def test_a_caller_overrides_the_window(write):
+def test_a_caller_overrides_the_window_with_which_the_simulation_can_end(write):
     folder = write()
     toml = folder / "campaign.toml"
     toml.write_text(toml.read_text() + "window_s = [0.5, 0.6]\n")
@@ -88,10 +85,7 @@ def test_a_caller_overrides_the_window(write):
     assert campaign.records[0].pieces[0].window == slice(500, 601)
     assert wide.records[0].pieces[0].window == slice(0, 701)
     assert wide.with_window(0.1, 0.2).records[0].pieces[0].window == slice(100, 201)
-
-
-def test_what_is_simulated_can_end_with_the_window(write):
-    piece = read_campaign(write()).with_window(0.3, 0.7).records[0].pieces[0].until_window_end()
+    piece = wide.with_window(0.3, 0.7).records[0].pieces[0].until_window_end()
     assert piece.manoeuvre.n_samples == piece.measured.size == 701
     assert piece.window == slice(300, 701)
 
@@ -110,13 +104,10 @@ def test_refused_windows(write, begin, end, found):
         read_campaign(folder)
 
 
-def test_a_window_without_motion_is_refused(write, arm_columns):
+def test_a_window_without_motion_or_without_a_piece_is_refused(write, write_axis, arm_columns):
     speed = np.where(arm_columns["time_s"] > 1.0, 3.0, arm_columns["angular_velocity_deg_s"])
     folder = write(lower={**arm_columns, "angular_velocity_deg_s": speed})
     with pytest.raises(ArmidError, match=r"lower\.csv is constant in the window"):
         read_campaign(folder).with_window(1.1, 1.2)
-
-
-def test_a_window_that_no_restarted_piece_fills_is_refused(write_axis):
     with pytest.raises(ArmidError, match=r"no piece of move\.csv"):
         read_campaign(write_axis("restart_s = 0.026\nwindow_s = [1.0, 1.025]\n"))

@@ -21,23 +21,19 @@ SVG = """<?xml version="1.0"?>
 
 
 def errors(rmse: float) -> dict[str, float]:
-    """Return the errors of some records."""
     return {"rmse": rmse, "nrmse": 0.01, "chi2_per_sample": 2.0, "s": 0.99, "s1": 0.98, "s2": 1.0}
 
 
 def parameter(value: float, unit: str = "1", sure: bool = True) -> dict[str, Any]:
-    """Return one parameter of a loop."""
     return {"value": value, "unit": unit, "low": 0.9 * value, "high": 1.1 * value, "trusted": sure}
 
 
 def curve(n: int, size: float) -> dict[str, list[float]]:
-    """Return a curve."""
     x = np.linspace(0.0, 1.2, n)
     return {"x": list(x), "y": list(size * np.sin(9.0 * x))}
 
 
 def made_by(command: str) -> dict[str, Any]:
-    """Return what made a result."""
     return {"command": command, "settings": {"seed": 1, "plugins": [], "window": ""}}
 
 
@@ -57,7 +53,6 @@ def loop_report(name: str = "arm") -> dict[str, Any]:
 
 
 def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> dict[str, Any]:
-    """Return details.json of the same loop."""
     record = {"role": "train", "n_samples": n_points, "noise_rms": 0.004,
               "error": {"before": errors(0.02), "after": errors(0.005)},
               "curves": {"before": curve(n_points, 0.03), "after": curve(n_points, 0.004)}}  # fmt: skip
@@ -79,7 +74,6 @@ def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> 
 
 
 def write_loop(folder: Path, name: str = "arm", details: bool = True, figures: bool = True) -> Path:
-    """Write a folder of `armid close-loop`."""
     folder.mkdir()
     (folder / "report.json").write_text(json.dumps(loop_report(name)))
     if details:

@@ -17,7 +17,7 @@ from armid.cli.main import main
 from armid.cli.report import LOOP, document_of, kind_in, refuse_damaged
 from armid.errors import ArmidError
 from armid.loop.document import loop_document
-from armid.report.document import Document, Line, Listing, Section, Sentences, changed, table, varying
+from armid.report.document import Document, Line, Listing, Section, Sentences, table, varying
 from armid.report.files import csv, latex
 from armid.report.html import html, inline
 from armid.report.markdown import markdown
@@ -192,11 +192,6 @@ def test_a_study_gives_its_answer_state_tables_and_file(capsys):
     assert "Words of made_up." in shown
 
 
-def test_what_comes_and_goes_is_marked():
-    lines = changed("a\nb\nc", "a\nB\nc\nd")
-    assert [(x.mark, x.text) for x in lines] == [("", "a"), ("-", "b"), ("+", "B"), ("", "c"), ("+", "d")]
-
-
 @pytest.mark.parametrize(("names", "said"), [
     ((), "holds no result: study.sqlite of `armid study`, report.json of `armid close-loop` or result.json of"),
     (("report.json", "result.json"), "holds report.json and result.json, which two commands wrote"),
@@ -250,7 +245,7 @@ def around(inner: str) -> str:
     return f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">{inner}</svg>'
 
 
-def test_ids_are_prefixed_where_they_are_referred_to_and_dropped_elsewhere():
+def test_a_figure_in_the_page_keeps_what_is_shown():
     made = str(inline(SVG, "f1-", "A figure"))
     assert 'id="f1-c1"' in made
     assert 'clip-path="url(#f1-c1)"' in made
@@ -258,20 +253,17 @@ def test_ids_are_prefixed_where_they_are_referred_to_and_dropped_elsewhere():
     assert "unused" not in made
     assert 'aria-label="A figure"' in made
     assert "today" not in made
-
-
-def test_coordinates_are_rounded_and_sizes_are_pixels():
-    made = str(inline(SVG, "", ""))
+    # coordinates are rounded and sizes are pixels
     assert 'd="M 0.12 10 L 450 200"' in made
     assert 'x="10.99"' in made
     assert 'width="600"' in made
     assert 'viewBox="0 0 450 225"' in made
-
-
-def test_layers_get_a_class_that_a_slider_finds():
+    # layers get a class that a slider finds
     made = str(inline(around('<g id="before"><path d="M 0 0"/></g><g id="other"/>'), "r1-", ""))
     assert 'class="layer-before"' in made
     assert "other" not in made
+    picture = str(inline(around('<image xlink:href="data:image/png;base64,AAAA" width="3" height="3"/>'), "", ""))
+    assert 'href="data:image/png;base64,AAAA"' in picture
 
 
 HOSTILE = (
@@ -294,11 +286,6 @@ def test_nothing_that_runs_or_is_fetched_comes_through():
         assert not re.search(r"\son\w+\s*=", re.sub(r'"[^"]*"', '""', made)), evil
 
 
-def test_a_picture_inside_stays():
-    made = str(inline(around('<image xlink:href="data:image/png;base64,AAAA" width="3" height="3"/>'), "", ""))
-    assert 'href="data:image/png;base64,AAAA"' in made
-
-
 def test_what_is_no_svg_and_a_bomb_of_entities_are_refused():
     levels = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))
     bomb = f'<!DOCTYPE svg [<!ENTITY l0 "lol">{levels}]><svg><text>&l11;</text></svg>'
@@ -319,18 +306,6 @@ def test_few_points_rising_with_both_ends_and_the_extremes(n, most, seed):
         assert values[kept].max() == values.max()
     if n <= most:
         assert len(kept) == n
-
-
-def test_a_single_spike_is_never_lost():
-    for where in range(0, 50_000, 997):
-        values = np.zeros(50_000)
-        values[where] = 1.0
-        assert where in thinned(values)
-
-
-@pytest.mark.parametrize("value", [0.0, 3.0])
-def test_a_constant_keeps_few_points(value):
-    assert len(thinned(np.full(10_000, value), 100)) <= 100
 
 
 def test_a_column_that_is_empty_in_some_lines_is_not_told_as_the_same_in_all():

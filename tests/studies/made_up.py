@@ -11,7 +11,6 @@ CLASSES = ("control", "single", "two", "unlisted", "one_stroke")
 
 
 def made_entry(rng: np.random.Generator) -> dict[str, Any]:
-    """Draw what may be true of a campaign."""
     label = str(rng.choice(CLASSES))
     n = {"control": 0, "two": 2, "one_stroke": int(rng.integers(0, 2))}.get(label, 1)
     names = [str(name) for name in rng.choice(NAMES, n, replace=False)]

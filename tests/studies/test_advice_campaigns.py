@@ -31,7 +31,6 @@ RAISE = {"start_angle_deg": 20.0, "target_angle_deg": -45.0, "shell": False, "su
 
 @pytest.fixture(scope="module")
 def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Make four campaigns of few strokes."""
     folder = tmp_path_factory.mktemp("advice") / "base"
     folder.with_name("proof.toml").write_text(SMALL)
     assert make_base([str(folder), "--seed", "4", "--suite", str(folder.with_name("proof.toml"))]) == 0

@@ -180,56 +180,27 @@ def test_the_fit_finds_an_arm_that_lacks_nothing() -> None:
         assert getattr(found, name) == pytest.approx(getattr(truth, name), rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["suite"], "--seed"),
-        (["suite", "--seed", "-1"], "seed must be 0"),
-        (["suite", "--seed", "1", "--only", "cool"], "no class or effect 'cool'"),
-        (["suite", "--seed", "1", "--processes", "0"], "processes must be 1"),
-        (["suite", "--seed", "1", "--suite", "none.toml"], "cannot be read"),
-        (["suite", "--seed", "1", "--suite", "empty.toml"], "lacks the key 'suite'"),
-        (["suite", "--seed", "1", "--suite", "wrong.toml"], "describes no suite"),
-        (["file", "--seed", "1"], "is a file"),
-        (["full", "--seed", "1"], "give --force"),
-        (["full", "--seed", "1", "--force"], "holds mine.txt"),
-    ],
-)
-def test_refuses_with_one_sentence_and_writes_nothing(
-    words: list[str], sentence: str, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").write_text("mine")
-    (tmp_path / "empty.toml").write_text("")
-    (tmp_path / "wrong.toml").write_text("[suite]\ncontrols =")
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "mine.txt").write_text("mine")
-    monkeypatch.chdir(tmp_path)
-    before = sorted(tmp_path.rglob("*"))
-    assert main(words) == 2
-    said = capsys.readouterr()
-    assert sentence in said.err
-    assert said.err.count("\n") == 1
-    assert sorted(tmp_path.rglob("*")) == before
+REFUSED = [
+    (main, ["suite"], "--seed"),
+    (main, ["suite", "--seed", "-1"], "seed must be 0"),
+    (main, ["suite", "--seed", "1", "--only", "cool"], "no class or effect 'cool'"),
+    (main, ["suite", "--seed", "1", "--processes", "0"], "processes must be 1"),
+    (main, ["suite", "--seed", "1", "--suite", "none.toml"], "cannot be read"),
+    (main, ["suite", "--seed", "1", "--suite", "empty.toml"], "lacks the key 'suite'"),
+    (main, ["suite", "--seed", "1", "--suite", "wrong.toml"], "describes no suite"),
+    (main, ["file", "--seed", "1"], "is a file"),
+    (main, ["full", "--seed", "1"], "give --force"),
+    (main, ["full", "--seed", "1", "--force"], "holds mine.txt"),
+    (families.main, ["made", "falt=1", "--seed", "1"], "families: 'falt=1' is no FAMILY=N: one of control, fault"),
+    (families.main, ["made", "fault=x", "--seed", "1"], "'fault=x' is no FAMILY=N"),
+    (families.main, ["made", "fault=1", "--seed", "-1"], "seed must be 0"),
+    (families.main, ["made", "fault=1", "--seed", "1", "--suite", "none.toml"], "none.toml cannot be read"),
+]
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["falt=1", "--seed", "1"], "families: 'falt=1' is no FAMILY=N: one of control, fault"),
-        (["fault=x", "--seed", "1"], "'fault=x' is no FAMILY=N"),
-        (["fault=1", "--seed", "-1"], "seed must be 0"),
-        (["fault=1", "--seed", "1", "--suite", "none.toml"], "none.toml cannot be read"),
-    ],
-)
-def test_families_refuse_with_one_sentence(
-    words: list[str], sentence: str, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert families.main(["made", *words]) == 2
-    said = capsys.readouterr()
-    assert sentence in said.err
-    assert said.err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
+def test_refuses_with_one_sentence_and_writes_nothing(refuses: Any) -> None:
+    for program, words, sentence in REFUSED:
+        refuses(program, words, sentence)
 
 
 def test_a_suite_refuses_an_effect_it_does_not_hold(tmp_path: Path) -> None:

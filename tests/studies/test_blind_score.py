@@ -110,7 +110,6 @@ def test_the_figure_shows_each_pair_with_both_records():
 
 
 def family(name, truths=(), fault=None, constants=None, dirt="none"):
-    """Return what the key of families tells of a campaign."""
     return {"class": name, "effects": [{"name": t} for t in truths], "floor": {"holdout": 0.005}, "dirt": dirt,
             "parameters": {"p0": 3e6, "k": 1.0, "eta3": 0.6, "n": 1.2}, "fault": fault or {},
             "constants": constants or {}}  # fmt: skip

@@ -150,7 +150,6 @@ def test_one_stroke_may_not_be_trusted(trusted: float, met: bool) -> None:
 
 @pytest.fixture
 def suite(tmp_path: Path) -> Path:
-    """Write a key of two campaigns and the report of one."""
     folder = tmp_path / "suite"
     key = {"campaigns": {"c000": entry("control"), "c001": entry("single", "coulomb")}}
     key_path(folder).write_text(json.dumps(key))

@@ -1,21 +1,15 @@
 """What each added effect of the stand must do: closed forms, equivalences, limits and signs."""
 
 import math
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from armid.contract.trials import middle
-from armid.engine import Schedule
-from armid.engine import simulate as simulate_all
-from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 from stand import RefusalError
 from stand.arm import KNOWN, Arm
 from stand.effects import (
     Effects,
-    drive,
     flux,
     friction,
     read_effects,
@@ -36,7 +30,6 @@ def moved(effects: Effects, name: str = "lower", duration_s: float = 0.9) -> Tra
 
 
 def states(count: int = 200) -> list[dict[str, float]]:
-    """Draw states within what a stroke meets."""
     rng = np.random.default_rng(5)
     low, high = (-0.9, -3.0, -70.0), (0.7, 3.0, 70.0)
     return [dict(zip(("angle", "speed", "current"), map(float, rng.uniform(low, high)))) for _ in range(count)]
@@ -50,7 +43,6 @@ def states(count: int = 200) -> list[dict[str, float]]:
          {"coulomb": 300.0 * LEVER, "coulomb_width": 0.004, "coulomb_tanh": 1.0}),
         ({"asymmetric_friction": 40.0, "asymmetric_share": 0.0},
          {"coulomb": 40.0, "coulomb_width": 0.002, "coulomb_tanh": 1.0}),
-        ({"line_loss": 2e4}, {"drag": 2e4 * LEVER * ARM.piston_area}),
         ({"worm_braking": 1.0},
          {"worm_loss": 1.0 - (2.0 - 1.0 / 0.55) / 0.55, "worm_width": 0.002, "worm_tanh": 1.0}),
         ({"piston_stiction": 500.0, "stiction_fade_deg": 1e9}, {"seal_friction": 500.0}),
@@ -58,11 +50,7 @@ def states(count: int = 200) -> list[dict[str, float]]:
         ({"sway": 20.0, "sway_hz": 1e-9, "sway_phase_deg": 90.0}, {"torque_offset": 20.0}),
         ({"rocking_hz": 8.0, "rocking_stop": 1e3}, {"rocking_hz": 8.0}),
         ({"base_compliance": 1e-4, "base_hz": 1e-3}, {}),
-        ({"dahl": 40.0, "dahl_stiffness": 1e6}, {"lugre": 40.0, "lugre_stiffness": 1e6, "lugre_breakaway": 1.0,
-                                                 "lugre_damping": 0.0}),
-        ({"dahl": 40.0}, {"bouc_wen": 40.0, "bouc_wen_exponent": 1.0, "bouc_wen_beta": 1.0}),
         ({"drive_compliance": 5e-11, "drive_damping": 3e5}, {}),
-        ({"cogging": 20.0, "cogging_waves": 1e-6}, {}),
     ],
     ids=lambda told: next(iter(told), "declared"),
 )  # fmt: skip
@@ -98,51 +86,6 @@ def test_friction_of_either_direction_has_its_own_size() -> None:
     assert (down, up) == pytest.approx((50.0, -30.0))
 
 
-@pytest.mark.slow
-def test_listed_effects_move_as_those_of_the_package() -> None:
-    """Equations written twice, with other numbers: slopes for ways, amperes for efforts, squares for exponents."""
-    arm, scale = PLANTS["shell_transfer_arm"], 2.0 * ARM.torque_constant * ARM.excitation * ARM.ratio_motor
-    per_square = scale * ARM.eta1 * ARM.eta2 * ARM.eta3
-    lugre, bouc_wen = (replace(e, name=e.form, forms=()) for e in EFFECTS["presliding"].forms)
-    dahl = replace(EFFECTS["presliding"], name="dahl", forms=())
-    names = ("cogging", "torque_constant_droop", "dead_zone", "drive_lag")
-    model = Model(arm, (dahl, lugre, bouc_wen, *(replace(EFFECTS[name], forms=()) for name in names)))
-    pairs = [
-        ({"dahl": 60.0}, {"dahl.level": 60.0, "dahl.way": 60.0 / 2e4}),
-        ({"lugre": 60.0, "lugre_damping": 200.0},
-         {"lugre.level": 60.0, "lugre.way": 60.0 / 2e4, "lugre.excess": 0.5, "lugre.fade": 0.15,
-          "lugre.damping": 0.01}),
-        ({"bouc_wen": 60.0}, {"bouc_wen.level": 60.0, "bouc_wen.way": 60.0 / 2e4, "bouc_wen.unloading": 0.5}),
-        ({"cogging": 30.0, "cogging_second": -0.4},
-         {"cogging.sine": 30.0, "cogging.waves": 24.0, "cogging.second": -0.4}),
-        ({"torque_droop": 200.0, "droop_exponent": 4.0},
-         {"torque_constant_droop.sharpness_squared": (per_square * 200.0**2) ** -2}),
-        ({"drive_dead_zone": 40.0}, {"dead_zone.zone": 40.0}),
-        ({"actuator_lag": 0.02}, {"drive_lag.time_constant": 0.02}),
-    ]  # fmt: skip
-    told = {"p0": ARM.p0, "k": ARM.k, "eta3": ARM.eta3, "n": ARM.n}
-    rest = told | {n: float(middle(p) if p.null is None else p.null) for n, p in model.parameters.items() if "." in n}
-    candidates = np.array(
-        [
-            [*(rest | {"dahl.width": 5e-4, "lugre.width": 5e-4, "bouc_wen.width": 5e-4} | values).values()]
-            for _, values in pairs
-        ]
-    )
-    found = simulate_all(model, Manoeuvre(1e-3, 901), candidates, Schedule(8)).output
-    declared = moved(Effects()).gyro
-    for (effects, _), signal in zip(pairs, found, strict=True):
-        expected = moved(Effects(**effects)).gyro
-        assert np.abs(expected - declared).max() > 0.02, effects
-        assert np.abs(signal - expected).max() < 2e-3, effects
-
-
-def test_the_exponent_of_stribeck_shapes_how_it_fades() -> None:
-    for exponent in (1.0, 2.0):
-        effects = Effects(stribeck=40.0, stribeck_exponent=exponent, stribeck_tanh=1.0)
-        found = friction(ARM, effects, {"speed": 0.3})
-        assert found == pytest.approx(40.0 * math.exp(-(2.0**exponent)))
-
-
 def test_stribeck_can_fade_rationally() -> None:
     effects = Effects(stribeck=40.0, stribeck_speed=0.1, stribeck_rational=1.0, stribeck_tanh=1.0)
     assert friction(ARM, effects, {"speed": 0.3}) == pytest.approx(4.0)
@@ -154,27 +97,12 @@ def test_the_root_saturates_at_its_current() -> None:
     assert flux(ARM, root, {"current": 1e7}) == pytest.approx(ARM.excitation * 100.0, rel=1e-4)
 
 
-def test_atan_saturates_as_its_series_says() -> None:
-    """K I_s atan(x) = K I (1 - x^2/3 + ...), x = I/I_s, and K I_s pi/2 in the end; the rational form bends at once."""
-    bent = Effects(flux_atan=100.0)
-    assert flux(ARM, bent, {"current": -10.0}) == pytest.approx(ARM.excitation * 10.0 * (1.0 - 0.01 / 3.0), rel=1e-4)
-    assert flux(ARM, bent, {"current": 1e7}) == pytest.approx(ARM.excitation * 100.0 * math.pi / 2.0, rel=1e-4)
-    rational = flux(ARM, Effects(flux_saturation=100.0), {"current": 10.0})
-    assert rational == pytest.approx(ARM.excitation * 10.0 / 1.1)
-
-
 def test_a_fading_motor_loses_torque_with_the_charge() -> None:
     effects = Effects(motor_fade=0.01)
     fresh, worn = (flux(ARM, effects, {"current": 50.0, "charge": charge}) for charge in (0.0, 25.0))
     assert worn == pytest.approx(fresh / 1.25)
     passed = moved(effects).states
     assert passed["charge"][-1] == pytest.approx(np.trapezoid(np.abs(passed["current"]), dx=1e-3), rel=1e-3)
-
-
-def test_the_gain_of_the_drive_is_a_factor_of_its_torque_and_not_of_the_back_emf() -> None:
-    for now in states(20):
-        assert drive(ARM, Effects(drive_gain=0.07), now) == pytest.approx(1.07 * drive(ARM, Effects(), now))
-        assert flux(ARM, Effects(drive_gain=0.07), now) == flux(ARM, Effects(), now)
 
 
 @pytest.mark.parametrize(("speed", "current", "expected"), [(1, 9, 0.55), (-1, -9, 0.55), (1, -9, 2 - 1 / 0.55)])
@@ -193,24 +121,6 @@ def test_a_worm_rubs_less_the_faster_it_slides() -> None:
     assert found[0] == pytest.approx(1.0)
     assert sorted(found, reverse=True) == found
     assert relative_friction(-1.0) == found[3] == pytest.approx(0.4, abs=0.15)
-
-
-def test_a_worm_can_lose_exponentially_with_speed() -> None:
-    now = {"angle": 0.0, "speed": -1.0, "current": 9.0}
-    found = worm_efficiency(ARM, Effects(worm_speed=0.1, worm_fade=0.5), now)
-    assert found == pytest.approx(0.55 * (1.0 - 0.1 * math.exp(-2.0)))
-
-
-def test_heat_that_is_lost_again_ends_below_heat_that_is_kept() -> None:
-    kept, lost = (moved(Effects(winding_heating=4e-5, winding_cooling=rate)).states["heat"] for rate in (0.0, 2.0))
-    assert kept[-1] == kept.max()
-    assert 0.2 * kept[-1] < lost[-1] < 0.9 * kept[-1]
-
-
-def test_a_stop_in_the_tray_stiffens_it() -> None:
-    soft, hard = (moved(Effects(rocking_hz=5.0, rocking_stop=stop)).states for stop in (0.0, 0.003))
-    stretch = [np.abs(states["shell_angle"] - states["angle"]).max() for states in (soft, hard)]
-    assert stretch[1] < 0.8 * stretch[0]
 
 
 def test_play_in_the_tray_lets_the_shell_lag() -> None:

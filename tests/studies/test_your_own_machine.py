@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.cli.main import main
 from armid.contract.check import check_thing
 from armid.model import Model, Output
 from armid.model.effects.sensor import sensor_effects
@@ -17,6 +16,7 @@ from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import IrregularSamplingWarning, read_campaign
 from armid.registry import load_registry
+from commands import ended
 
 TRUTH = {"inertia": 0.8, "motor_constant": 1.6, "boom_moment": 4.0, "load_friction.share": 0.15,
          "output_lag.time_constant": 0.012}  # fmt: skip
@@ -39,11 +39,8 @@ def identified(folder, plugin, tmp_path_factory):
 
     def run(effects):
         out = tmp_path_factory.mktemp("boom")
-        command = ["identify", str(folder / "campaign"), "--plugin", plugin, "--identifier", "least_squares",
-                   "--fitness", "rmse", "--budget", "600", "--effects", effects, "--out", str(out)]  # fmt: skip
-        with pytest.raises(SystemExit) as left:
-            main(command)
-        assert left.value.code == 0
+        words = ("--identifier", "least_squares", "--fitness", "rmse", "--budget", "600", "--effects", effects)
+        assert ended("identify", folder / "campaign", "--plugin", plugin, *words, "--out", out) == 0
         return json.loads((out / "result.json").read_text())
 
     return run
@@ -99,11 +96,8 @@ def test_without_them_the_answer_is_wrong_and_says_so(identified, capsys):
 
 @pytest.mark.slow
 def test_the_loop_finds_both_and_no_more(folder, plugin, tmp_path):
-    command = ["close-loop", str(folder / "campaign"), "--plugin", plugin, "--threads", "1", "--out", str(tmp_path),
-               "--candidates", "load_friction,output_lag,viscous"]  # fmt: skip
-    with pytest.raises(SystemExit) as left:
-        main(command)
-    assert left.value.code == 0
+    words = ("--threads", "1", "--out", tmp_path, "--candidates", "load_friction,output_lag,viscous")
+    assert ended("close-loop", folder / "campaign", "--plugin", plugin, *words) == 0
     report = json.loads((tmp_path / "report.json").read_text())
     assert [step["effect"] for step in report["steps"]] == ["load_friction", "output_lag"]
     assert report["verdict"] == "explained"

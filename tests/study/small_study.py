@@ -56,53 +56,40 @@ from pymoo.algorithms.soo.nonconvex.de import DE
 class Bad(DE):
     """Misbehave in the second generation."""
 
+    def __init__(self):
+        super().__init__(pop_size=10)
+
     def _advance(self, **_):
         self.misbehave()
 
 
-class Hangs(Bad):
+class hangs(Bad):
     def misbehave(self):
         while True:
             time.sleep(60.0)
 
 
-class Segfaults(Bad):
+class segfaults(Bad):
     def misbehave(self):
         ctypes.string_at(0)
 
 
-class Leaves(Bad):
+class leaves(Bad):
     def misbehave(self):
         sys.exit(3)
 
 
-class Raises(Bad):
+class raises(Bad):
     def misbehave(self):
         raise ZeroDivisionError("nothing to divide by")
 
 
-def hangs(budget):
-    return Hangs(pop_size=10)
-
-
-def segfaults(budget):
-    return Segfaults(pop_size=10)
-
-
-def leaves(budget):
-    return Leaves(pop_size=10)
-
-
-def raises(budget):
-    return Raises(pop_size=10)
-
-
-class Interrupts(Bad):
+class interrupts(Bad):
     def misbehave(self):
         raise KeyboardInterrupt
 
 
-class Writes(Bad):
+class writes(Bad):
     def misbehave(self):
         for descriptor in range(3, 64):
             try:
@@ -111,15 +98,7 @@ class Writes(Bad):
                 pass
 
 
-def interrupts(budget):
-    return Interrupts(pop_size=10)
-
-
-def writes(budget):
-    return Writes(pop_size=10)
-
-
-def cannot_be_built(budget):
+def raises_when_built(budget):
     return 1 / 0
 
 

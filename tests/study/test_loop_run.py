@@ -14,9 +14,9 @@ import pandas as pd
 import pytest
 from loop_suite import STUDY, SUITE, kept_reports
 
-from armid.cli.main import main
 from armid.study.results import load_study
 from armid.study.runner import run_study
+from commands import ended
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -48,7 +48,6 @@ def without_key(suite, tmp_path):
 
 @pytest.fixture(scope="module")
 def closed(suite):
-    """The study run with its key beside it."""
     return run_study(suite / "blind.toml", jobs=1, out=suite / "out")
 
 
@@ -70,7 +69,6 @@ def test_the_loop_never_opens_the_key(closed, without_key):
 
 
 def n_kept(out):
-    """How many runs a store holds."""
     try:
         with closing(sqlite3.connect(f"file:{out / 'study.sqlite'}?mode=ro", uri=True)) as connection:
             return connection.execute("SELECT count(*) FROM loops").fetchone()[0]
@@ -99,9 +97,7 @@ def test_a_kill_loses_nothing(start, closed, without_key):
 
 
 def test_the_score_is_right_of_a_store_and_of_exported_reports(suite, closed, tmp_path):
-    with pytest.raises(SystemExit) as ended:
-        main(["export", "reports", str(suite / "out"), str(tmp_path / "reports")])
-    assert ended.value.code == 0
+    assert ended("export", "reports", suite / "out", tmp_path / "reports") == 0
     for results in (suite / "out", tmp_path / "reports"):
         program = [sys.executable, str(ROOT / "studies" / "blind" / "score.py"), str(results)]
         words = ["--key", str(suite / "suite.key.json"), "--out", str(tmp_path / "score")]

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from loop_suite import STUDY, fake_campaigns
 
-from armid.cli.main import main
 from armid.errors import ArmidError
 from armid.model import EFFECTS
 from armid.study.tasks import read_study
@@ -81,15 +80,10 @@ def test_some_campaigns_only(write):
         ('campaigns = "."\n', "'.' holds no folder with a campaign.toml, `make suite` makes them"),
     ],
 )
-def test_refuses_with_one_sentence(more, sentence, write, capsys):
+def test_refuses_with_one_sentence(more, sentence, write, refused):
     name = more.partition(" ")[0]
     text = re.sub(rf"^{name} = .*\n", "", STUDY, flags=re.MULTILINE) + more
-    with pytest.raises(SystemExit) as stopped:
-        main(["study", str(write(text=text))])
-    assert stopped.value.code == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
+    assert sentence in refused("study", write(text=text))
 
 
 @pytest.mark.parametrize("name", ["blind", "blind_short"])

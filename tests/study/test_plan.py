@@ -25,7 +25,6 @@ FIRST_CASE = '[[cases]]\nname = "row 1"'
 
 
 def replays_of(study, **wanted):
-    """Replays of the first planned run whose words are as wanted."""
     planned = next(p for p in study.plan() if all(getattr(p, word) == value for word, value in wanted.items()))
     return RunCache(study.registry, study.folder).replays(json.loads(planned.settings))[1]
 

@@ -1,6 +1,5 @@
 """The store: claims of other runners, files that are no store, and damaged ones."""
 
-import shutil
 import sqlite3
 import subprocess
 import sys
@@ -8,7 +7,6 @@ from contextlib import closing
 
 import pytest
 
-from armid.cli.main import main
 from armid.errors import ArmidError
 from armid.study.outcome import DONE, Outcome, Planned
 from armid.study.results import load_study
@@ -119,50 +117,8 @@ def test_a_file_of_another_program_is_left_alone(tmp_path, content):
     assert file.read_bytes() == before
 
 
-def test_a_folder_without_a_store_is_told(tmp_path):
-    with pytest.raises(ArmidError, match="there is no store"):
-        load_study(tmp_path)
-
-
 def test_a_store_of_another_format_is_told(store, tmp_path):
     with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
         connection.execute("PRAGMA user_version = 99")
     with pytest.raises(ArmidError, match="is a store of format 99, 1 is expected"):
         load_study(tmp_path)
-
-
-DAMAGES = {
-    "UPDATE study SET value = 'garbage' WHERE key = 'description'": "the description of the study cannot be read",
-    "UPDATE study SET value = '[]' WHERE key = 'description'": "the description of the study lacks 'name'",
-    "UPDATE study SET value = '{\"name\": \"small\"}' WHERE key = 'description'": "lacks 'cases'",
-    "UPDATE traces SET trace = x'00112233'": "the trace of run",
-    "UPDATE traces SET names = 'p0, k'": "the trace of run",
-}
-
-
-def refused(folder, capsys):
-    """Return the one sentence with which a report of a folder is refused."""
-    with pytest.raises(SystemExit) as ended:
-        main(["report", str(folder)])
-    said = capsys.readouterr().err
-    assert ended.value.code == 2, said
-    assert said.count("\n") == 1
-    return said
-
-
-def test_damage_is_one_sentence(undisturbed, tmp_path, capsys):
-    """What was tampered with or damaged is told, never with a traceback; also a page of rubbish."""
-    file = tmp_path / "out" / FILE_NAME
-    for damage, words in DAMAGES.items():
-        shutil.copytree(undisturbed.path.parent, tmp_path / "out")
-        with closing(sqlite3.connect(file)) as connection, connection:
-            connection.execute(damage)
-        said = refused(tmp_path / "out", capsys)
-        assert f"{file} is damaged: " in said
-        assert words in said
-        shutil.rmtree(tmp_path / "out")
-    shutil.copytree(undisturbed.path.parent, tmp_path / "out")
-    content = bytearray(file.read_bytes())
-    content[4096 : len(content) // 2] = b"\xa5" * (len(content) // 2 - 4096)
-    file.write_bytes(content)
-    assert str(file) in refused(tmp_path / "out", capsys)

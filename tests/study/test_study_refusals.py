@@ -7,7 +7,6 @@ from armid.study.runner import run_study
 from armid.study.tasks import read_study
 
 BOX = "[bounds]\n"
-CHAIN = 'name = "pso+least_squares"'
 # What is changed in the small study (old, new), and what the sentence has to hold.
 REFUSED = [
     ('question = "Does it run?"', "qestion = 3", "small.toml: key 'qestion' is unknown, did you mean 'question'?"),
@@ -53,6 +52,7 @@ REFUSED = [
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nlabel = "random"',
      "label 'random' stands for identifiers of other name or options"),
     ('name = "small"', 'name = "../small"', "key 'name' is '../small', a plain name"),
+    ('name = "small"', "name = ", "small.toml is no valid TOML"),
     ('[[cases]]\nname = "row 5"', 'campaign = "c"\n[[cases]]\nname = "row 5"',
      "manoeuvres to simulate or a campaign to read is expected, both are given"),
     ("duration_s = 0.3 }]", 'duration_s = 0.3, role = "holdout" }]', "no manoeuvre has the role 'train'"),
@@ -74,31 +74,6 @@ def test_refused_with_one_sentence(write_study, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_the_command_prints_the_sentence_and_leaves(start, write_study, tmp_path):
-    process = start(write_study(change=("budget = 40", "budgt = 40")), "--out", tmp_path / "out")
-    out, err = process.communicate(timeout=600)
-    assert (process.returncode, out) == (2, "")
-    assert err == "armid: small.toml: key 'budgt' is unknown, did you mean 'budget'?\n"
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(("text", "words"), [
-    ("name = ", "bad.toml is no valid TOML"),
-    (b"\xff\xfe", "line 1: not readable as text"),
-    ("", "key 'name' is missing"),
-])  # fmt: skip
-def test_what_is_no_study(tmp_path, text, words):
-    file = tmp_path / "bad.toml"
-    file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(ArmidError, match=words):
-        read_study(file)
-
-
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(ArmidError, match=r"does not exist, a file that ends in \.toml is expected"):
-        read_study(tmp_path / "no.toml")
-
-
 @pytest.mark.parametrize(("told", "words"), [
     ({"jobs": 0}, "jobs is 0, a whole number of processes above 0"),
     ({"time_limit": 0.0}, "the time limit is 0"),
@@ -110,13 +85,6 @@ def test_arguments_that_no_runner_can_work_with(write_study, tmp_path, told, wor
     with pytest.raises(ArmidError, match=words.replace("?", r"\?")):
         run_study(write_study(), out=tmp_path / "out", **told)
     assert not (tmp_path / "out").exists()
-
-
-def test_an_identifier_of_the_user_that_cannot_be_built(write_study, tmp_path, bad_identifiers):
-    file = write_study(change=(CHAIN, 'name = "cannot_be_built"'))
-    words = "identifier 'cannot_be_built': it cannot be built: plug-in .*: ZeroDivisionError: division by zero"
-    with pytest.raises(ArmidError, match=words):
-        run_study(file, out=tmp_path / "out", plugins=[f"{bad_identifiers}:cannot_be_built"])
 
 
 def test_a_link_out_of_the_folder(write_study, tmp_path, paper_arm_folder):

@@ -9,22 +9,20 @@ from numpy.typing import NDArray
 from armid.model import Manoeuvre, Model
 
 Array = NDArray[np.float64]
-REFERENCE = Path(__file__).parents[1] / "reference"
+REFERENCE = Path(__file__).parent / "reference"
 
 
 def index_rows() -> list[dict[str, str]]:
-    """Manoeuvre and parameters of each reference trajectory."""
     with (REFERENCE / "index.csv").open(encoding="utf-8") as index:
         return list(csv.DictReader(index))
 
 
-def manoeuvre_of(row: dict[str, str], n_samples: int = 1201) -> Manoeuvre:
-    """The manoeuvre of a row, 1.2 s at 1 kHz."""
+def manoeuvre_of(row: dict[str, str], interval: float = 0.001, n_samples: int = 1201) -> Manoeuvre:
     constants = {
         "theta_C": np.deg2rad(float(row["start_angle_deg"])), "theta_D": np.deg2rad(float(row["target_angle_deg"])),
         "shell": float(row["shell"]), "U": float(row["supply_V"]),
     }  # fmt: skip
-    return Manoeuvre(0.001, n_samples, constants)
+    return Manoeuvre(interval, n_samples, constants)
 
 
 def candidate_of(row: dict[str, str]) -> Array:
