@@ -201,7 +201,7 @@ def test_a_campaign_is_read_moves_and_says_that_it_is_synthetic(run, tmp_path):
 def test_the_friction_that_the_campaign_s_text_names_is_in_its_records(run):
     run("new", "campaign", "my_axis")
     ran = run("identify", "my_axis", "--effects", "viscous", "--fitness", "rmse", "--identifier", "least_squares")
-    found = {name: float(value) for name, value in re.findall(r"([\w.]+) +│ ([\d.]+) +│ ", ran.out)}
+    found = {name: float(value) for name, value in re.findall(r"([\w.]+) +│ +([\d.]+) +│ ", ran.out)}
     assert found["inertia"] == pytest.approx(0.05, rel=0.01)
     assert found["viscous.slope"] == pytest.approx(0.03, rel=0.02)
 

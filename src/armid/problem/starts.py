@@ -19,6 +19,7 @@ from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Piece
 from armid.record.broken import sound_samples
+from armid.record.noise import correlation_sum
 from armid.record.record import StartCorrection
 
 # Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
@@ -36,9 +37,9 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
     """Return replays whose pieces start where one whole candidate fits best, ready to correct others about there.
 
     Pieces whose start is not to be fitted stay as they are. Gauss and Newton's steps from the start that the piece has,
-    J(s) = |x - y(s)|^2 / max(1, m) + |(s - s_reader) / 3 deviations|^2 with squares over those of the noise and m the
-    mean square that no start brings down: a model that lacks something must not be made up for by a start that the
-    first samples rule out.
+    J(s) = |x - y(s)|^2 / (max(1, m) c) + |(s - s_reader) / 3 deviations|^2 with squares over those of the noise, m the
+    mean square that no start brings down and c = 1 + 2 sum rho its correlation in time: a model that lacks something
+    must not be made up for by a start that the first samples rule out.
     """
     found: list[Replay] = []
     for outputs in by_file(replays):
@@ -146,10 +147,23 @@ class Start:
 
     def left(self, residual: Array, slopes: Array) -> float:
         """Return the sum of squares that no start brings down, infinite where the simulation diverges."""
+        return float(np.sum(self.beyond(residual, slopes) ** 2))
+
+    def beyond(self, residual: Array, slopes: Array) -> Array:
+        """Return what no start can do of a residual, (n_seen,), infinite where the simulation diverges."""
         if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
-            return np.inf
+            return np.full(len(residual), np.inf)
         scale = np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300)
-        return float(np.sum((residual - np.linalg.lstsq((slopes / scale).T, residual)[0] @ (slopes / scale)) ** 2))
+        return np.asarray(residual - np.linalg.lstsq((slopes / scale).T, residual)[0] @ (slopes / scale))
+
+    def misfit(self, residual: Array, slopes: Array) -> float:
+        """Return by what squares are divided: their mean that no start brings down, at least 1, by how long it lasts.
+
+        What a model lacks is alike in neighbours: these are one witness against the reader's start, and not many.
+        """
+        rest = self.beyond(residual, slopes)
+        square = float(np.sum(rest**2)) / max(int(np.count_nonzero(self.weights)), 1)
+        return max(square, 1.0) * (1.0 + 2.0 * correlation_sum(rest))
 
     def answer(self, constants: Array, slopes: Array, misfit: float) -> tuple[Array, Array]:
         """Return gain and offset of a step, (n_constants, n_seen) and (n_constants,); misfit: that is left."""
@@ -169,7 +183,7 @@ class Start:
             residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
                 return pieces
-            misfit = max(self.left(residual, seen) / max(int(np.count_nonzero(self.weights)), 1), 1.0)
+            misfit = self.misfit(residual, seen)
             gain, offset = self.answer(constants, seen, misfit)
             shorter = constants + (gain @ residual + offset) / 2.0 ** np.arange(MOST_HALVINGS)[:, np.newaxis]
             tried = self.residual(self.signals(shorter, np.repeat(population, MOST_HALVINGS, axis=0)))

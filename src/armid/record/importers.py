@@ -3,6 +3,7 @@
 import struct
 import zipfile
 import zlib
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -185,8 +186,14 @@ def read_dfki(folder: Path, file: str) -> dict[str, Array]:
     if not path.is_file():
         raise ArmidError(f"{folder}: {file} does not exist there, the folder results/ of the set, or its files in one "
                          "folder, is expected")  # fmt: skip
-    columns = read_table(path, file).columns
-    for name in DFKI_COLUMNS:
-        if name not in columns:
-            raise ArmidError(f"{file}, line 1: column '{name}' is missing, {', '.join(DFKI_COLUMNS)} are expected")
+    columns = read_columns(path, file, DFKI_COLUMNS)
     return {header: columns[name] for name, header in DFKI_COLUMNS.items()}
+
+
+def read_columns(path: Path, file: str, names: Collection[str]) -> dict[str, Array]:
+    """Return the named columns of a CSV file; refuse a file or column that is missing. file: how messages name it."""
+    columns = read_table(path, file).columns
+    for name in names:
+        if name not in columns:
+            raise ArmidError(f"{file}, line 1: column '{name}' is missing, {', '.join(names)} are expected")
+    return {name: columns[name] for name in names}
