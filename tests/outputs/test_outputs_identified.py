@@ -49,7 +49,7 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     for name, truth in (("start_motor", 0.3), ("start_motor_speed", 2.0), ("start_load", 0.25)):
         assert found[name] == pytest.approx(truth, abs=0.03 if name != "start_motor_speed" else 0.3)
     # about there another candidate gets a start of its own: as good as if it were fitted about that one
-    other = WHOLE * [1.02, 0.99, 1.01, 1.1]
+    other = WHOLE * [1.01, 0.995, 1.005, 1.05]
     near = started[3].measured - started[3].signal(other[np.newaxis])[0]
     own = with_starts(started, other)[3]
     assert np.linalg.norm(near) == pytest.approx(
