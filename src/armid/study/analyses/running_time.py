@@ -112,8 +112,9 @@ def share_panels(
 ) -> tuple[Any, list[Any]]:
     """Draw shares that rise with the simulations, one panel each. curves: title, simulations, and name -> share."""
     figure, axes = panels(len(curves), columns, width, panel_height(len(colours)))
+    largest = max((float(np.max(shares)) for *_, lines in curves for shares in lines.values()), default=1.0)
     for axis, (title, grid, lines) in zip(axes, curves, strict=True):
-        axis.set(xscale="log", ylim=(0.0, 1.0))
+        axis.set(xscale="log", ylim=(0.0, min(1.0, 1.1 * largest) or 1.0))
         named_lines(axis, grid, lines, colours)
         axis.set_title(title)
         axis.grid(alpha=0.3)
