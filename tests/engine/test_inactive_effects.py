@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arm_cases import Array, drawn
 
+from arm_cases import Array, drawn
 from armid.engine import Schedule, simulate
 from armid.engine.generate import FEWEST, strengths_of
 from armid.model import EFFECTS, Manoeuvre, Model, applicable

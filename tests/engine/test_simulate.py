@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arm_cases import Array, drawn
 
+from arm_cases import Array, drawn
 from armid.engine import Schedule, Simulation, simulate
 from armid.errors import ArmidError
 from armid.model import PLANTS, Effect, Manoeuvre, Model, Parameter

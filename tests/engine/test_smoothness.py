@@ -5,8 +5,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from arm_cases import Array, drawn
 
+from arm_cases import Array, drawn
 from armid.engine import Schedule, simulate
 from armid.model import Manoeuvre, Model
 from armid.problem.fitness import mean_square
