@@ -4,6 +4,7 @@ import re
 import shutil
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from made_machines import motion
 from armid.contract.check import check_campaign
 from armid.engine.simulate import Prepared
 from armid.errors import ArmidError
-from armid.estimation.screen import Trial, screen, shortened
+from armid.estimation.mends import Mend
+from armid.estimation.screen import Trial, chosen, screen, shortened
 from armid.model import EFFECTS, Model
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
@@ -384,3 +386,11 @@ def test_check_and_identify_say_it(campaign, run):
     assert told.code == 0
     assert f"armid: warning: {words}" in told.err
     assert words in " ".join(told.out.split())
+
+
+def test_a_factor_of_two_has_to_leave_little():
+    """A missing spring looks like an input that is told twice as large; so does no inverted sign."""
+    halved = Mend("input", 0.5, "halved", lambda record: record)
+    assert chosen("", 1.1, [(0.32, halved)]) == []
+    assert [s.kind for s in chosen("", 1.1, [(0.15, halved)])] == ["input"]
+    assert [s.kind for s in chosen("", 1.1, [(0.32, replace(halved, kind="sign", factor=-1.0))])] == ["sign"]

@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 TOLERABLE = 0.1
 # What undoing a mistake must leave of the error, and of what it may be told to be one of several.
 MENDED, LEFT, AS_GOOD = 0.4, 0.5, 1.5
+# What is left of the error by a factor of two, which a missing spring or friction can imitate.
+LEFT_BY_TWO = 0.2
 # An error above this, with no candidate of this cosine to the signal: the model explains nothing of it.
 NOTHING, UNLIKE = 0.95, 0.3
 # An error up to this, where the model explains nothing as told, shows an exchange that a missing effect half hides.
@@ -317,7 +319,8 @@ def least_nearby(trial: Trial, train: Sequence[Record], record: Record, z: Array
 def chosen(record: str, before: float, tried: Iterable[tuple[float, Mend]]) -> list[Suspicion]:
     """Return the mend that leaves least, with those that do as well; none where none takes most of the error away."""
     most = min(MENDED * before, LEFT)
-    good = sorted((pair for pair in tried if pair[0] <= most), key=lambda pair: pair[0])
+    good = [(e, m) for e, m in tried if e <= (min(most, LEFT_BY_TWO) if m.factor in (0.5, 2.0) else most)]
+    good.sort(key=lambda pair: pair[0])
     if not good:
         return []
     first = good[0][1].suspicion(record, before, good[0][0])

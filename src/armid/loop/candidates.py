@@ -32,7 +32,7 @@ T = TypeVar("T")
 # What the names of empirical terms begin with (no effect of a library may), and how reports show them.
 UNNAMED, SHOWN_AS = "unnamed_", "unnamed:"
 # How much wider a range becomes that a strength has reached the end of.
-FURTHER = 4.0
+FURTHER = 16.0
 # What the names of constants that are known roughly begin with, which are looked for as effects are.
 ROUGHLY, CONSTANT = "error_of_", "constant:"
 # More than the library holds: a model that grew for ever would take for ever to compile.
