@@ -8,8 +8,8 @@
 anything: tables (CSV), pages (Markdown), report.json or result.json, and the figures that README.md or a guide shows,
 as PNG of 90 dpi in 256 colours. A page loses its other figures and says once which command makes them.
 
-Run it with the Python that armid is installed in. A study that was interrupted goes on where it was. The records of
-`emps` and `dfki` are not part of the repository: README.md says how to import them into out/campaigns first.
+Run it with the Python that armid is installed in. An interrupted study goes on where it was. `armid import` has to bring
+the records of `emps` and `dfki` into out/campaigns first.
 """
 
 import argparse
@@ -43,9 +43,10 @@ class Recipe:
     before: tuple[tuple[str, str], ...] = ()
 
 
-def study(name: str, *figures: str, before: tuple[tuple[str, str], ...] = ()) -> Recipe:
-    """Return the recipe of a study: run it, then report it."""
-    return Recipe((f"armid study studies/{name}.toml --out out/{name}", f"armid report out/{name}"), figures, before)
+def study(name: str, *figures: str, file: str = "", before: tuple[tuple[str, str], ...] = ()) -> Recipe:
+    """Return the recipe of a study: run it, then report it; file: of the study, where it is no NAME.toml."""
+    run, tell = f"armid study studies/{file or name}.toml --out out/{name}", f"armid report out/{name}"
+    return Recipe((run, tell), figures, before)
 
 
 def scored(name: str, *figures: str, before: tuple[tuple[str, str], ...]) -> Recipe:
@@ -61,8 +62,7 @@ def loop(name: str, *figures: str, campaign: str = "", more: tuple[str, ...] = (
 
 
 EMPS = "armid identify out/campaigns/emps --effects coulomb,viscous,torque_offset"
-STAND = "python studies/test_stand.py"
-BLIND, FAMILIES = "studies/campaigns/blind", "studies/campaigns/families"
+STAND, BLIND, FAMILIES = "python studies/test_stand.py", "studies/campaigns/blind", "studies/campaigns/families"
 ADVICE, ADVISED = f"{BLIND}_advice", f"{BLIND}_advised"
 RECIPES = {
     "advised": scored("advised", "advice", before=(
@@ -89,7 +89,7 @@ RECIPES = {
     "one_stroke": loop("one_stroke", "parameters"),
     "paper_arm": Recipe(("armid identify studies/campaigns/paper_arm --out out/paper_arm",), ("fit",)),
     "rocking_shell": loop("rocking_shell", "residuals", "ranking"),
-    "suite": Recipe(("armid study studies/suite/suite.toml --out out/suite", "armid report out/suite"), ("attained",)),
+    "suite": study("suite", "attained", file="suite/suite"), "suite_long": study("suite_long", file="suite/long"),
     "table1": study("table1", "table1", "valley_noise_free"),
     "table1_short": study("table1_short"), "table2": study("table2", "table2"),
 }  # fmt: skip
