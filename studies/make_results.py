@@ -8,8 +8,8 @@
 anything: tables (CSV), pages (Markdown), report.json or result.json, and the figures that README.md or a guide shows,
 as PNG of 90 dpi in 256 colours. A page loses its other figures and says once which command makes them.
 
-Run it with the Python that armid is installed in. An interrupted study goes on where it was. `armid import` has to bring
-the records of `emps` and `dfki` into out/campaigns first.
+Run it with the Python that armid is installed in. An interrupted study goes on where it was. `armid import` has to
+bring the records of `emps` and `dfki` into out/campaigns first.
 """
 
 import argparse
