@@ -125,6 +125,7 @@ def test_a_campaign_is_a_problem_on_top(paper_arm, paper_arm_folder):
     problem = suite[-1]
     assert (len(suite), problem.name, str(problem)) == (
         len(armid.suite()) + 1, "paper_arm/1", "<MeasuredProblem paper_arm/1, version 1: p0, k, eta3, n>")  # fmt: skip
+    assert armid.suite(campaigns=paper_arm_folder)[-1].name == armid.suite(campaigns=str(paper_arm_folder))[-1].name
     assert problem.truth is problem.optimum_x is problem.optimum_value is None
     # the records are simulated with parameters that are known here
     near = problem((np.array([3.05e6, 1.0, 0.55, 1.4]) - [2.6e6, 0.6, 0.45, 0.9]) / [0.9e6, 0.5, 0.25, 0.6])

@@ -15,7 +15,7 @@ from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.problem.starts import by_file
-from armid.record.noise import correlation_sum, memory_of
+from armid.record.noise import correlation_sum, new_share
 from armid.record.record import NOISE_FREE, Noise
 
 Array = NDArray[np.float64]
@@ -213,14 +213,13 @@ def level_of(replay: Replay, space: Space, x: Array) -> Level:
     noise = replay.record.noise
     residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
     rms = float(np.sqrt(np.mean(residual**2)))
+    known = Level(noise.rms, noise.effective_fraction)
     if not np.isfinite(rms) or rms <= ENGINE_ERRORS * replay.engine_error:
-        return Level(noise.rms, noise.effective_fraction)
-    if is_noise(residual, noise):
-        # differences tell the least that the noise can be, and nothing of its colour
-        memory = 0.0 if noise.source == "rest" else memory_of([residual])
-        known = Level(noise.rms, noise.effective_fraction)
-        return known if noise.source == "rest" else Level(max(rms, noise.rms), (1.0 - memory) / (1.0 + memory))
-    return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+        return known
+    if not is_noise(residual, noise):
+        return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+    # differences tell the least that the noise can be, and nothing of its colour
+    return known if noise.source == "rest" else Level(max(rms, noise.rms), new_share(residual))
 
 
 def is_noise(residual: Array, noise: Noise) -> bool:

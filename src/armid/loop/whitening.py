@@ -21,7 +21,7 @@ from armid.model import Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Record
 from armid.record.broken import sound_samples
-from armid.record.noise import correlation_sum, memory_of
+from armid.record.noise import correlation_sum, new_share
 
 Array = NDArray[np.float64]
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
@@ -255,8 +255,7 @@ class WhitenedData:
                 weight = 1.0 / square / (1.0 + 2.0 * correlation_sum(part))
             elif not level.known:
                 # differences tell the least that the noise can be, and nothing of its colour
-                memory = memory_of([part])
-                weight = (1.0 - memory) / (1.0 + memory) / max(square, 1.0)
+                weight = new_share(part) / max(square, 1.0)
             found.append(np.full(len(part), weight))
         return np.concatenate(found)
 

@@ -118,7 +118,9 @@ DEFINITIONS: dict[str, Definition] = {
 """Name -> problem, in the order of the suite; a change of one of them changes VERSION."""
 
 
-def suite(objectives: str = "one", units: str = "box", campaigns: Iterable[Campaign | str | Path] = ()) -> "Suite":
+def suite(
+    objectives: str = "one", units: str = "box", campaigns: Iterable[Campaign | str | Path] | Campaign | str | Path = ()
+) -> "Suite":
     """Return all instances of all problems, each made when it is asked for; none is compiled before its first call.
 
     Parameters
@@ -128,7 +130,8 @@ def suite(objectives: str = "one", units: str = "box", campaigns: Iterable[Campa
     units
         "box": candidates in the unit cube; "SI": in the parameters' own units.
     campaigns
-        Campaigns of measured machines, or their folders: a `MeasuredProblem` of each, `NAME/1`, comes on top.
+        One or several campaigns of measured machines, or their folders: a `MeasuredProblem` of each, `NAME/1`, comes on
+        top.
 
     Returns
     -------
@@ -150,7 +153,7 @@ def suite(objectives: str = "one", units: str = "box", campaigns: Iterable[Campa
     several = [name for name, d in DEFINITIONS.items() if objectives == "one" or len(d.strokes) > 1]
     keys = [(name, i) for name in several for i in range(1, N_INSTANCES + 1)]
     measured: dict[str, Campaign] = {}
-    for one in campaigns:
+    for one in [campaigns] if isinstance(campaigns, Campaign | str | Path) else campaigns:
         campaign = one if isinstance(one, Campaign) else read_campaign(one)
         if campaign.name in (*DEFINITIONS, *measured):
             raise ArmidError(f"campaign {quoted(campaign.name)}: the suite has a problem of that name already, another "

@@ -72,6 +72,12 @@ def memory_of(parts: Sequence[Array]) -> float:
     return rho if 2.0 * DISTINCT / np.sqrt(n) < rho <= LONGEST_MEMORY else 0.0
 
 
+def new_share(residual: Array) -> float:
+    """Return the share of samples that count as independent in a residual with the memory of `memory_of`."""
+    memory = memory_of([residual])
+    return (1.0 - memory) / (1.0 + memory)
+
+
 def difference_rms(motion: Array, times: Array | None = None) -> float:
     """Return the rms of what high differences leave of a motion [unit]; white noise is assumed.
 
