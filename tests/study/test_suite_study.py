@@ -1,20 +1,29 @@
 """A study of problems of the suite: plan, budgets, fitness, report in words, refusals."""
 
+import json
+import signal
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from commands import ended
 
 from armid.errors import ArmidError
+from armid.estimation.identify import search
+from armid.problem.meter import Meter
+from armid.problem.problem import IdentificationProblem
+from armid.registry import load_registry
 from armid.report.style import pyplot
-from armid.study.analyses.analysis import Evidence
+from armid.study.analyses.analysis import TARGETS, Evidence, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve, attained
 from armid.study.document import report_of
 from armid.study.results import load_study
 from armid.study.runner import run_study
+from armid.study.store import Store
 from armid.study.tasks import read_study
-from armid.study.tune import score, training, tunable, tune, tuned_study
+from armid.study.tune import RANGES, Tuned, proposed, training, tune, tuned_document
 
 STUDY = """\
 name = "own"
@@ -110,29 +119,138 @@ def test_curves_end_where_the_budget_of_their_setting_does():
     pyplot().close(figure)
 
 
+SMALL = {'"arm_sh*"': '"arm_short"', "[5, 30]": "[2, 20]"}
+
+
+@pytest.fixture
+def watched(monkeypatch):
+    """Runs that were handed out, and those that had ended then; the command is interrupted after so many runs."""
+    seen = SimpleNamespace(handed=[], finished=[], started=[], press_after=0)
+
+    def watch(counts, outcome):
+        if outcome is None:
+            seen.started.append(counts)
+            return
+        seen.finished.append(outcome.run)
+        if len(seen.finished) == seen.press_after:
+            signal.raise_signal(signal.SIGINT)
+
+    def claim(store, n, claims=Store.claim):
+        runs = claims(store, n)
+        seen.handed += [(each.run, each.run in seen.finished) for each in runs]
+        return runs
+
+    monkeypatch.setattr(Store, "claim", claim)
+    monkeypatch.setattr("armid.study.runner.progress_bar", lambda shown: nullcontext(watch))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield seen
+    signal.signal(signal.SIGINT, before)
+
+
+def area_of(entry, options, cases, seed):
+    """The area over the curve of a search here, without study and store; mean over cases."""
+    areas = []
+    for problem in (case.suite for case in cases):
+        known, meter = problem.identification, Meter(20 * problem.n_var)
+        identifier = load_registry().identifier_of(entry.name).with_options(options)
+        search(IdentificationProblem(known.space, known.replays, known.fitness, meter), meter, identifier, seed, None)
+        start, trace = np.median(problem(problem.spread(64))), meter.trace()
+        hits = first_hits(trace.evaluation, remaining_share(trace.value, start, problem.floor), TARGETS)
+        areas.append(area_over_curve(hits[np.newaxis], np.array([20.0 * problem.n_var]))[0])
+    return np.mean(areas)
+
+
 @pytest.mark.slow
-def test_tuning_learns_on_other_instances_and_gives_a_study_that_runs(written, tmp_path):
+def test_a_tuning_that_was_interrupted_ends_as_one_that_was_not(written, tmp_path, watched, capsys):
     pytest.importorskip("optuna")
+    file, whole, broken = written(**SMALL), tmp_path / "whole", tmp_path / "broken"
+    command = ("tune", file, "--configurations", 4, "--jobs", 1)
+    assert ended(*command, "--out", whole) == 0
+    ran = capsys.readouterr()
+    assert "16 runs, 1,280 simulations at most in all" in ran.err
+    assert ran.out.startswith("of 2 identifiers ")
+    assert "16 of 16 are in " in ran.out
+    # to who watches the four rounds are one study
+    assert [(c.planned, c.done) for c in watched.started] == [(16, 0), (16, 4), (16, 8), (16, 12)]
+    made = set(watched.finished)
+    assert len(made) == len(watched.finished) == 16
+
+    watched.finished.clear()
+    watched.handed.clear()
+    for watched.press_after in (6, 11):
+        assert ended(*command, "--out", broken, "--json") == 130
+        assert json.loads(capsys.readouterr().out)["tuned"] == {}
+        assert not (broken / "tuned.toml").exists()
+    assert 11 <= len(watched.finished) < 16
+    watched.press_after = 0
+    assert ended(*command, "--out", broken, "--json") == 0
+    given = json.loads(capsys.readouterr().out)
+    assert not any(had_ended for _, had_ended in watched.handed)
+    assert sorted(watched.finished) == sorted(made)
+    assert (broken / "tuned.toml").read_text() == (whole / "tuned.toml").read_text()
+
+    tuned, first = read_study(broken / "tuned.toml"), training(read_study(file), 1)
+    better = {entry.label.removesuffix(", tuned"): entry.options for entry in tuned.entries if entry.options}
+    assert better, "of four configurations none is better than the defaults"
+    assert (tuned.name, len(tuned.entries)) == ("own_tuned", 2 + len(better))
+    for entry in first.entries:
+        areas, options = given["areas"][entry.label], better.get(entry.label, {})
+        assert given["tuned"][entry.label] == options
+        assert areas["default"] == pytest.approx(area_of(entry, {}, first.cases, 1), abs=1e-12)
+        assert areas["tuned"] == pytest.approx(area_of(entry, options, first.cases, 1), abs=1e-12)
+        assert (areas["tuned"] > areas["default"]) == bool(options)
+
+
+@pytest.mark.slow
+def test_a_configuration_that_fails_or_comes_again_ends_no_tuning(written, tmp_path, monkeypatch):
+    pytest.importorskip("optuna")
+    monkeypatch.setitem(RANGES, "pso", {"n_particles": (8, 8)})
+    monkeypatch.setitem(RANGES, "cmaes", {"no_such": (1.0, 2.0)})
+    first = training(read_study(written(**SMALL)), 1)
+    (swarm, cmaes), ending = tune(first, "own.toml", tmp_path / "out", 3, jobs=1)
+    assert ending.counts == (2 * (2 + 3), 6, 4)
+    assert "no_such" in ending.first_error
+    assert swarm.options in ({}, {"n_particles": 8})
+    assert (cmaes.options, cmaes.tuned) == ({}, cmaes.default)
+    assert cmaes.default > 0.0
+
+
+def test_proposals_follow_from_scores_and_seed_and_go_where_the_area_is():
+    pytest.importorskip("optuna")
+    known = [({"initial_step": float(x)}, -abs(np.log(x / 0.1))) for x in np.geomspace(0.005, 0.5, 30)]
+    found = [proposed("bobyqa", known, (1, i))["initial_step"] for i in range(8)]
+    assert found == [proposed("bobyqa", known, (1, i))["initial_step"] for i in range(8)]
+    assert len({*found, proposed("bobyqa", known, (2, 0))["initial_step"]}) == 9
+    assert 0.07 < np.median(found) < 0.14
+    first = proposed("pso", [], (1, 1))
+    assert list(first) == list(RANGES["pso"])
+    assert all(low <= first[name] <= high for name, (low, high) in RANGES["pso"].items())
+    assert isinstance(first["n_particles"], int)
+
+
+def test_the_answer_of_a_tuning(written):
+    found = [Tuned("pso", {"c1": 1.2345, "n_particles": 20}, 0.41, 0.55), Tuned("de", {}, 0.3, 0.3)]
     study = read_study(written())
-    cases = training(study)
-    assert [case.name for case in cases] == ["arm 3", "arm_shape 3", "arm_short 3"]
-    (swarm, cmaes) = tunable(study)
-    found = [tune(entry, study, cases, 6, 1) for entry in (swarm, cmaes)]
-    assert all(each.tuned >= each.default for each in found)
-    assert found[0] == tune(swarm, study, cases, 6, 1)
-    better = [each for each in found if each.options]
-    assert better, "of six configurations none is better than the defaults"
-    for each in better:
-        assert score(swarm if each.label == "pso" else cmaes, study, cases, each.options, 1) == each.tuned
-    file = tmp_path / "tuned.toml"
-    file.write_text(tuned_study(study, found), encoding="utf-8")
-    tuned = read_study(file)
-    assert tuned.name == "own_tuned"
-    assert tuned.labels == ["pso", "cmaes", *(f"{each.label}, tuned" for each in better)]
+    document = tuned_document(study, found)
+    assert document.said == ["of 2 identifiers 1 is better tuned; the largest gain is pso, area 0.410 to 0.550"]
+    cells = [[cell.text for cell in row] for row in document.main_tables[0].cells()]
+    assert cells == [["pso", "0.410", "0.550", "c1 = 1.23, n_particles = 20"], ["de", "0.300", "0.300", ""]]
+    assert tuned_document(study, found[1:]).said == ["of 1 identifiers none is better tuned"]
 
 
 def test_tuning_refuses_what_it_would_be_tested_on(written):
     with pytest.raises(ArmidError, match="arm 2 is in train and in instances"):
-        training(read_study(written(**{"train = [3]": "train = [2]"})))
+        training(read_study(written(**{"train = [3]": "train = [2]"})), 1)
     with pytest.raises(ArmidError, match=r"train is \[\], different ones"):
-        training(read_study(written(**{"train = [3]": ""})))
+        training(read_study(written(**{"train = [3]": ""})), 1)
+    none = {'"pso"': '"random"', '"cmaes"': '"sobol"'}
+    with pytest.raises(ArmidError, match="has nothing to tune, one of pso, .* is expected"):
+        training(read_study(written(**none)), 1)
+
+
+def test_tuning_takes_the_largest_budget_and_each_identifier_once(written):
+    study = read_study(written('fitness = "rmse"', **{'name = "cmaes"': 'name = "pso"\nfitness = "similarity"'}))
+    first = training(study, 7)
+    assert first.labels == ["pso"]
+    assert first.case_names == ["arm 3", "arm_shape 3", "arm_short 3"]
+    assert [(run.budget, run.seed) for run in first.plan()] == [(100, 7)] * 3

@@ -1,6 +1,7 @@
 """`armid study`: run what is missing of a study; `armid tune`: set the options of its identifiers."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,12 @@ if TYPE_CHECKING:
 
 
 MOST_NAMED = 300
+jobs_option = click.option(
+    "--jobs", type=click.IntRange(1), help="Worker processes. [default: as many as processors]"
+)  # fmt: skip
+dask_option = click.option(
+    "--dask", metavar="tcp://HOST:PORT", help="Scheduler of a Dask cluster, in place of own processes."
+)
 
 
 @command("study", short_help="Run what is missing of a study.", epilog=examples(
@@ -21,8 +28,8 @@ MOST_NAMED = 300
     "armid study mine.toml --plugin mine.py:my_search --out results/mine",
 ))  # fmt: skip
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option("--jobs", type=click.IntRange(1), help="Worker processes. [default: as many as processors]")
-@click.option("--dask", metavar="tcp://HOST:PORT", help="Scheduler of a Dask cluster, in place of own processes.")
+@jobs_option
+@dask_option
 @out_option("Folder of the results. [default: results/NAME]")
 @click.option(
     "--time-limit", type=float, metavar="S", show_default="600",
@@ -93,35 +100,49 @@ def words(ending: "Ending") -> list[str]:
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("--configurations", type=click.IntRange(1), default=20, show_default=True, help="Tried of each.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of proposals and searches.")
+@jobs_option
+@dask_option
 @out_option("Folder of the tuned study. [default: results/NAME_tuned]")
 @plugin_option
 def tune_command(
-    study: Path, configurations: int, seed: int, out: Path | None, plugins: tuple[str, ...]
+    study: Path, configurations: int, seed: int, jobs: int | None, dask: str | None, out: Path | None,
+    plugins: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Write STUDY again with each identifier twice, as it is and tuned.
 
     Every identifier gets the same number of configurations, its defaults among them, judged by the area over the
-    convergence curve on the instances that [suite] calls train; the study itself is run on others. Needs Optuna.
+    convergence curve on the instances that [suite] calls train; the study itself is run on others. Finished runs are
+    kept in the folder `training` of the results, whatever ends the program; the same command goes on where it was. A
+    configuration that fails counts as area 0. Ends with 130 after Ctrl-C. Needs Optuna.
     """
     from armid.errors import ArmidError
     from armid.report.result import NewFiles
-    from armid.study.runner import RESULTS, absolute
+    from armid.study.runner import RESULTS, absolute, progress_bar
     from armid.study.tasks import Study, read_study
-    from armid.study.tune import training, tunable, tune, tuned_study
+    from armid.study.tune import training, tune, tuned_document, tuned_study
 
-    known = read_study(study, absolute(plugins))
-    if not isinstance(known, Study):
-        raise ArmidError(f"study '{known.name}' closes loops, armid tune expects one that identifies")
-    cases, entries = training(known), tunable(known)
-    most = sum(entry.budgets(len(case.bounds))[-1] for entry in entries for case in cases)
-    say(f"{known.name}: {len(entries)} identifiers, {configurations} configurations each on {len(cases)} training "
-        f"instances: {configurations * most:,} simulations at most")  # fmt: skip
-    found = []
-    for entry in entries:
-        found.append(tune(entry, known, cases, configurations, seed))
-        say(f"{entry.label}: area {found[-1].default:.3f} as it is, {found[-1].tuned:.3f} tuned, {found[-1].options}")
-    folder = RESULTS / f"{known.name}_tuned" if out is None else out
-    with NewFiles(folder) as files:
-        files.path("tuned.toml").write_text(tuned_study(known, found), encoding="utf-8")
-    say(f"wrote tuned.toml to {folder}")
-    give(study=known.name, folder=folder, tuned={each.label: each.options for each in found})
+    with progress_bar(speaks()) as show_progress:
+        known = read_study(study, absolute(plugins))
+        if not isinstance(known, Study):
+            raise ArmidError(f"study '{known.name}' closes loops, armid tune expects one that identifies")
+        first = training(known, seed)
+        if speaks():
+            whole = replace(first, entries=first.entries * configurations)
+            tell(f"{known.name}: {len(first.entries)} identifiers, {configurations} configurations each on {len(first.cases)} "
+                 f"training instances: {whole.cost()}; what is finished already is kept")  # fmt: skip
+        folder = RESULTS / f"{known.name}_tuned" if out is None else out
+        found, ending = tune(first, study, folder / "training", configurations, jobs, dask, show_progress)
+    answer: list[str] = []
+    if found:
+        with NewFiles(folder) as files:
+            files.path("tuned.toml").write_text(tuned_study(known, found), encoding="utf-8")
+        document = tuned_document(known, found)
+        present(document)
+        say(f"wrote tuned.toml to {folder}")
+        answer = document.said
+    say(*words(ending))
+    give(study=known.name, folder=folder, answer=answer, tuned={each.label: each.options for each in found},
+         areas={each.label: {"default": each.default, "tuned": each.tuned} for each in found},
+         interrupted=ending.interrupted)  # fmt: skip
+    if ending.interrupted:
+        sys.exit(130)

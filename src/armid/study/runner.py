@@ -219,7 +219,7 @@ def progress_bar(is_shown: bool) -> Iterator[Progress]:
         def update(counts: Counts, outcome: Outcome | None) -> None:
             nonlocal began, finished, simulations
             if outcome is None:
-                began = time.monotonic()
+                began, finished, simulations = time.monotonic(), 0, 0
             else:
                 finished, simulations = finished + 1, simulations + outcome.used
             seconds, missing = max(time.monotonic() - began, 1e-9), counts.missing - finished

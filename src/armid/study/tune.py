@@ -1,23 +1,27 @@
 """Options of identifiers, tuned on instances of the suite that the study itself does not use.
 
-Every identifier gets the same number of configurations, its defaults among them; what is better goes into a study file
-with each identifier twice, as it is and tuned.
+Tuning goes in rounds: the defaults of every identifier, then one further configuration of each at a time, as Optuna's
+Bayesian sampler proposes it. All are identifiers of one training study, which is run and kept like any other; what is
+proposed follows from the runs that it holds, so that a tuning that was interrupted goes on as if it had not been.
 """
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from armid.errors import ArmidError
-from armid.estimation.identify import search
-from armid.problem.meter import Meter
-from armid.problem.problem import IdentificationProblem
+from armid.report.document import Column, Document, table
 from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve
-from armid.study.cases import Case, suite_cases
+from armid.study.cases import suite_cases
+from armid.study.outcome import DONE, FAILED
+from armid.study.results import StudyResults, load_study
+from armid.study.runner import Ending, Progress, run
+from armid.study.spec import WHOLE
 from armid.study.tasks import Entry, Study
 
 SWARM_PULLS = {"c1": (0.3, 2.5), "c2": (0.3, 2.5)}
@@ -50,59 +54,123 @@ class Tuned:
     tuned: float
 
 
-def tunable(study: Study) -> list[Entry]:
-    return [entry for entry in study.entries if entry.name in RANGES and not entry.options]
+def tune(
+    first: Study, file: str | Path, out: Path, n: int, jobs: int | None = None, dask: str | None = None,
+    progress: Progress = lambda counts, outcome: None,
+) -> tuple[list[Tuned], Ending]:  # fmt: skip
+    """Try n configurations of each identifier; runs that the store holds already are not made again.
+
+    Parameters
+    ----------
+    first
+        The training study with the defaults alone, see `training`.
+    file, out, jobs, dask, progress
+        As `armid.study.runner.run` takes them; all rounds are one study to who is told of the progress.
+    n
+        Configurations of each identifier, its defaults among them.
+
+    Returns
+    -------
+    list of Tuned
+        One an identifier; empty after Ctrl-C.
+    Ending
+        Of all rounds together.
+
+    Raises
+    ------
+    ArmidError
+        Without Optuna, and while another runner is at runs of the store.
+    """
+    try:
+        import optuna
+    except ImportError as error:
+        raise ArmidError("armid tune needs the package optuna, which is not installed: "
+                         "pip install 'armid[suite]' is expected") from error  # fmt: skip
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    tried: dict[str, list[Entry]] = {entry.label: [] for entry in first.entries}
+    areas: dict[str, float] = {}
+    endings: list[Ending] = []
+    for i in range(n):
+        for entry in first.entries:
+            own = tried[entry.label]
+            known = [(each.options, areas[each.label]) for each in own[1:]]
+            options = proposed(entry.name, known, (first.entries[0].seeds[0], i)) if i else {}
+            # the same once more would tell nothing new
+            if all(each.options != options for each in own):
+                own.append(replace(entry, label=f"{entry.label} {i}", options=options))
+        study = replace(first, entries=tuple(each for own in tried.values() for each in own))
+        later = (n - 1 - i) * len(first.entries) * len(first.cases)
+        endings.append(run(study, file, jobs, dask, out, progress=_with_later(progress, later)))
+        if endings[-1].interrupted:
+            return [], _together(endings, later)
+        if endings[-1].counts.missing:
+            raise ArmidError(f"{endings[-1].counts.missing} runs of {out} are still with another runner: let it end, "
+                             "the same command goes on then")  # fmt: skip
+        areas = scores(study, load_study(out))
+    # the first of the best: of defaults that nothing surpasses no options are told
+    best = {label: max(own, key=lambda each: areas[each.label]) for label, own in tried.items()}
+    found = [Tuned(label, best[label].options, areas[own[0].label], areas[best[label].label])
+             for label, own in tried.items()]  # fmt: skip
+    return found, _together(endings, 0)
 
 
-def training(study: Study) -> list[Case]:
-    """Return the training instances; refuse with ArmidError a study without a suite and one that is tried on them."""
+def training(study: Study, seed: int) -> Study:
+    """Return the study of the training instances: identifiers as they are, one seed, their largest budget.
+
+    Refuse with ArmidError a study without a suite, one that is tried on them, and one without what could be tuned.
+    """
     if study.spec.suite is None:
         raise ArmidError(f"study '{study.name}' has no table [suite], armid tune expects one with train instances")
     cases = suite_cases(study.spec, f"study '{study.name}', suite", train=True)
     both = {case.name for case in cases} & set(study.case_names)
     if both:
         raise ArmidError(f"study '{study.name}': {min(both)} is in train and in instances, each in one is expected")
-    return cases
+    entries = [replace(e, seeds=(seed,), per_parameter=e.per_parameter[-1:]) for e in tunable(study)]
+    if not entries:
+        raise ArmidError(f"study '{study.name}' has nothing to tune, one of {', '.join(RANGES)} without options is "
+                         "expected")  # fmt: skip
+    spec = replace(study.spec, name=f"{study.name}_training", question="Which options are best on the train instances?",
+                   report="", windows_s=(WHOLE,))  # fmt: skip
+    return replace(study, spec=spec, cases=tuple(cases), entries=tuple(entries))
 
 
-def tune(entry: Entry, study: Study, cases: list[Case], n: int, seed: int) -> Tuned:
-    """Try n configurations of an identifier, its defaults first, then as Optuna's Bayesian sampler proposes."""
-    try:
-        import optuna
-    except ImportError as error:
-        raise ArmidError("armid tune needs the package optuna, which is not installed: "
-                         "pip install 'armid[suite]' is expected") from error  # fmt: skip
-    default = score(entry, study, cases, {}, seed)
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    trials = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed))
-    for _ in range(n - 1):
-        trial = trials.ask()
-        chosen = {name: suggested(trial, name, *ends) for name, ends in RANGES[entry.name].items()}
-        trials.tell(trial, score(entry, study, cases, chosen, seed))
-    if n < 2 or trials.best_value <= default:
-        return Tuned(entry.label, {}, default, default)
-    return Tuned(entry.label, trials.best_params, default, trials.best_value)
+def tunable(study: Study) -> list[Entry]:
+    """Return the identifiers whose options can be tuned, those of one label or of one budget once."""
+    found: list[Entry] = []
+    for entry in study.entries:
+        same = any(e.label == entry.label or (e.name, e.budget) == (entry.name, entry.budget) for e in found)
+        if entry.name in RANGES and not entry.options and not same:
+            found.append(entry)
+    return found
 
 
-def suggested(trial: Any, name: str, low: float, high: float) -> Any:
-    suggest: Callable[..., Any] = trial.suggest_int if isinstance(low, int) else trial.suggest_float
-    return suggest(name, low, high, log=high >= 10 * low)
+def proposed(name: str, known: Sequence[tuple[Mapping[str, Any], float]], seed: Sequence[int]) -> dict[str, Any]:
+    """Return the next configuration of an identifier; the same scores and seed propose the same."""
+    from optuna import create_study, create_trial
+    from optuna.distributions import BaseDistribution, FloatDistribution, IntDistribution
+    from optuna.samplers import TPESampler
+
+    ranges: dict[str, BaseDistribution] = {
+        option: (IntDistribution if isinstance(low, int) else FloatDistribution)(low, high, log=high >= 10 * low)
+        for option, (low, high) in RANGES[name].items()
+    }
+    sampler = TPESampler(seed=int(np.random.SeedSequence(seed).generate_state(1)[0]))
+    trials = create_study(direction="maximize", sampler=sampler)
+    for options, area in known:
+        trials.add_trial(create_trial(params=dict(options), distributions=ranges, value=area))
+    return dict(trials.ask(ranges).params)
 
 
-def score(entry: Entry, study: Study, cases: list[Case], options: Mapping[str, Any], seed: int) -> float:
-    """Return the area over the convergence curve at the largest budget, mean over cases."""
-    identifier = study.registry.identifier(entry.name, "tune").with_options(options)
-    hits, budgets = [], []
-    for case in cases:
-        assert case.suite is not None
-        known = case.suite.identification
-        meter = Meter(entry.budgets(known.n_var)[-1])
-        search(IdentificationProblem(known.space, known.replays, known.fitness, meter), meter, identifier, seed, None)
-        start = float(np.median(case.suite(case.suite.spread(64))))
-        trace = meter.trace()
-        hits.append(first_hits(trace.evaluation, remaining_share(trace.value, start, case.suite.floor), TARGETS))
-        budgets.append(meter.budget)
-    return float(area_over_curve(np.array(hits), np.array(budgets, dtype=np.float64)).mean())
+def scores(study: Study, results: StudyResults) -> dict[str, float]:
+    """Return label -> area over the convergence curve, mean over the cases; 0 where a run has failed."""
+    ways = {case.name: (float(np.median(p(p.spread(64)))), p.floor) for case in study.cases if (p := case.suite)}
+    done = results.runs[results.runs["status"] == DONE]
+    hits = [first_hits(trace.evaluations, remaining_share(trace.values, *ways[case]), TARGETS)
+            for trace, case in zip(results.iter_traces(), done["case"], strict=True)]  # fmt: skip
+    area = area_over_curve(np.reshape(hits, (-1, TARGETS.size)), done["budget"].to_numpy(np.float64))
+    means = done.assign(area=area).groupby("identifier")["area"].mean()
+    failed = results.runs.loc[results.runs["status"] == FAILED, "identifier"]
+    return {str(label): float(mean) for label, mean in means.items()} | dict.fromkeys(failed, 0.0)
 
 
 def tuned_study(study: Study, found: list[Tuned]) -> str:
@@ -115,3 +183,31 @@ def tuned_study(study: Study, found: list[Tuned]) -> str:
             text += (f'\n\n[[identifiers]]\nname = "{names[each.label]}"\nlabel = "{each.label}, tuned"\n'
                      f"options = {{ {options} }}")  # fmt: skip
     return f"{text}\n"
+
+
+def tuned_document(study: Study, found: Sequence[Tuned]) -> Document:
+    """Return the answer in a sentence and the table of what was found; study: the one that is tuned."""
+    better = [each for each in found if each.options]
+    answer = f"of {len(found)} identifiers {len(better) or 'none'} {'are' if len(better) > 1 else 'is'} better tuned"
+    if better:
+        most = max(better, key=lambda each: each.tuned - each.default)
+        answer += f"; the largest gain is {most.label}, area {most.default:.3f} to {most.tuned:.3f}"
+    rows = [(e.label, e.default, e.tuned, ", ".join(f"{name} = {value:.3g}" for name, value in e.options.items()))
+            for e in found]  # fmt: skip
+    columns = ("identifier", Column("default", "area as it is", ".3f"), Column("tuned", "area tuned", ".3f"), "options")
+    caption = ("Area over the convergence curve at the largest budget, mean over the training instances. The best of "
+               "several is better on these by chance too: what it is worth the tuned study tells.")  # fmt: skip
+    main = table("Options that were found", columns, rows, caption)
+    return Document(f"{study.name}_tuned", "Tuning", "", (answer,), (), main=(main,))
+
+
+def _with_later(progress: Progress, later: int) -> Progress:
+    """Return what tells of a round as a part of the whole; later: runs of the rounds that are still to come."""
+    return lambda counts, outcome: progress(counts._replace(planned=counts.planned + later), outcome)
+
+
+def _together(endings: Sequence[Ending], later: int) -> Ending:
+    last = endings[-1]
+    return replace(last, counts=last.counts._replace(planned=last.counts.planned + later),
+                   finished=sum(e.finished for e in endings), simulations=sum(e.simulations for e in endings),
+                   seconds=sum(e.seconds for e in endings))  # fmt: skip
