@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from commands import ended
 
 from armid.errors import ArmidError
 from armid.estimation.identify import search
@@ -21,9 +20,10 @@ from armid.study.analyses.convergence import area_over_curve, attained
 from armid.study.document import report_of
 from armid.study.results import load_study
 from armid.study.runner import run_study
-from armid.study.store import Store
+from armid.study.store import Counts, Store
 from armid.study.tasks import read_study
-from armid.study.tune import RANGES, Tuned, proposed, training, tune, tuned_document
+from armid.study.tune import RANGES, Tuned, proposed, training, tune, tuned_document, tuned_study
+from commands import ended
 
 STUDY = """\
 name = "own"
@@ -228,6 +228,33 @@ def test_proposals_follow_from_scores_and_seed_and_go_where_the_area_is():
     assert isinstance(first["n_particles"], int)
 
 
+def test_a_tuned_identifier_has_the_budgets_and_seeds_of_the_one_as_it_is(written, tmp_path):
+    own = 'name = "cmaes"\nbudget = 60\nbudget_per_parameter = 8\nseeds = [4]'
+    study = read_study(written(**{'name = "cmaes"': own}))
+    found = [Tuned("pso", {"c1": 1.5}, 0.1, 0.2), Tuned("cmaes", {"growth": 2.0}, 0.1, 0.2)]
+    file = tmp_path / "tuned.toml"
+    file.write_text(tuned_study(study, found))
+    tuned = read_study(file)
+    assert tuned.labels == ["pso", "cmaes", "pso, tuned", "cmaes, tuned"]
+    for before, after in zip(tuned.entries[:2], tuned.entries[2:]):
+        assert (after.name, after.budget, after.per_parameter, after.seeds) == (
+            before.name, before.budget, before.per_parameter, before.seeds
+        )  # fmt: skip
+    assert [dict(entry.options) for entry in tuned.entries[2:]] == [{"c1": 1.5}, {"growth": 2.0}]
+
+
+def test_no_tuning_without_its_package_or_while_another_is_at_its_runs(written, tmp_path, monkeypatch):
+    pytest.importorskip("optuna")
+    first = training(read_study(written()), 1)
+    left = SimpleNamespace(interrupted=False, counts=Counts(6, 4, 0))
+    monkeypatch.setattr("armid.study.tune.run", lambda *_, **__: left)
+    with pytest.raises(ArmidError, match="2 runs of .* are still with another runner"):
+        tune(first, "own.toml", tmp_path / "out", 2)
+    monkeypatch.setattr("armid.study.tune.find_spec", lambda name: None)
+    with pytest.raises(ArmidError, match=r"needs the package optuna.*pip install 'armid\[suite\]'"):
+        tune(first, "own.toml", tmp_path / "out", 2)
+
+
 def test_the_answer_of_a_tuning(written):
     found = [Tuned("pso", {"c1": 1.2345, "n_particles": 20}, 0.41, 0.55), Tuned("de", {}, 0.3, 0.3)]
     study = read_study(written())
@@ -244,7 +271,7 @@ def test_tuning_refuses_what_it_would_be_tested_on(written):
     with pytest.raises(ArmidError, match=r"train is \[\], different ones"):
         training(read_study(written(**{"train = [3]": ""})), 1)
     none = {'"pso"': '"random"', '"cmaes"': '"sobol"'}
-    with pytest.raises(ArmidError, match="has nothing to tune, one of pso, .* is expected"):
+    with pytest.raises(ArmidError, match="has nothing to tune, one of pso, pymoo_pso, "):
         training(read_study(written(**none)), 1)
 
 

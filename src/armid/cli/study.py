@@ -128,8 +128,8 @@ def tune_command(
         first = training(known, seed)
         if speaks():
             whole = replace(first, entries=first.entries * configurations)
-            tell(f"{known.name}: {len(first.entries)} identifiers, {configurations} configurations each on {len(first.cases)} "
-                 f"training instances: {whole.cost()}; what is finished already is kept")  # fmt: skip
+            tell(f"{known.name}: {len(first.entries)} identifiers, {configurations} configurations of each on "
+                 f"{len(first.cases)} instances: {whole.cost()}; what is finished already is kept")  # fmt: skip
         folder = RESULTS / f"{known.name}_tuned" if out is None else out
         found, ending = tune(first, study, folder / "training", configurations, jobs, dask, show_progress)
     answer: list[str] = []

@@ -6,8 +6,9 @@ proposed follows from the runs that it holds, so that a tuning that was interrup
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,9 @@ from armid.report.document import Column, Document, table
 from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve
 from armid.study.cases import suite_cases
-from armid.study.outcome import DONE, FAILED
+from armid.study.outcome import DONE
 from armid.study.results import StudyResults, load_study
 from armid.study.runner import Ending, Progress, run
-from armid.study.spec import WHOLE
 from armid.study.tasks import Entry, Study
 
 SWARM_PULLS = {"c1": (0.3, 2.5), "c2": (0.3, 2.5)}
@@ -58,35 +58,14 @@ def tune(
     first: Study, file: str | Path, out: Path, n: int, jobs: int | None = None, dask: str | None = None,
     progress: Progress = lambda counts, outcome: None,
 ) -> tuple[list[Tuned], Ending]:  # fmt: skip
-    """Try n configurations of each identifier; runs that the store holds already are not made again.
+    """Try n configurations of each identifier; return what was found, nothing after Ctrl-C, and how all rounds ended.
 
-    Parameters
-    ----------
-    first
-        The training study with the defaults alone, see `training`.
-    file, out, jobs, dask, progress
-        As `armid.study.runner.run` takes them; all rounds are one study to who is told of the progress.
-    n
-        Configurations of each identifier, its defaults among them.
-
-    Returns
-    -------
-    list of Tuned
-        One an identifier; empty after Ctrl-C.
-    Ending
-        Of all rounds together.
-
-    Raises
-    ------
-    ArmidError
-        Without Optuna, and while another runner is at runs of the store.
+    first: see `training`. The others are those of `armid.study.runner.run`; progress is told of all rounds as one
+    study. Raises ArmidError without Optuna, and while another runner is at runs of the store.
     """
-    try:
-        import optuna
-    except ImportError as error:
+    if find_spec("optuna") is None:
         raise ArmidError("armid tune needs the package optuna, which is not installed: "
-                         "pip install 'armid[suite]' is expected") from error  # fmt: skip
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+                         "pip install 'armid[suite]' is expected")  # fmt: skip
     tried: dict[str, list[Entry]] = {entry.label: [] for entry in first.entries}
     areas: dict[str, float] = {}
     endings: list[Ending] = []
@@ -94,7 +73,7 @@ def tune(
         for entry in first.entries:
             own = tried[entry.label]
             known = [(each.options, areas[each.label]) for each in own[1:]]
-            options = proposed(entry.name, known, (first.entries[0].seeds[0], i)) if i else {}
+            options = proposed(entry.name, known, (entry.seeds[0], i)) if i else {}
             # the same once more would tell nothing new
             if all(each.options != options for each in own):
                 own.append(replace(entry, label=f"{entry.label} {i}", options=options))
@@ -107,10 +86,11 @@ def tune(
             raise ArmidError(f"{endings[-1].counts.missing} runs of {out} are still with another runner: let it end, "
                              "the same command goes on then")  # fmt: skip
         areas = scores(study, load_study(out))
-    # the first of the best: of defaults that nothing surpasses no options are told
-    best = {label: max(own, key=lambda each: areas[each.label]) for label, own in tried.items()}
-    found = [Tuned(label, best[label].options, areas[own[0].label], areas[best[label].label])
-             for label, own in tried.items()]  # fmt: skip
+    found = []
+    for label, own in tried.items():
+        # the first of the best: nothing is told where nothing surpasses the defaults
+        best = max(own, key=lambda each: areas[each.label])
+        found.append(Tuned(label, best.options, areas[own[0].label], areas[best.label]))
     return found, _together(endings, 0)
 
 
@@ -129,8 +109,7 @@ def training(study: Study, seed: int) -> Study:
     if not entries:
         raise ArmidError(f"study '{study.name}' has nothing to tune, one of {', '.join(RANGES)} without options is "
                          "expected")  # fmt: skip
-    spec = replace(study.spec, name=f"{study.name}_training", question="Which options are best on the train instances?",
-                   report="", windows_s=(WHOLE,))  # fmt: skip
+    spec = replace(study.spec, name=f"{study.name}_training", question="Which options are best on the train instances?")
     return replace(study, spec=spec, cases=tuple(cases), entries=tuple(entries))
 
 
@@ -144,20 +123,17 @@ def tunable(study: Study) -> list[Entry]:
     return found
 
 
-def proposed(name: str, known: Sequence[tuple[Mapping[str, Any], float]], seed: Sequence[int]) -> dict[str, Any]:
+def proposed(name: str, known: Iterable[tuple[Mapping[str, Any], float]], seed: Sequence[int]) -> dict[str, Any]:
     """Return the next configuration of an identifier; the same scores and seed propose the same."""
-    from optuna import create_study, create_trial
-    from optuna.distributions import BaseDistribution, FloatDistribution, IntDistribution
-    from optuna.samplers import TPESampler
+    import optuna
 
-    ranges: dict[str, BaseDistribution] = {
-        option: (IntDistribution if isinstance(low, int) else FloatDistribution)(low, high, log=high >= 10 * low)
-        for option, (low, high) in RANGES[name].items()
-    }
-    sampler = TPESampler(seed=int(np.random.SeedSequence(seed).generate_state(1)[0]))
-    trials = create_study(direction="maximize", sampler=sampler)
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    kinds: dict[type, Any] = {int: optuna.distributions.IntDistribution, float: optuna.distributions.FloatDistribution}
+    ranges = {option: kinds[type(low)](low, high, log=high >= 10 * low) for option, (low, high) in RANGES[name].items()}
+    sampler = optuna.samplers.TPESampler(seed=int(np.random.SeedSequence(seed).generate_state(1)[0]))
+    trials = optuna.create_study(direction="maximize", sampler=sampler)
     for options, area in known:
-        trials.add_trial(create_trial(params=dict(options), distributions=ranges, value=area))
+        trials.add_trial(optuna.create_trial(params=dict(options), distributions=ranges, value=area))
     return dict(trials.ask(ranges).params)
 
 
@@ -169,19 +145,24 @@ def scores(study: Study, results: StudyResults) -> dict[str, float]:
             for trace, case in zip(results.iter_traces(), done["case"], strict=True)]  # fmt: skip
     area = area_over_curve(np.reshape(hits, (-1, TARGETS.size)), done["budget"].to_numpy(np.float64))
     means = done.assign(area=area).groupby("identifier")["area"].mean()
-    failed = results.runs.loc[results.runs["status"] == FAILED, "identifier"]
+    failed = results.runs.loc[results.runs["status"] != DONE, "identifier"]
     return {str(label): float(mean) for label, mean in means.items()} | dict.fromkeys(failed, 0.0)
 
 
 def tuned_study(study: Study, found: list[Tuned]) -> str:
-    """Return the text of the study with the tuned identifiers behind the others."""
-    names = {entry.label: entry.name for entry in study.entries}
+    """Return the text of the study with the tuned identifiers behind the others, on the same budgets and seeds."""
+    entries, spec = {entry.label: entry for entry in reversed(study.entries)}, study.spec
     text = re.sub(r'(?m)^name = ".*"$', f'name = "{study.name}_tuned"', study.text.rstrip(), count=1)
     for each in found:
         if each.options:
+            entry = entries[each.label]
             options = ", ".join(f"{name} = {value!r}" for name, value in each.options.items())
-            text += (f'\n\n[[identifiers]]\nname = "{names[each.label]}"\nlabel = "{each.label}, tuned"\n'
-                     f"options = {{ {options} }}")  # fmt: skip
+            text += f'\n\n[[identifiers]]\nname = "{entry.name}"\nlabel = "{each.label}, tuned"\n'
+            text += f"budget = {entry.budget}\n" if entry.budget != spec.budget else ""
+            if entry.per_parameter != spec.budget_per_parameter:
+                text += f"budget_per_parameter = {list(entry.per_parameter)}\n"
+            text += f"seeds = {list(entry.seeds)}\n" if entry.seeds != spec.seeds else ""
+            text += f"options = {{ {options} }}"
     return f"{text}\n"
 
 
