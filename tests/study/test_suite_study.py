@@ -248,7 +248,7 @@ def test_no_tuning_without_its_package_or_while_another_is_at_its_runs(written, 
     first = training(read_study(written()), 1)
     left = SimpleNamespace(interrupted=False, counts=Counts(6, 4, 0))
     monkeypatch.setattr("armid.study.tune.run", lambda *_, **__: left)
-    with pytest.raises(ArmidError, match="2 runs of .* are still with another runner"):
+    with pytest.raises(ArmidError, match=r"2 runs of .* are still with another runner"):
         tune(first, "own.toml", tmp_path / "out", 2)
     monkeypatch.setattr("armid.study.tune.find_spec", lambda name: None)
     with pytest.raises(ArmidError, match=r"needs the package optuna.*pip install 'armid\[suite\]'"):
