@@ -50,6 +50,8 @@ THREE = (
     ("stribeck", "flux_saturation", "gyro_lag"),
 )  # fmt: skip
 FAMILIES = ("control", "fault", "constant", "constants", "two", "three", "trend")
+# An effect that moves no record by so many times the noise is not there for anyone: the arm is drawn anew.
+LEAST = 2.0
 # What changes from record to record in a trend, by how much from the first to the last.
 TRENDS, TREND = ("p0", "k", "eta3", "n"), (0.02, 0.08)
 
@@ -76,9 +78,12 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
                 for m, _ in strokes]  # fmt: skip
         found = [run(Motion(a, m, truth.effects()), duration) for a, m in zip(arms, moved, strict=True)]
         told = run(Motion(arm, strokes[place][0], truth.effects()), duration)
-        if told is not None and all(found):
+        if told is None or not all(found):
+            continue
+        drawn = Drawn(arm, strokes, duration, gyro, tuple(f for f in found if f is not None))
+        if all(moves(drawn, replace(truth, planted=tuple(p for p in planted if p is not each))) > LEAST
+               for each in planted):  # fmt: skip
             break
-    drawn = Drawn(arm, strokes, duration, gyro, tuple(f for f in found if f is not None))
     records = measure_strokes(suite, drawn, truth.effects(), rng)
     dirt = DIRT[index // 2 % len(DIRT)] if family == "control" else "none"
     for i, each in enumerate(records):
@@ -99,10 +104,7 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
     if dirt == "jitter":
         files |= {each.file: record_text(each, gyro.decimals, 6) for each in records}
     if trend:
-        sound = [run(Motion(arm, m, truth.effects()), duration) for m in moved]
-        changes = [a.gyro - b.gyro for a, b in zip(drawn.trajectories, sound, strict=True) if b is not None]
-        moves = max(rms(np.degrees(change)) for change in changes) / gyro.noise_deg_s
-        fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves}
+        fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, truth)}
     entry = {
         "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
         "effects": [planted_entry(p) | {"alone": None} for p in planted],
@@ -111,6 +113,16 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
         "constants": off, "dirt": dirt,
     }  # fmt: skip
     return files, entry
+
+
+def moves(drawn: Drawn, other: Case) -> float:
+    """Return by how many times the noise the record moves that changes most when other effects are there, infinite
+    where one cannot be simulated.
+    """
+    there = [run(Motion(drawn.arm, m, other.effects()), drawn.duration_s) for m, _ in drawn.strokes]
+    changes = [math.inf if b is None else rms(np.degrees(a.gyro - b.gyro))
+               for a, b in zip(drawn.trajectories, there, strict=True)]  # fmt: skip
+    return max(changes) / drawn.gyro.noise_deg_s
 
 
 def at_its_place(arm: Arm, trend: dict[str, Any], place: float) -> Arm:

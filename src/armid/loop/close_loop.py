@@ -30,6 +30,7 @@ from armid.loop.constants import (
     constant_models,
     constants_beside,
     group_beside,
+    is_outdone,
     known_together,
     measurements,
     trends_of,
@@ -56,7 +57,7 @@ from armid.loop.result import (
     estimates,
     unseen_biases_of,
 )
-from armid.loop.search import Search, SearchLevel
+from armid.loop.search import COMPARABLE, Search, SearchLevel
 from armid.loop.suspects import (
     FREED,
     LEFT_OUT,
@@ -347,8 +348,12 @@ def decide(search: Search) -> Decision:
     levels = search.run(1) if beside else search.run()
     if len(levels) > 1 and not lacks:
         beside = constant_models(declared, within, library)
+    constants = answer_of_constants(beside, levels[-1].best)
+    if constants is not None and levels[-1].best.chi2 < COMPARABLE * constants.fit.chi2:
+        more = search.run()
+        if is_outdone(constants, more[-1].best, len(search.library.candidates)):
+            levels, constants = more, None
     last, library = levels[-1].best, search.library
-    constants = answer_of_constants(beside, last)
     if constants is not None:
         wider = {name: constants.scale * tolerance for name, tolerance in library.tolerances.items()}
         return Decision(search, replace(library, tolerances=wider), declared, constants.fit, last,

@@ -20,7 +20,7 @@ from armid.loop.candidates import ROUGHLY, Library
 from armid.loop.diagnose import is_significant
 from armid.loop.equivalence import MOST as TOO_MANY
 from armid.loop.equivalence import WITHIN, EffectGroup
-from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
+from armid.loop.fit import FAMILYWISE, Fit, beyond, compare, decomposed, fit_from, with_own_starts
 from armid.loop.score_test import candidate_at
 from armid.loop.search import Search, unless_diverged
 from armid.loop.suspects import FREED, Suspect, simulated_file, with_measured
@@ -176,6 +176,19 @@ def answer_of_constants(models: Sequence[ConstantModel], named: Fit) -> Constant
     if best is None or len(named.active) != 1 or is_significant(named):
         return best
     return next((m for m in models if m.chi2 < named.chi2 + WITHIN), None)
+
+
+def is_outdone(constants: ConstantModel, named: Fit, n_candidates: int) -> bool:
+    """Tell whether a set of effects leaves noise and does what the constants that explain the records cannot do.
+
+    Noise whose level a short rest tells may hide what they leave; it does not hide how much better a set fits.
+    """
+    n = len(named.active)
+    if n < 2 or is_significant(named):
+        return False
+    # What is left out of a fit is no test: the constants stay as all records have them.
+    compared = compare(constants.fit, named, n_candidates**n, n_extra=n)
+    return compared.p < FAMILYWISE and compared.gain > 0.0
 
 
 def constants_beside(models: Sequence[ConstantModel]) -> tuple[str, ...]:

@@ -342,15 +342,15 @@ def predicted_alike(fits: Sequence[Fit]) -> list[Fit]:
 
 
 def parts_to_judge(smaller: Fit, larger: Fit) -> list[Part]:
-    """Return what is left out in turn: whole manoeuvres, of two that do not determine each other blocks of time.
+    """Return what is left out in turn: whole manoeuvres, of those that the others do not determine blocks of time.
 
-    What one manoeuvre predicts of another says nothing of an effect where the parameters that it leaves undetermined
+    What the others predict of a manoeuvre says nothing of an effect where the parameters that they leave undetermined
     may change that prediction by more than the effect is to explain.
     """
-    whole = larger.records.data.parts()
-    if len(whole) != 2:
-        return whole
     data = larger.records.data
+    whole = data.parts()
+    if len(whole) < 2:
+        return whole
     judged = [data.blocks(part) if is_undetermined(smaller, larger, part) else [part] for part in whole]
     return [part for parts in judged for part in parts]
 

@@ -13,8 +13,8 @@ from armid.errors import ArmidError
 from armid.estimation.least_squares import REACH, held_by_bound, spread_starts
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
 from armid.loop.diagnose import is_significant, train_residuals
-from armid.loop.equivalence import substitutes
-from armid.loop.fit import Comparison, Fit, compare, criterion, fit_from, with_own_starts
+from armid.loop.equivalence import WITHIN, substitutes
+from armid.loop.fit import Comparison, Fit, behind, compare, criterion, fit_from, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
 from armid.loop.whitening import WhiteRecords
 
@@ -35,13 +35,15 @@ QUIET = 0.1
 # Of so many of the best the fixed shapes are set free: a rival must not lose by the width of a sign alone.
 N_FREED, FREED_WITHIN = 4, 4.0
 # Scores are a linear guess: refit at least and at most so many, and those within a factor of the best.
-FEWEST, MOST, WITHIN = 6, 12, 4.0
+FEWEST, MOST, FACTOR = 6, 12, 4.0
 # So many of them are refitted even where the score says that they cannot do as well as a model that is known.
 SURE = 4
 # A drop of chi2 that one candidate in thousands reaches on noise: below it nothing is refitted.
 WORTH = 8.0
 # An addition whose statistic stays below this is not looked at further; one in ten thousand asks for 15.
 PROMISING = 12.0
+# One that no noise reaches, whatever is known of its level.
+CLEAR = 40.0
 # Refits stop early; those are finished whose n ln(chi2) is within this of the best of their size, and so many anyhow.
 FAR, N_FINISHED = 50.0, 4
 # Where a limit is set, nothing is exchanged in a model that leaves more than this share of what is above it.
@@ -135,7 +137,7 @@ class Search:
         smaller: the model with which they are compared.
         """
         size = len(last.best.active) + 1
-        if last.best.active and (p := train_residuals(last.best).diagnosis.p) > QUIET:
+        if last.best.active and (p := train_residuals(last.best).diagnosis.p) > QUIET and not self.is_clear(last.best):
             self.note_round(size, f"what is left is noise (chance {p:.2g}; below {QUIET:g} the search goes on)")
             return None
         self.extend(last.best)
@@ -157,6 +159,10 @@ class Search:
                 self.extend(self.reduced(best, tuple(k for k in best.active if k != key)))
             if self.of_size(size)[0] is best:
                 self.exchange_substitutes(best)
+                if not is_significant(best):
+                    # A rival that does nearly as well may be the right effect beside another that is not.
+                    for rival in parents([f for f in self.of_size(size) if behind(f, best) < WITHIN])[1:]:
+                        self.exchange_substitutes(rival)
             self.free_shapes(f for f in self.of_size(size)[:N_FREED] if f.chi2 <= FREED_WITHIN * best.chi2)
             if self.of_size(size)[0] is best:
                 break
@@ -189,16 +195,24 @@ class Search:
         """
         least = WORTH * max(1.0, parent.chi2 / len(parent.residual))
         worth = [s for s in self.scores_at(parent) if s.drop > least and s.twin is None]
-        near = [s for s in worth if s.drop * WITHIN >= worth[0].drop]
+        near = [s for s in worth if s.drop * FACTOR >= worth[0].drop]
         leading = [s for s in worth[: max(FEWEST, min(MOST, len(near)))] if parent.chi2 - REACH * s.drop <= self.limit]
         self.add_each(parent, leading[:SURE])
         limit = min((f.chi2 for f in self.of_size(len(parent.active) + 1)), default=np.inf)
         self.add_each(parent, [s for s in leading[SURE:] if parent.chi2 - REACH * s.drop <= limit])
 
+    def is_clear(self, fit: Fit) -> bool:
+        """Tell whether a candidate would lower chi2 by far more than noise lets it, to first order.
+
+        Where noise is coloured and its level known from a short rest, that shows what no test of the residual does.
+        """
+        drop = max((s.drop for s in self.scores_at(fit)), default=0.0)
+        return fit.independent * np.log(fit.chi2 / max(fit.chi2 - drop, 1e-300)) > CLEAR
+
     def add_each(self, parent: Fit, found: Iterable[Score]) -> None:
         """Fit a model with each of some candidates added, as far as it may come near the best of its size."""
         best = min(self.of_size(len(parent.active) + 1), key=lambda f: f.chi2, default=None)
-        limit = np.inf if best is None else best.chi2 * max(COMPARABLE, float(np.exp(FAR / best.independent)))
+        limit = np.inf if best is None else best.chi2 * max(COMPARABLE, min(FACTOR, np.exp(FAR / best.independent)))
         self.fit_each({
             frozenset((*parent.active, s.key)): partial(refitted, parent, s, self.library, min(limit, self.limit))
             for s in found
@@ -273,7 +287,8 @@ class Search:
         """Bring the models near the best of a size to their estimates; the others stay where a few steps led."""
         while True:
             fits = self.of_size(size)
-            near = [f for i, f in enumerate(fits) if f.rough and (i < N_FINISHED or far_behind(f, fits[0]) < FAR)]
+            near = [f for i, f in enumerate(fits) if f.rough and (
+                i < N_FINISHED or (far_behind(f, fits[0]) < FAR and f.chi2 < COMPARABLE * fits[0].chi2))]  # fmt: skip
             if not near:
                 break
             found = self.library.each(unless_diverged, [partial(finished, f, self.library) for f in near])
