@@ -37,6 +37,7 @@ from stand.blind.campaign import (
 from stand.blind.draw import Drawn, draw_arm, rms, run, six_strokes
 from stand.blind.suite import Case, Suite, read_suite, signed
 from stand.campaign import record_text
+from stand.effects import Effects
 from stand.gyro import Gyro
 from stand.motion import Motion
 
@@ -50,8 +51,8 @@ THREE = (
     ("stribeck", "flux_saturation", "gyro_lag"),
 )  # fmt: skip
 FAMILIES = ("control", "fault", "constant", "constants", "two", "three", "trend")
-# An effect that moves no record by so many times the noise is not there for anyone: the arm is drawn anew.
-LEAST = 2.0
+# An effect that moves no record by more than its noise is hardly there: the arm is drawn anew until each does.
+LEAST = 1.0
 # What changes from record to record in a trend, by how much from the first to the last.
 TRENDS, TREND = ("p0", "k", "eta3", "n"), (0.02, 0.08)
 
@@ -81,8 +82,8 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
         if told is None or not all(found):
             continue
         drawn = Drawn(arm, strokes, duration, gyro, tuple(f for f in found if f is not None))
-        if all(moves(drawn, replace(truth, planted=tuple(p for p in planted if p is not each))) > LEAST
-               for each in planted):  # fmt: skip
+        rests = [replace(truth, planted=tuple(p for p in planted if p is not each)) for each in planted]
+        if all(moves(drawn, truth.effects(), rest.effects()) > LEAST for rest in rests):
             break
     records = measure_strokes(suite, drawn, truth.effects(), rng)
     dirt = DIRT[index // 2 % len(DIRT)] if family == "control" else "none"
@@ -104,7 +105,7 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
     if dirt == "jitter":
         files |= {each.file: record_text(each, gyro.decimals, 6) for each in records}
     if trend:
-        fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, truth)}
+        fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, truth.effects(), truth.effects())}
     entry = {
         "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
         "effects": [planted_entry(p) | {"alone": None} for p in planted],
@@ -115,12 +116,13 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
     return files, entry
 
 
-def moves(drawn: Drawn, other: Case) -> float:
+def moves(drawn: Drawn, effects: Effects, others: Effects) -> float:
     """Return by how many times the noise the record moves that changes most when other effects are there, infinite
     where one cannot be simulated.
     """
-    there = [run(Motion(drawn.arm, m, other.effects()), drawn.duration_s) for m, _ in drawn.strokes]
-    changes = [math.inf if b is None else rms(np.degrees(a.gyro - b.gyro))
+    there = [run(Motion(drawn.arm, m, others), drawn.duration_s) for m, _ in drawn.strokes]
+    bias = effects.gyro_bias_deg_s - others.gyro_bias_deg_s
+    changes = [math.inf if b is None else rms(np.degrees(a.gyro - b.gyro) + bias)
                for a, b in zip(drawn.trajectories, there, strict=True)]  # fmt: skip
     return max(changes) / drawn.gyro.noise_deg_s
 
