@@ -105,7 +105,8 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
     if dirt == "jitter":
         files |= {each.file: record_text(each, gyro.decimals, 6) for each in records}
     if trend:
-        fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, truth.effects(), truth.effects())}
+        there = truth.effects()
+        fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, there, there)}
     entry = {
         "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
         "effects": [planted_entry(p) | {"alone": None} for p in planted],
