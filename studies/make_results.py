@@ -74,24 +74,24 @@ RECIPES = {
     "benchmark": study("benchmark", "ecdf", "critical_difference_0_3_deg_s"),
     "best_chain": study("best_chain"),
     "blind": scored("blind", "confusion", "held_out", before=((BLIND, f"{STAND} blind {BLIND} --seed 97"),)),
-    "cramer_rao": study("cramer_rao", "cramer_rao"),
+    "cramer_rao": study("cramer_rao", "cramer_rao"), "fitness": study("fitness", "fitness"),
     "dfki_pendulum": loop("dfki_pendulum", "residuals", campaign="out/campaigns/dfki"),
     "emps": loop("emps", "residuals", campaign="out/campaigns/emps", more=(
         "python studies/measured/emps/inverse_model.py out/campaigns/emps out/emps/inverse_model.md",
     )),
     "emps_identified": Recipe((f"{EMPS} --fitness rmse --out out/emps_identified",)),
-    "families": scored("families", before=((FAMILIES, f"python studies/stand/families.py {FAMILIES} --seed 103 "
+    "families": scored("families", before=((FAMILIES, f"python studies/stand/families.py {FAMILIES} --seed 107 "
                                             "fault=200 constant=100 constants=100 two=100 three=100 control=200"),)),
-    "fitness": study("fitness", "fitness"),
-    "four_strokes": loop("four_strokes", "parameters"),
+    "four_strokes": loop("four_strokes", "parameters"), "one_stroke": loop("one_stroke", "parameters"),
     "landscape": Recipe(("python studies/suite/landscape.py --out out/landscape",), ("landscape",)),
     "measured": Recipe(("python studies/measured/run.py --data out/data --out out/measured",)),
-    "one_stroke": loop("one_stroke", "parameters"),
     "paper_arm": Recipe(("armid identify studies/campaigns/paper_arm --out out/paper_arm",), ("fit",)),
     "rocking_shell": loop("rocking_shell", "residuals", "ranking"),
     "suite": study("suite", "attained", file="suite/suite"), "suite_long": study("suite_long", file="suite/long"),
-    "table1": study("table1", "table1", "valley_noise_free"),
-    "table1_short": study("table1_short"), "table2": study("table2", "table2"),
+    "suite_tuned": study("suite_tuned", file="../out/tuned/tuned", before=(
+        ("out/tuned/tuned.toml", "armid tune studies/suite/suite.toml --configurations 10 --out out/tuned"),)),
+    "table1": study("table1", "table1", "valley_noise_free"), "table1_short": study("table1_short"),
+    "table2": study("table2", "table2"),
 }  # fmt: skip
 
 
