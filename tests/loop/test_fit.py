@@ -32,11 +32,17 @@ def test_manoeuvres_that_do_not_determine_each_other_are_judged_in_blocks():
     assert np.array_equal(np.sort(np.concatenate(parts)), np.arange(2 * N))
 
 
+def test_the_one_of_three_that_the_others_do_not_determine_is_judged_in_blocks():
+    """So it is with the record of a load that no other has: what the rest predicts of it says nothing."""
+    parts = parts_to_judge(*models([(50.0, 0.0), (50.0, 1.0), (50.0, 50.0)], 2.0, 3))
+    assert [len(p) for p in parts] == [N, N, *5 * [N // 5]]
+
+
 @pytest.mark.parametrize(("slopes", "size", "n_parts"), [
-    (TOGETHER, 2.0, 2), (APART, 50.0, 2), (APART, 2.0, 3), (APART, 2.0, 1),
+    (TOGETHER, 2.0, 2), (APART, 50.0, 2), (APART, 2.0, 3), (TOGETHER, 2.0, 1),
 ])  # fmt: skip
 def test_others_are_left_out_whole(slopes, size, n_parts):
-    """They predict each other, or the effect is larger than what they leave open, or there are three, or one."""
+    """They predict each other, or the effect is larger than what they leave open, or a third sees both, or there is one."""
     parts = parts_to_judge(*models(slopes, size, n_parts))
     assert [len(p) for p in parts] == [N] * n_parts
 

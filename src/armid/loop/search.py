@@ -69,7 +69,12 @@ class SearchLevel:
     @property
     def earned(self) -> bool:
         """Whether its best is preferred to the smaller ones."""
-        return self.comparison is None or self.comparison.earned
+        return not self.refused
+
+    @property
+    def refused(self) -> str:
+        """Which threshold was not reached, in words; "" where all were."""
+        return "" if self.comparison is None else self.comparison.why
 
 
 @dataclass(eq=False)
@@ -129,7 +134,22 @@ class Search:
                     break
             elif len(levels) > LOOK_AHEAD or not is_significant(level.best):
                 break
-        return levels[:earned]
+        return self.renewed(levels)
+
+    def renewed(self, levels: Sequence[SearchLevel]) -> list[SearchLevel]:
+        """Return the levels up to the last that earned its effects, each with what was found of its size later.
+
+        An exchange in a larger model may leave a smaller one that is better than all that its own round had tried.
+        """
+        found, earned = [levels[0]], 1
+        for old in levels[1:]:
+            level, fits = old, self.of_size(len(old.best.active))
+            if far_behind(old.best, fits[0]) > WITHIN:
+                level = self.judged(fits, found[earned - 1].best)
+                self.note_round(len(fits[0].active), level.refused)
+            found.append(level)
+            earned = len(found) if level.earned else earned
+        return found[:earned]
 
     def next_level(self, last: SearchLevel, smaller: Fit) -> SearchLevel | None:
         """Return the best models with one effect more, None where no candidate is worth a fit.
@@ -166,13 +186,18 @@ class Search:
             self.free_shapes(f for f in self.of_size(size)[:N_FREED] if f.chi2 <= FREED_WITHIN * best.chi2)
             if self.of_size(size)[0] is best:
                 break
-        fits, n_more = self.of_size(size), size - len(smaller.active)
         # An exchange may have found a better model of the size before.
-        smaller = self.of_size(size - 1)[0] if n_more == 1 else smaller
+        smaller = self.of_size(size - 1)[0] if size - len(smaller.active) == 1 else smaller
+        level = self.judged(self.of_size(size), smaller)
+        self.note_round(size, level.refused)
+        return level
+
+    def judged(self, fits: Sequence[Fit], smaller: Fit) -> SearchLevel:
+        """Return the models of a size as a level whose best is compared with a smaller model."""
         self.library.say(f"judging {' + '.join(fits[0].names)}")
+        n_more = len(fits[0].active) - len(smaller.active)
         new = [s.n_shapes for s in self.scores_at(smaller) if s.key in fits[0].active and s.key not in smaller.active]
         compared = compare(smaller, fits[0], len(self.library.candidates) ** n_more, max(new, default=1), n_more)
-        self.note_round(size, compared.why)
         return SearchLevel(tuple(fits), compared)
 
     def note_round(self, size: int, refused: str) -> None:
@@ -207,7 +232,7 @@ class Search:
         Where noise is coloured and its level known from a short rest, that shows what no test of the residual does.
         """
         drop = max((s.drop for s in self.scores_at(fit)), default=0.0)
-        return fit.independent * np.log(fit.chi2 / max(fit.chi2 - drop, 1e-300)) > CLEAR
+        return bool(fit.independent * np.log(fit.chi2 / max(fit.chi2 - drop, 1e-300)) > CLEAR)
 
     def add_each(self, parent: Fit, found: Iterable[Score]) -> None:
         """Fit a model with each of some candidates added, as far as it may come near the best of its size."""
