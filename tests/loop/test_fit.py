@@ -42,7 +42,7 @@ def test_the_one_of_three_that_the_others_do_not_determine_is_judged_in_blocks()
     (TOGETHER, 2.0, 2), (APART, 50.0, 2), (APART, 2.0, 3), (TOGETHER, 2.0, 1),
 ])  # fmt: skip
 def test_others_are_left_out_whole(slopes, size, n_parts):
-    """They predict each other, or the effect is larger than what they leave open, or a third sees both, or there is one."""
+    """They predict each other, the effect is larger than what they leave open, a third sees both, or there is one."""
     parts = parts_to_judge(*models(slopes, size, n_parts))
     assert [len(p) for p in parts] == [N] * n_parts
 

@@ -1,13 +1,15 @@
 """Shapes that are fixed by declaration, set free where a model is among the best; work shared among threads."""
 
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from armid.estimation.least_squares import side_by_side
 from armid.loop.candidates import EffectKey, Library, library_of
-from armid.loop.search import Search, best_along, finished, with_free_shapes
+from armid.loop.fit import Comparison
+from armid.loop.search import Search, SearchLevel, best_along, finished, with_free_shapes
 from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
@@ -58,6 +60,25 @@ def test_a_narrow_valley_is_found_along_one_parameter():
     best = best_along(Narrow(), np.array([0.5, 0.5]), 1)
     assert best[0] == 0.5
     assert best[1] == pytest.approx(0.7123, abs=0.002)
+
+
+def test_what_is_found_of_a_size_later_takes_the_place_of_its_best(monkeypatch):
+    """The right pair turned up only as an exchange beside a third effect, which does not earn its place then."""
+    earned, not_earned = Comparison(1.0, 0.0, (2.0, 1.0)), Comparison(-1.0, 1.0, (np.nan, np.nan))
+
+    def fit(chi2, names):
+        active = tuple(map(EffectKey, names))
+        return SimpleNamespace(active=active, chi2=chi2, independent=100.0, n_free=len(names), residual=np.ones(9))
+
+    none, one, wrong, right, three = map(fit, (1e6, 1e5, 1e4, 101.0, 100.0), ("", "a", "bc", "ad", "abd"))
+    levels = [SearchLevel((none,)), SearchLevel((one,), earned), SearchLevel((wrong,), earned)]
+    monkeypatch.setattr(Search, "judged", lambda _, fits, smaller: SearchLevel(tuple(fits), earned))
+    monkeypatch.setattr(Search, "note_round", lambda *_: None)
+    search = Search(None, {frozenset(f.active): f for f in (none, one, wrong, right, three)})
+    assert [level.best for level in search.renewed([*levels, SearchLevel((three,), not_earned)])] == [none, one, right]
+    assert search.renewed([*levels, SearchLevel((three,), earned)])[-1].best is three
+    del search.fits[frozenset(right.active)]
+    assert search.renewed(levels) == levels
 
 
 def test_keys_and_what_they_own():
