@@ -349,7 +349,7 @@ def decide(search: Search) -> Decision:
     if len(levels) > 1 and not lacks:
         beside = constant_models(declared, within, library)
     constants = answer_of_constants(beside, levels[-1].best)
-    if constants is not None and levels[-1].best.chi2 < COMPARABLE * constants.fit.chi2:
+    if constants is not None and (constants.is_stretched or levels[-1].best.chi2 < COMPARABLE * constants.fit.chi2):
         more = search.run()
         if is_outdone(constants, more[-1].best, len(search.library.candidates)):
             levels, constants = more, None

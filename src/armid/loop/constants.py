@@ -30,8 +30,9 @@ from armid.record import Record
 Array = NDArray[np.float64]
 # So many single products are refitted, of those that take away this share of what is no noise.
 MOST, HALF = 6, 0.5
-# In tolerances: how far a fit may go, and what is no answer any more.
-FARTHEST, PLAUSIBLE = 4.0, 3.0
+# In tolerances: how far a fit may go, and from where on one alone is no answer; at this share of the first a bound
+# holds it.
+FARTHEST, PLAUSIBLE, HELD = 4.0, 3.0, 0.99
 # Relative fall of chi2 in one step at which their fit stops, a constant costs a simulation of its own; and what chi2 a
 # sample must be in reach: of noise it is 1.
 SETTLED, IN_REACH = 1e-6, 2.0
@@ -74,9 +75,15 @@ class ConstantModel:
         return tuple(n for n, u in self.off.items() if abs(u) >= least)
 
     @property
+    def is_stretched(self) -> bool:
+        """Whether a constant is far outside its tolerance."""
+        return max(map(abs, self.off.values())) >= PLAUSIBLE
+
+    @property
     def explains(self) -> bool:
-        """Whether it leaves noise, no constant far outside its tolerance."""
-        return max(map(abs, self.off.values())) < PLAUSIBLE and not is_significant(self.fit)
+        """Whether it leaves noise, one alone not far outside its tolerance, none of many as far as a fit may go."""
+        most = PLAUSIBLE if len(self.off) == 1 else HELD * FARTHEST
+        return max(map(abs, self.off.values())) < most and not is_significant(self.fit)
 
     @property
     def chi2(self) -> float:
@@ -181,11 +188,14 @@ def answer_of_constants(models: Sequence[ConstantModel], named: Fit) -> Constant
 def is_outdone(constants: ConstantModel, named: Fit, n_candidates: int) -> bool:
     """Tell whether a set of effects leaves noise and does what the constants that explain the records cannot do.
 
-    Noise whose level a short rest tells may hide what they leave; it does not hide how much better a set fits.
+    Noise whose level a short rest tells may hide what they leave; it does not hide how much better a set fits. Of
+    constants that are far off it is asked only to fit better.
     """
     n = len(named.active)
     if n < 2 or is_significant(named):
         return False
+    if constants.is_stretched:
+        return named.chi2 < constants.chi2
     # What is left out of a fit is no test: the constants stay as all records have them.
     compared = compare(constants.fit, named, n_candidates**n, n_extra=n)
     return compared.p < FAMILYWISE and compared.gain > 0.0

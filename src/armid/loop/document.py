@@ -378,12 +378,19 @@ def constants_sentence(found: ClosedLoop) -> str:
     moved = sorted((n for n in step.constants), key=lambda n: -abs(shares[first_member(n)]))
     told = ", ".join(f"{n.removeprefix(NAMED)} {shares[first_member(n)]:+.1%}" for n in moved[:MOST_PORTS])
     others = f"; so would {' or '.join(step.alternatives)}" if step.alternatives else ""
-    return (f"No effect is needed: with constants off within their tolerances ({told}) {remains(found)} on "
+    known = found.campaign.tolerances
+    beyond = any(abs(shares[first_member(n)]) > sum(known[each] for each in members(n)) for n in moved)
+    within = ", some beyond" if beyond else " within"
+    return (f"No effect is needed: with constants off{within} their tolerances ({told}) {remains(found)} on "
             f"{judged_on(found)}{others}.")  # fmt: skip
 
 
 def first_member(name: str) -> str:
-    return re.split(r"[*/+]", name.removeprefix(NAMED))[0]
+    return members(name)[0]
+
+
+def members(name: str) -> list[str]:
+    return re.split(r"[*/+]", name.removeprefix(NAMED))
 
 
 def carried_sentence(found: ClosedLoop) -> str:

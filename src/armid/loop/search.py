@@ -42,6 +42,8 @@ SURE = 4
 WORTH = 8.0
 # An addition whose statistic stays below this is not looked at further; one in ten thousand asks for 15.
 PROMISING = 12.0
+# Where as many times the noise are left, sets are looked at that a single effect does not promise.
+FAR_ABOVE_NOISE = 2.0
 # One that no noise reaches, whatever is known of its level.
 CLEAR = 40.0
 # Refits stop early; those are finished whose n ln(chi2) is within this of the best of their size, and so many anyhow.
@@ -168,7 +170,9 @@ class Search:
             return None
         for parent in parents(last.fits)[1:]:
             self.extend(parent)
-        if not any(far_behind(self.of_size(size - 1)[0], f) > PROMISING for f in self.of_size(size)[:1]):
+        is_promising = any(far_behind(self.of_size(size - 1)[0], f) > PROMISING for f in self.of_size(size)[:1])
+        # Where few samples of a residual are independent an effect may not show without the others.
+        if not is_promising and not (self.of_size(size) and size < LOOK_AHEAD and last.best.misfit > FAR_ABOVE_NOISE):
             self.note_round(size, f"no candidate lowers n ln(chi2) by more than {PROMISING:g}")
             return None
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
