@@ -115,6 +115,7 @@ def test_constants_that_are_off_are_found_and_no_effect_is_named(stand):
     assert found.effects == ("constant:R",)
     assert found.after.fit.constants["R"] == pytest.approx(1.0 / 1.04 - 1.0, abs=0.002)
     assert found.after.holdout_error.chi2_per_sample < 1.1
+    assert "with constants off, some beyond their tolerances (R -3.8%) what remains is noise" in conclusion(found)
     step = report_of(found)["steps"][0]
     assert (step["constants"], step["alternatives"], step["claimed"]) == (["constant:R"], [], True)
     for e in found.after.estimates[:4]:

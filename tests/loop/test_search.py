@@ -1,4 +1,4 @@
-"""Shapes that are fixed by declaration, set free where a model is among the best; work shared among threads."""
+"""What the search finds: free shapes, smaller models found later, sets beside constants; work shared among threads."""
 
 import threading
 from types import SimpleNamespace
@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from armid.estimation.least_squares import side_by_side
+from armid.loop import constants
 from armid.loop.candidates import EffectKey, Library, library_of
+from armid.loop.constants import ConstantModel, is_outdone
 from armid.loop.fit import Comparison
 from armid.loop.search import Search, SearchLevel, best_along, finished, with_free_shapes
 from armid.loop.whitening import whitened
@@ -79,6 +81,26 @@ def test_what_is_found_of_a_size_later_takes_the_place_of_its_best(monkeypatch):
     assert search.renewed([*levels, SearchLevel((three,), earned)])[-1].best is three
     del search.fits[frozenset(right.active)]
     assert search.renewed(levels) == levels
+
+
+def test_a_set_of_effects_outdoes_constants_where_it_fits_clearly_better(monkeypatch):
+    """Constants that are far off only have to fit worse; a single effect is compared elsewhere."""
+    monkeypatch.setattr(constants, "is_significant", lambda fit: fit.chi2 > 200.0)
+
+    def outdone(off, chi2, n=2, p=1e-6, gain=9.0):
+        monkeypatch.setattr(constants, "compare", lambda *_, n_extra: Comparison(gain, p, (np.nan, np.nan)))
+        names = {f"constant:{i}": off for i in range(3)}
+        model = ConstantModel(SimpleNamespace(chi2=100.0), names, 1.0)
+        return is_outdone(model, SimpleNamespace(active=(None,) * n, chi2=chi2), 50)
+
+    assert outdone(1.0, 60.0)
+    assert not outdone(1.0, 60.0, n=1)
+    assert not outdone(1.0, 60.0, p=0.1)
+    assert not outdone(1.0, 60.0, gain=-1.0)
+    assert not outdone(1.0, 201.0)
+    # three constants by 3.5 tolerances each cost 37 beside the 100
+    assert outdone(3.5, 119.0, p=1.0)
+    assert not outdone(3.5, 138.0)
 
 
 def test_keys_and_what_they_own():
