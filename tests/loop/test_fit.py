@@ -13,10 +13,11 @@ N = 100
 PARTS = [np.arange(N), np.arange(N, 2 * N), np.arange(2 * N, 3 * N)]
 
 
-def models(slopes, size, n_parts=2):
+def models(slopes, size, n_parts=2, n_manoeuvres=0):
     """A smaller model that leaves `size` at each sample, and a larger one with two parameters of such slopes."""
     jacobian = np.concatenate([np.tile(row, (N, 1)) for row in slopes[:n_parts]])
-    data = SimpleNamespace(parts=lambda: PARTS[:n_parts], blocks=lambda part: np.array_split(part, 5))
+    data = SimpleNamespace(n_manoeuvres=n_manoeuvres or n_parts, parts=lambda: PARTS[:n_parts],
+                           blocks=lambda part: np.array_split(part, 5))  # fmt: skip
     larger = SimpleNamespace(jacobian=jacobian, n_free=2, records=SimpleNamespace(data=data))
     return SimpleNamespace(residual=np.full(n_parts * N, size)), larger
 
@@ -45,6 +46,11 @@ def test_others_are_left_out_whole(slopes, size, n_parts):
     """They predict each other, the effect is larger than what they leave open, a third sees both, or there is one."""
     parts = parts_to_judge(*models(slopes, size, n_parts))
     assert [len(p) for p in parts] == [N] * n_parts
+
+
+def test_blocks_of_the_only_manoeuvre_are_not_cut_again():
+    assert len(parts_to_judge(*models(APART, 2.0))) == 10
+    assert [len(p) for p in parts_to_judge(*models(APART, 2.0, n_manoeuvres=1))] == [N, N]
 
 
 def test_the_spread_is_that_of_the_linear_prediction():

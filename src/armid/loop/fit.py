@@ -349,7 +349,7 @@ def parts_to_judge(smaller: Fit, larger: Fit) -> list[Part]:
     """
     data = larger.records.data
     whole = data.parts()
-    if len(whole) < 2:
+    if data.n_manoeuvres < 2:
         return whole
     judged = [data.blocks(part) if is_undetermined(smaller, larger, part) else [part] for part in whole]
     return [part for parts in judged for part in parts]

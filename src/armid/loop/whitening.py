@@ -191,6 +191,11 @@ class WhitenedData:
         # What is no data weighs nothing, whoever asks.
         return white if self.sound.all() else white * self.sound
 
+    @property
+    def n_manoeuvres(self) -> int:
+        """How many manoeuvres there are, repeats not counted."""
+        return len({r.repeat_of or r.file for r in self.records})
+
     def parts(self) -> list[NDArray[np.int64]]:
         """Return what is left out in turn, as numbers of samples: one manoeuvre with its repeats, or blocks of time.
 
