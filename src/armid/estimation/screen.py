@@ -497,7 +497,7 @@ def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
     pairs = Counter(pair for group in groups for pair in combinations(np.unique(group).tolist(), 2))
     for (i, j), n in sorted(pairs.items()):
         a, b = records[i], records[j]
-        if (a.repeat_of or a.file) == (b.repeat_of or b.file):
+        if a.manoeuvre_file == b.manoeuvre_file:
             continue
         yield Suspicion("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE - 1} samples: one recording "
                         "is given twice, records that do not overlap are expected.", b.file)  # fmt: skip

@@ -301,7 +301,7 @@ def repeat_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare the mean of repeats with their scatter (pure-error lack of fit), which needs no other noise."""
     groups: dict[tuple[str, str], list[Array]] = {}
     for record, part in zip(seen.data.records, seen.data.by_record(seen.residual), strict=True):
-        groups.setdefault((record.repeat_of or record.file, record.output), []).append(part)
+        groups.setdefault((record.manoeuvre_file, record.output), []).append(part)
     for (name, _), parts in groups.items():
         if len(parts) < 2 or len({len(p) for p in parts}) > 1:
             continue

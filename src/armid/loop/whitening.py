@@ -194,14 +194,14 @@ class WhitenedData:
     @property
     def n_manoeuvres(self) -> int:
         """How many manoeuvres there are, repeats not counted."""
-        return len({r.repeat_of or r.file for r in self.records})
+        return len({r.manoeuvre_file for r in self.records})
 
     def parts(self) -> list[NDArray[np.int64]]:
         """Return what is left out in turn, as numbers of samples: one manoeuvre with its repeats, or blocks of time.
 
         A repeat stays with its original: left in, it would tell what was left out.
         """
-        names = [r.repeat_of or r.file for r in self.records]
+        names = [r.manoeuvre_file for r in self.records]
         pairs = list(zip(self.by_record(np.arange(self.edges[-1])), names, strict=True))
         whole = [np.concatenate([x for x, n in pairs if n == name]) for name in dict.fromkeys(names)]
         return whole if len(whole) > 1 else self.blocks(whole[0])

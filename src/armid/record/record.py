@@ -144,6 +144,11 @@ class Record:
         return (self, *self.others)
 
     @property
+    def manoeuvre_file(self) -> str:
+        """File of the record that first made the manoeuvre: the one that this repeats, else its own."""
+        return self.repeat_of or self.file
+
+    @property
     def times(self) -> Array:
         """Sample times [s], shape (n_samples,)."""
         return self.manoeuvre.times()
