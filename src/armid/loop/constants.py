@@ -17,13 +17,13 @@ from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import LeastSquaresProblem, descend
 from armid.loop.candidates import ROUGHLY, Library
-from armid.loop.diagnose import is_significant
+from armid.loop.diagnose import is_significant, train_residuals
 from armid.loop.equivalence import MOST as TOO_MANY
 from armid.loop.equivalence import WITHIN, EffectGroup
 from armid.loop.fit import FAMILYWISE, Fit, beyond, compare, decomposed, fit_from, with_own_starts
 from armid.loop.score_test import candidate_at
 from armid.loop.search import Search, unless_diverged
-from armid.loop.suspects import FREED, Suspect, simulated_file, with_measured
+from armid.loop.suspects import FREED, Suspect, is_earned, simulated_file, with_measured
 from armid.loop.whitening import WhiteRecords
 from armid.record import Record
 
@@ -81,9 +81,12 @@ class ConstantModel:
 
     @property
     def explains(self) -> bool:
-        """Whether it leaves noise, one alone not far outside its tolerance, none of many as far as a fit may go."""
+        """Whether it leaves noise, one alone not far outside its tolerance, none of many as far as a fit may go.
+
+        What noise leaves once in a hundred campaigns asks for no sets of effects yet.
+        """
         most = PLAUSIBLE if len(self.off) == 1 else HELD * FARTHEST
-        return max(map(abs, self.off.values())) < most and not is_significant(self.fit)
+        return max(map(abs, self.off.values())) < most and train_residuals(self.fit).diagnosis.p > FAMILYWISE
 
     @property
     def chi2(self) -> float:
@@ -324,7 +327,9 @@ def trends_of(fit: Fit, library: Library) -> list[Trend]:
         tried.append((float(column @ fit.residual) ** 2 / square, moves))
     sized = [moves for drop, moves in sorted(tried, key=lambda t: -t[0]) if drop > worth][:MOST]
     found = library.each(lambda moves: unless_diverged(lambda: with_trend(fit, moves)), sized)
-    return sorted((t for t in found if t is not None and not is_significant(t.fit)), key=lambda t: t.chi2)
+    good = [t for t in found if t is not None and is_earned(fit, t.fit, t.chi2, len(tried))
+            and not is_significant(t.fit)]  # fmt: skip
+    return sorted(good, key=lambda t: t.chi2)
 
 
 def order_of(records: WhiteRecords) -> Array:

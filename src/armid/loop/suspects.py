@@ -11,12 +11,13 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from armid.errors import ArmidError
 from armid.estimation.information import NORMAL_95, start_changes
 from armid.loop.candidates import Library
 from armid.loop.diagnose import holdout_residuals, is_significant
-from armid.loop.fit import Fit, beyond, decomposed, fit_from, with_own_starts
+from armid.loop.fit import FAMILYWISE, Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.search import start_of, unless_diverged
 from armid.loop.whitening import WhiteRecords, with_samples
 from armid.model import Model, Plant
@@ -320,8 +321,18 @@ def mended_records(declared: Fit, library: Library) -> list[Mended]:
     found = library.each(lambda t: unless_diverged(lambda: mended(declared, *t[1:])),
                          [*sized, *(t for t in tried if t[0] == np.inf)])  # fmt: skip
     few = n + LEFT * (declared.chi2 - n)
-    good = [m for m in found if m is not None and (m.chi2 < few or not is_significant(m.fit))]
+    good = [m for m in found if m is not None and is_earned(declared, m.fit, m.chi2, len(tried))
+            and (m.chi2 < few or not is_significant(m.fit))]  # fmt: skip
     return sorted(good, key=lambda m: m.chi2)
+
+
+def is_earned(before: Fit, after: Fit, chi2: float, n_tried: int) -> bool:
+    """Tell whether a fault, or a trend, does more than noise lets the best of so many do.
+
+    What is left may pass for noise once it is undone although next to nothing has changed. chi2: after it.
+    """
+    fall = max(before.independent, after.independent) * np.log(before.chi2 / chi2)
+    return bool(fall > chdtri(1.0, FAMILYWISE / n_tried))
 
 
 def others_agree(declared: Fit, index: int) -> bool:
