@@ -117,7 +117,7 @@ def substitutes(fit: Fit, library: Library) -> list[Substitute]:
     A score at the model without the effect is a linear guess from parameters that the lack of it has biased; dry
     friction can rank fourteenth there and still fit as well as the first (seen on one stroke). About the model with the
     effect the guess is good: put in its place, a rival does nearly what it does, the parameters making up for what they
-    can.
+    can. Another form of an effect stands in its place alone.
     """
     changes = {key: change_by(fit, key) for key in fit.active}
     bases = {key: basis_of_others(fit, key) for key in fit.active}
@@ -127,11 +127,12 @@ def substitutes(fit: Fit, library: Library) -> list[Substitute]:
         records = library.problem((*fit.active, candidate), fit.values)
         grid, _ = activation_grid(records, candidate)
         near = [(key, likest(changes[key], responses(fit, records, grid, without=key), bases[key]))
-                for key in fit.active]  # fmt: skip
+                for key in fit.active if candidate.public in (key.public, *others)]  # fmt: skip
         return [Substitute(key, candidate, best[1], fit.values | grid[best[0]].at(float(np.clip(best[2], 0.01, 1.0))))
                 for key, best in near if best is not None]  # fmt: skip
 
-    each = library.each(places_of, library.joinable(fit.active))
+    mine, others = declared_keys(fit.active), {key.public for key in library.joinable(fit.active)}
+    each = library.each(places_of, [key for key in library.candidates if key not in mine])
     found = sorted(chain.from_iterable(each), key=lambda r: -r.correlation)
     return [r for place in fit.active for r in [r for r in found if r.place == place][:MOST_SUBSTITUTES]]
 
