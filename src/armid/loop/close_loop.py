@@ -350,7 +350,10 @@ def decide(search: Search) -> Decision:
         beside = constant_models(declared, within, library)
     constants = answer_of_constants(beside, levels[-1].best)
     if constants is not None and (constants.is_stretched or levels[-1].best.chi2 < COMPARABLE * constants.fit.chi2):
-        more = search.run()
+        # What cannot come down to what the constants leave is given up.
+        search.limit = constants.fit.chi2
+        more = search.run(known=levels)
+        search.limit = np.inf
         if is_outdone(constants, more[-1].best, len(search.library.candidates)):
             levels, constants = more, None
     last, library = levels[-1].best, search.library

@@ -107,23 +107,28 @@ class Search:
     def further(self, level: SearchLevel, limit: float, to_noise: bool = True) -> Fit | None:
         """Return the best model with one effect more, if it earns it, chi2 is below a limit, and noise is left.
 
-        to_noise: whether it must leave noise.
+        Or of as many effects, if a better one is found on the way. to_noise: whether it must leave noise.
         """
         library = self.library.about(level.best.records.replays, level.best.misfit)
         beside = replace(self, library=library, fits=dict(self.fits), rounds=[], limit=limit)
         found = beside.next_level(level, level.best)
-        if found is None or not found.earned or found.best.chi2 > limit or (to_noise and is_significant(found.best)):
-            return None
-        return found.best
+        # Those that were given up above the limit are not known for good.
+        self.fits |= {active: f for active, f in beside.fits.items() if f.chi2 < limit and not f.rough}
+        alike = self.of_size(len(level.best.active))[0]
+        rivals = [alike] if far_behind(level.best, alike) > WITHIN else []
+        rivals += [found.best] if found is not None and found.earned else []
+        good = [f for f in rivals if f.chi2 <= limit and not (to_noise and is_significant(f))]
+        return min(good, key=lambda f: f.chi2, default=None)
 
-    def run(self, most: int = MOST_EFFECTS) -> list[SearchLevel]:
+    def run(self, most: int = MOST_EFFECTS, known: Sequence[SearchLevel] = ()) -> list[SearchLevel]:
         """Return the levels: the declared model, and all up to the last whose best earned its effects, at most so many.
 
         An effect may show only beside another one: where more than noise is left, sets of up to three are tried before
-        the search ends.
+        the search ends. known: levels from which it goes on.
         """
-        levels, earned = [SearchLevel((self.start(),))], 1
-        self.library = self.library.about(levels[0].best.records.replays, levels[0].best.misfit)
+        levels = [*known] or [SearchLevel((self.start(),))]
+        earned = len(levels)
+        self.library = self.library.about(levels[-1].best.records.replays, levels[-1].best.misfit)
         while len(levels) <= most:
             level = self.next_level(levels[-1], levels[earned - 1].best)
             if level is None:
@@ -131,9 +136,11 @@ class Search:
             levels.append(level)
             self.library = self.library.about(level.best.records.replays, level.best.misfit)
             if level.earned:
-                earned = len(levels)
                 if self.enough(level):
+                    earned = len(levels)
                     break
+                levels = self.renewed(levels)
+                earned = len(levels)
             elif len(levels) > LOOK_AHEAD or not is_significant(level.best):
                 break
         return self.renewed(levels)
@@ -177,10 +184,33 @@ class Search:
             return None
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
             return None
+        self.exchange(size, last.best)
+        # An exchange may have found a better model of the size before.
+        smaller = self.of_size(size - 1)[0] if size - len(smaller.active) == 1 else smaller
+        level = self.judged(self.of_size(size), smaller)
+        self.note_round(size, level.refused)
+        return level
+
+    def exchange(self, size: int, smaller: Fit) -> None:
+        """Try others in the place of each effect of the best model of a size, and its shapes free, while that helps.
+
+        smaller: the best that the round before had found.
+        """
         for _ in range(N_EXCHANGES):
             best = self.of_size(size)[0]
-            for key in best.active:
-                self.extend(self.reduced(best, tuple(k for k in best.active if k != key)))
+            reduced = [self.reduced_again(best, tuple(k for k in best.active if k != key)) for key in best.active]
+            less = self.of_size(size - 1)[0]
+            is_better = far_behind(smaller, less) > WITHIN
+            if is_better and not is_significant(less):
+                break
+            for parent in reduced:
+                self.extend(parent)
+            if is_better and less.active not in self.exchanged:
+                # What its own round would have done with it.
+                self.exchange_substitutes(less)
+                self.free_shapes([less])
+                for parent in parents(self.of_size(size - 1)):
+                    self.extend(parent)
             if self.of_size(size)[0] is best:
                 self.exchange_substitutes(best)
                 if not is_significant(best):
@@ -190,11 +220,6 @@ class Search:
             self.free_shapes(f for f in self.of_size(size)[:N_FREED] if f.chi2 <= FREED_WITHIN * best.chi2)
             if self.of_size(size)[0] is best:
                 break
-        # An exchange may have found a better model of the size before.
-        smaller = self.of_size(size - 1)[0] if size - len(smaller.active) == 1 else smaller
-        level = self.judged(self.of_size(size), smaller)
-        self.note_round(size, level.refused)
-        return level
 
     def judged(self, fits: Sequence[Fit], smaller: Fit) -> SearchLevel:
         """Return the models of a size as a level whose best is compared with a smaller model."""
@@ -276,7 +301,9 @@ class Search:
             for key in (rival.key, replace(rival.key, free_shape=True))[: 1 + is_free]:
                 active = (*(k for k in best.active if k != rival.place), key)
                 tried.setdefault(frozenset(active), partial(fit_near, active, rival.values, self.library))
-        self.fit_each(tried)
+        # A known one may have ended elsewhere, from a start that was further away.
+        near = {active for active in tried if active in self.fits and far_behind(self.fits[active], best) < FAR}
+        self.fit_each(tried, near)
 
     def twins_of(self, keys: Set[EffectKey | None]) -> set[EffectKey]:
         """Return the candidates that were left out of the search as they do the same as one of some."""
@@ -302,13 +329,16 @@ class Search:
                     tried.setdefault(frozenset(freed(fit.active, key)), trial)
         self.fit_each(tried)
 
-    def fit_each(self, tried: Mapping[frozenset[EffectKey], Trial]) -> None:
-        """Make the fits that are not known yet, side by side; one that diverges whatever its start is left out."""
-        new = {active: trial for active, trial in tried.items() if active not in self.fits}
+    def fit_each(
+        self, tried: Mapping[frozenset[EffectKey], Trial], again: Set[frozenset[EffectKey]] = frozenset()
+    ) -> None:
+        """Make the fits that are not known, or to be made again, side by side; one that diverges is left out."""
+        new = {active: trial for active, trial in tried.items() if active not in self.fits or active in again}
         for active in new:
             self.library.say(f"fitting {' + '.join(key.public for key in sorted(active))}")
         found = self.library.each(unless_diverged, new.values())
-        self.fits |= {active: fit for active, fit in zip(new, found, strict=True) if fit and np.isfinite(fit.chi2)}
+        for active, fit in zip(new, found, strict=True):
+            self.take_better(active, fit)
         for size in {len(active) for active in new}:
             self.finish(size)
 
@@ -334,16 +364,24 @@ class Search:
             self.fits[frozenset(rest)] = accurate(fit_from(records, rest, [start]), self.library)
         return self.fits[frozenset(rest)]
 
+    def reduced_again(self, fit: Fit, rest: Active) -> Fit:
+        """Return the fit without an effect, from where it stands even if it is known: that one may be a local one."""
+        known = self.fits.get(frozenset(rest))
+        if known is not None and rest:
+            self.take_better(frozenset(rest), unless_diverged(partial(finished_near, rest, fit.values, self.library)))
+        return self.reduced(fit, rest)
+
+    def take_better(self, active: frozenset[EffectKey], fit: Fit | None) -> None:
+        """Keep a fit unless it diverged, or is no better than the one that is known."""
+        known = self.fits.get(active)
+        if fit is not None and np.isfinite(fit.chi2) and (known is None or fit.chi2 < known.chi2):
+            self.fits[active] = fit
+
     def pruned(self, fit: Fit) -> Fit:
         """Return the fit without the effects that may as well be at their nulls, the others fitted again from there."""
         for key in fit.active:
             if not fit.needs(key):
-                rest = tuple(k for k in fit.active if k != key)
-                again = unless_diverged(partial(finished_near, rest, fit.values, self.library))
-                known = self.fits.get(frozenset(rest))
-                if again is not None and (known is None or again.chi2 < known.chi2):
-                    self.fits[frozenset(rest)] = again
-                return self.pruned(self.reduced(fit, rest))
+                return self.pruned(self.reduced_again(fit, tuple(k for k in fit.active if k != key)))
         return fit
 
     def ordered(self, fit: Fit) -> Fit:
