@@ -12,18 +12,9 @@ import numpy as np
 
 from stand import RefusalError
 from stand.arm import TRAVEL_DEG, Manoeuvre
-from stand.blind.campaign import (
-    Entry,
-    campaign_files,
-    key_path,
-    make_as_told,
-    manoeuvre_entry,
-    measure_strokes,
-    planted_entry,
-    suite_parser,
-    write_campaigns,
-)
+from stand.blind.campaign import campaign_files, measure_strokes, planted_entry
 from stand.blind.draw import Drawn, draw, run, six_strokes
+from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Kind, Suite, made_of_table, make_suite
 from stand.motion import Motion
 from stand.score.judge import read_json
@@ -137,13 +128,6 @@ Advice = Sequence[Mapping[str, Any]]
 """What a report advises, the best first, each with its manoeuvre and the power that is promised."""
 
 
-def asked_in(report: Mapping[str, Any], pair: Sequence[str]) -> Advice:
-    """Give what a report advises to tell a pair apart; nothing where it is not in doubt about it."""
-    if report["verdict"] != "cannot_tell_apart":
-        return []
-    return [each for each in report["advice"] if set(pair) <= set(each["separates"])]
-
-
 def make_second(
     proof: Proof, counts: Mapping[str, int], named: tuple[First, Advice, str]
 ) -> tuple[dict[str, str], Entry]:
@@ -153,19 +137,20 @@ def make_second(
     make, counted from 1, and is None where it could make none of them: then the campaign is the first one again.
     """
     first, asked, choice = named
-    drawn, effects, found = drawn_of(proof, first), first.case().effects(), None
+    drawn, effects, found, added = drawn_of(proof, first), first.case().effects(), None, None
     records = measure_strokes(proof.suite, drawn, effects, np.random.default_rng([*first.key, 2]))
     for rank, manoeuvre in _advised(asked) if choice == "advised" else _random(first):
         trajectory = run(Motion(drawn.arm, manoeuvre, effects), drawn.duration_s, must_close=False)
         if trajectory:
-            found = {"rank": rank, "next": manoeuvre_entry(manoeuvre)}
+            found, added = rank, manoeuvre.told()
             more = replace(drawn, strokes=((manoeuvre, "train"),), trajectories=(trajectory,))
             records += measure_strokes(proof.suite, more, effects, np.random.default_rng([*first.key, 3]))
             break
-    told = {"choice": choice, "base": first.name, "rank": found["rank"] if found else None}
-    told |= {"power": asked[0]["power"], "next": found["next"] if found else None}
-    told |= {"tried": proof.tried, "in_doubt": counts[first.pair.letter]}
-    return campaign_files(f"{first.name}_{choice}", drawn.gyro, records), entry_of(first, drawn) | told
+    entry = entry_of(first, drawn) | {
+        "choice": choice, "base": first.name, "rank": found, "power": asked[0]["power"], "next": added,
+        "tried": proof.tried, "in_doubt": counts[first.pair.letter],
+    }  # fmt: skip
+    return campaign_files(f"{first.name}_{choice}", drawn.gyro, records), entry
 
 
 def _advised(asked: Advice) -> Iterator[tuple[int, Manoeuvre]]:
@@ -221,7 +206,9 @@ def _make_more(options: argparse.Namespace) -> str:
         raise RefusalError(f"{options.base} was made with seed {key['seed']}, not {options.seed}")
     doubts: dict[str, list[tuple[First, Advice]]] = {pair.letter: [] for pair in proof.pairs}
     for first in _firsts(proof, options.seed):
-        asked = asked_in(read_json(options.reports / first.name / "report.json"), first.pair.names)
+        report, pair = read_json(options.reports / first.name / "report.json"), {*first.pair.names}
+        told = report["advice"] if report["verdict"] == "cannot_tell_apart" else []
+        asked = [each for each in told if pair <= {*each["separates"]}]
         if asked:
             doubts[first.pair.letter].append((first, asked))
     named = {
@@ -230,5 +217,5 @@ def _make_more(options: argparse.Namespace) -> str:
     }  # fmt: skip
     counts = {letter: len(some) for letter, some in doubts.items()}
     write_campaigns(options, named, partial(make_second, proof, counts))
-    told = ", ".join(f"{' and '.join(p.names)} {counts[p.letter]} of {proof.tried}" for p in proof.pairs)
-    return f"{options.folder}: {len(named)} campaigns with one record more, SYNTHETIC; in doubt were {told}"
+    doubted = ", ".join(f"{' and '.join(p.names)} {counts[p.letter]} of {proof.tried}" for p in proof.pairs)
+    return f"{options.folder}: {len(named)} campaigns with one record more, SYNTHETIC; in doubt were {doubted}"

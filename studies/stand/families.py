@@ -21,24 +21,13 @@ import numpy as np
 
 from stand import RefusalError
 from stand.arm import Arm
-from stand.blind.campaign import (
-    SUITE,
-    Entry,
-    campaign_files,
-    key_path,
-    make_as_told,
-    measure_strokes,
-    noise_floor,
-    planted_entry,
-    record_entry,
-    suite_parser,
-    write_campaigns,
-)
-from stand.blind.draw import Drawn, draw_arm, rms, run, six_strokes
+from stand.blind.campaign import SUITE, campaign_files, measure_strokes, noise_floor, planted_entry, record_entry
+from stand.blind.draw import Drawn, draw_arm, run, six_strokes
+from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Suite, read_suite, signed
 from stand.campaign import record_text
 from stand.effects import Effects
-from stand.gyro import Gyro
+from stand.gyro import Gyro, rms
 from stand.motion import Motion
 
 FAULTS = ("late", "start", "offset", "drift", "gain", "label", "clipped", "gap", "spikes", "stuck")
@@ -211,19 +200,17 @@ def main(words: Sequence[str]) -> int:
 
 
 def _make_families(options: argparse.Namespace) -> str:
-    wanted = [_counted(text) for text in options.families]
+    wanted = []
+    for text in options.families:
+        family, _, count = text.partition("=")
+        if family not in FAMILIES or not count.isdecimal():
+            raise RefusalError(f"{text!r} is no FAMILY=N: one of {', '.join(FAMILIES)} with a whole number is expected")
+        wanted.append((family, int(count)))
     # In turn, so that a study that is cut short has seen all families alike.
     parts = [((index + 0.5) / count, family, index) for family, count in wanted for index in range(count)]
     named = {f"c{place:03d}": (family, index) for place, (_, family, index) in enumerate(sorted(parts))}
     write_campaigns(options, named, partial(make, read_suite(options.suite), options.seed))
     return f"{options.folder}: {len(named)} campaigns, SYNTHETIC; key: {key_path(options.folder)}"
-
-
-def _counted(text: str) -> tuple[str, int]:
-    family, _, count = text.partition("=")
-    if family not in FAMILIES or not count.isdecimal():
-        raise RefusalError(f"{text!r} is no FAMILY=N: one of {', '.join(FAMILIES)} with a whole number is expected")
-    return family, int(count)
 
 
 if __name__ == "__main__":

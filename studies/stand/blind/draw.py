@@ -14,7 +14,7 @@ from stand import RefusalError
 from stand.arm import GRAVITY, Arm, Manoeuvre
 from stand.blind.suite import Case, Suite
 from stand.effects import Effects
-from stand.gyro import Gyro
+from stand.gyro import Gyro, rms
 from stand.motion import SAMPLES_PER_SECOND, Motion, Trajectory, simulate
 
 TOLERANCE = 1e-9
@@ -194,13 +194,8 @@ def fit_declared(manoeuvres: Sequence[Manoeuvre], speeds: FloatArray, truth: Arm
         forward, backward = found[1 : 1 + width.size], found[1 + width.size :]
         return found[0], (forward - backward).T / (2.0 * DIFFERENCE)
 
-    def missed(point: FloatArray) -> FloatArray:
-        return tried(tuple(point.tolist()))[0]
-
-    def slopes(point: FloatArray) -> FloatArray:
-        return tried(tuple(point.tolist()))[1]
-
     start = (np.array([getattr(truth, name) for name in ranges]) - low) / width
+    missed, slopes = (lambda point, i=i: tried(tuple(point.tolist()))[i] for i in (0, 1))
     best = least_squares(missed, start, slopes, bounds=(0.0, 1.0), ftol=1e-4, xtol=1e-4, max_nfev=20)
     return arm_at(best.x)
 
@@ -247,10 +242,6 @@ def weigh_alone(drawn: Drawn, effects: Effects, ranges: Ranges) -> Weight | None
     except RefusalError:
         return None
     return weigh(drawn, np.array(speeds), ranges)
-
-
-def rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def brief(value: float | None) -> float | None:

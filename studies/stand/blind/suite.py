@@ -119,8 +119,6 @@ def _range(edges: Any) -> tuple[float, float]:
 
 
 CLASSES = ("control", "single", "two", "unlisted", "one_stroke")
-LARGEST = 2**32
-"""Seeds of a suite lie below this, so that they fit any generator."""
 
 
 @dataclass(frozen=True)
