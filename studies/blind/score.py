@@ -21,7 +21,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from matplotlib.figure import Figure
-from pandas import DataFrame
+from pandas import DataFrame, crosstab
 
 from blind import advice, families, tables
 from blind.figures import advice_figure, counts_figure, held_out_figure
@@ -158,7 +158,10 @@ def suite_parts(
     if len(single):
         held, effects = single["matters"].astype(bool), sorted(set(single["truth"]))
         halves = {"moves the held-out error by more than 20 %": single[held], "moves it less": single[~held]}
-        counts = {t: tables.answer_counts(p).reindex(effects, fill_value=0) for t, p in halves.items() if len(p)}
+        counts = {
+            title: crosstab(part["truth"], part["answer"]).reindex(index=effects, columns=tables.ANSWERS, fill_value=0)
+            for title, part in halves.items() if len(part)
+        }  # fmt: skip
         sections["Answers"] += [
             tables.answers_by_effect(rows),
             drawn(out, "confusion", "True effect and answer", CONFUSION, counts_figure(counts)),

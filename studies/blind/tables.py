@@ -58,8 +58,7 @@ def rows_of(judgements: Sequence[Row]) -> DataFrame:
     rows = DataFrame(judgements)
     rows["truth"] = rows["truth"].replace("", NOTHING)
     numbers = ["floor", "before", "after", "before_over_floor", "after_over_floor", "cut", "excess_cut"]
-    for name in numbers:
-        rows[name] = rows[name].astype(float) if name in rows else np.nan
+    rows[numbers] = rows[numbers].astype(float)
     rows["answer"] = [answer(row) for row in rows.to_dict("records")]
     return rows
 
@@ -276,9 +275,3 @@ def times(rows: DataFrame) -> Table:
     )
     show = WIDE | {f"{k}_{word}": (f"{kind} {word} [s]", ".3g") for k, kind in kinds.items() for word in summary}
     return Table("times", "Times", words, DataFrame(lines), show)
-
-
-def answer_counts(rows: DataFrame) -> DataFrame:
-    """Return true effect x answer: numbers of campaigns, every answer a column."""
-    counts = rows.groupby(["truth", "answer"]).size().unstack(fill_value=0)
-    return counts.reindex(columns=list(ANSWERS), fill_value=0)
