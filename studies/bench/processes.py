@@ -28,12 +28,11 @@ def run_apart(command: Sequence[str], failed: str = "", **environment: str) -> s
 
     Raises ArmidError with the last thing it said when it fails; failed: the words before that.
     """
-    environment = child_environment() | environment
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=child_environment() | environment)
     if done.returncode:
         said = done.stderr.strip().splitlines() or ["nothing"]
-        words = " ".join(command)
-        raise ArmidError(f"{failed or f'`{words}` failed and said:'} {said[-1]}")
+        words = failed or f"`{' '.join(command)}` failed and said:"
+        raise ArmidError(f"{words} {said[-1]}")
     return done.stdout
 
 
@@ -150,11 +149,6 @@ ARMID = (sys.executable, "-m", "armid")
 IMPORTS = (sys.executable, "-c", "import numpy, scipy, pandas")
 
 
-def compiled_files() -> set[tuple[str, int]]:
-    """Return the files of the cache with the time of their last change."""
-    return {(str(f), f.stat().st_mtime_ns) for f in cache_folder().rglob("*") if f.is_file()}
-
-
 def startup_row(rounds: int = 8, command: Sequence[str] = ARMID, n_samples: int = 701) -> Row:
     """Measure `armid simulate` on a warm cache, by the clock on the wall.
 
@@ -163,6 +157,9 @@ def startup_row(rounds: int = 8, command: Sequence[str] = ARMID, n_samples: int 
     with TemporaryDirectory(prefix="armid-bench-") as folder:
         campaign = write_sample(Path(folder) / "campaign", n_samples)
         numbers = count()
+
+        def compiled_files() -> set[tuple[str, int]]:
+            return {(str(f), f.stat().st_mtime_ns) for f in cache_folder().rglob("*") if f.is_file()}
 
         def simulate_again() -> None:
             run_apart([*command, "simulate", str(campaign), "--out", f"{folder}/out{next(numbers)}"])
