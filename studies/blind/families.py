@@ -11,7 +11,8 @@ from typing import Any
 from pandas import DataFrame
 
 from blind import tables
-from stand.score.judge import LARGEST_GROUP, PARAMETERS
+from stand.arm import PARAMETERS
+from stand.score.judge import LARGEST_GROUP
 from stand.score.targets import Target, aim, share, without_report
 
 Row = dict[str, Any]

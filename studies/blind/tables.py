@@ -7,7 +7,7 @@ import numpy as np
 from pandas import DataFrame, Series
 from scipy.stats import binomtest
 
-from stand.score.judge import PARAMETERS
+from stand.arm import PARAMETERS
 from stand.score.targets import RIGHT, Target
 
 Row = dict[str, Any]
@@ -24,7 +24,7 @@ WIDE = {"class": "campaigns", "n": ("n", ".0f")}
 class Table(NamedTuple):
     """A table: `frame` goes to NAME.csv in SI, `show` says the heading and format of each column on the page.
 
-    A format of "%" shows a share in per cent, "" a text. A table without columns to show is a file alone.
+    A format of "%" shows a share in per cent, "" a text.
     """
 
     name: str

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from stand import RefusalError
-from stand.arm import TRAVEL_DEG, Manoeuvre
+from stand.arm import PARAMETERS, TRAVEL_DEG, Manoeuvre
 from stand.blind.campaign import campaign_files, measure_strokes, planted_entry
 from stand.blind.draw import Drawn, draw, run, six_strokes
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
-from stand.blind.suite import Case, Kind, Suite, made_of_table, make_suite
+from stand.blind.suite import Case, Kind, Suite, kind_of, made_of_table, make_suite
 from stand.motion import Motion
 from stand.score.judge import read_json
 
@@ -51,16 +51,13 @@ class Proof:
 def read_proof(path: Path) -> Proof:
     """Read the [suite] table of a proof. Raises RefusalError with one sentence when that is none."""
 
-    def kind(entry: Mapping[str, Any]) -> Kind:
-        form, signed = "the library's", entry.get("signed", False)
-        return Kind(entry["name"], entry["port"], form, (entry["size"],), signed=signed)
-
     def make(table: Mapping[str, Any]) -> Proof:
-        pairs = tuple(
-            Pair(letter, (kind(entry["first"]), kind(entry["second"])), tuple(entry["strokes"]))
-            for letter, entry in zip(ascii_lowercase, table["pairs"], strict=False)
-        )
-        return Proof(make_suite(table), pairs, int(table["tried"]), int(table["taken"]))
+        pairs = []
+        for letter, entry in zip(ascii_lowercase, table["pairs"], strict=False):
+            both = (entry["first"], entry["second"])
+            first, second = (kind_of({"form": "the library's", "sizes": [each["size"]], **each}) for each in both)
+            pairs.append(Pair(letter, (first, second), tuple(entry["strokes"])))
+        return Proof(make_suite(table), tuple(pairs), int(table["tried"]), int(table["taken"]))
 
     proof = made_of_table(path, make, "proof of advice")
     if not 1 <= proof.taken <= proof.tried <= MOST:
@@ -103,8 +100,8 @@ def drawn_of(proof: Proof, first: First) -> Drawn:
 
 def make_first(proof: Proof, first: First) -> tuple[dict[str, str], Entry]:
     """Make the files of a campaign, which tell nothing of its truth, and its entry in the key."""
-    drawn, rng = drawn_of(proof, first), np.random.default_rng([*first.key, 2])
-    records = measure_strokes(proof.suite, drawn, first.case().effects(), rng)
+    drawn = drawn_of(proof, first)
+    records = measure_strokes(proof.suite, drawn, first.case().effects(), np.random.default_rng([*first.key, 2]))
     return campaign_files(first.name, drawn.gyro, records), entry_of(first, drawn)
 
 
@@ -113,7 +110,7 @@ def entry_of(first: First, drawn: Drawn) -> Entry:
         "class": "pair",
         "pair": list(first.pair.names),
         "place": first.place,
-        "parameters": {name: getattr(drawn.arm, name) for name in ("p0", "k", "eta3", "n")},
+        "parameters": {name: getattr(drawn.arm, name) for name in PARAMETERS},
         "effects": [planted_entry(each) for each in first.case().planted],
         "noise": {"kind": "white", "rms_deg_s": drawn.gyro.noise_deg_s},
         "floor": {"train": None, "holdout": None},

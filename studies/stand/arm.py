@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from stand import RefusalError
 
+PARAMETERS = ("p0", "k", "eta3", "n")
+"""What an identifier must find."""
 GRAVITY = 9.81
 State = dict[str, float]
 """What the equations know of an instant, by name."""
@@ -60,7 +62,7 @@ class Arm:
     switch_distance: float = math.radians(25.0)
 
     def __post_init__(self) -> None:
-        for name in ("p0", "k", "eta3", "n"):
+        for name in PARAMETERS:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise RefusalError(f"{name} must be a positive number, not {value}")

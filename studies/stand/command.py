@@ -12,9 +12,9 @@ from typing import NoReturn
 import numpy as np
 
 from stand import RefusalError
-from stand.arm import KNOWN, NAME, Arm, Manoeuvre, read_manoeuvre, write_manoeuvre
+from stand.arm import KNOWN, NAME, PARAMETERS, Arm, Manoeuvre, read_manoeuvre, write_manoeuvre
 from stand.campaign import campaign_text, check_place, record_text, replacing, short
-from stand.effects import Effects, describe_effects, read_effects
+from stand.effects import Effects, read_effects
 from stand.gyro import REST_SAMPLES, Gyro, Record, recorded
 from stand.motion import SAMPLES_PER_SECOND, Motion, simulate
 
@@ -120,7 +120,7 @@ class Settings:
         folder = Path(self.folder.name) if self.folder.is_absolute() else self.folder
         told = [each.name if KNOWN.get(each.name) == each else write_manoeuvre(each) for each in self.manoeuvres]
         words = ["python", "studies/test_stand.py", folder.as_posix(), "--name", self.name]
-        for option in ("p0", "k", "eta3", "n"):
+        for option in PARAMETERS:
             words += [f"--{option}", short(getattr(self.arm, option))]
         words += ["--manoeuvres", ",".join(told), "--holdout", ",".join(self.holdout), "--repeats", str(self.repeats)]
         for each in fields(self.gyro):
@@ -142,7 +142,7 @@ def read_settings(options: argparse.Namespace) -> Settings:
     if told["name"] is None:
         told["name"] = options.folder.resolve().name
     told["effects"] = read_effects(told.pop("effect"))
-    told["arm"] = Arm(*(told.pop(name) for name in ("p0", "k", "eta3", "n")))
+    told["arm"] = Arm(*(told.pop(name) for name in PARAMETERS))
     told["gyro"] = Gyro(**{each.name: told.pop(each.name.replace("range", "gyro_range")) for each in fields(Gyro)})
     told |= {"duration_s": told.pop("duration"), "rest_s": told.pop("rest")}
     told["manoeuvres"] = tuple(map(read_manoeuvre, split(options.manoeuvres)))
@@ -256,10 +256,11 @@ def split(text: str) -> tuple[str, ...]:
 
 
 def _parser() -> Parser:
+    effects = [f"  {each.name} [{each.metadata['unit']}]: {each.metadata['note']}" for each in fields(Effects)]
     parser = Parser(
         prog="test_stand.py",
         description="Make a campaign of SYNTHETIC records of the shell transfer arm.",
-        epilog=f"effects (0 = off; SI units unless the name says otherwise):\n{describe_effects()}",
+        epilog="\n".join(["effects (0 = off; SI units unless the name says otherwise):", *effects]),
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )

@@ -168,11 +168,6 @@ def read_effects(words: Iterable[str]) -> Effects:
     return Effects(**sizes)
 
 
-def describe_effects() -> str:
-    """List each effect with its unit and meaning, one line each."""
-    return "\n".join(f"  {each.name} [{each.metadata['unit']}]: {each.metadata['note']}" for each in fields(Effects))
-
-
 def command(arm: Arm, effects: Effects, manoeuvre: Manoeuvre, seen: State, closed_loop: bool) -> float:
     """Give the voltage demanded of the drive [V]: full supply before E; after it K_p (theta_D - theta) - K_d k omega.
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from stand.blind.draw import Drawn, brief, draw, weigh, weigh_alone
+from stand.arm import PARAMETERS
+from stand.blind.draw import Drawn, brief, draw, one_stroke, six_strokes, weigh, weigh_alone
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Planted, Suite, cases_of, read_suite, shuffled
 from stand.campaign import EXACT, campaign_text, record_text
@@ -24,7 +25,8 @@ SAID = "SYNTHETIC and blind: a simulated shell transfer arm; no machine was meas
 def make_campaign(suite: Suite, seed: int, named: tuple[str, Case]) -> tuple[dict[str, str], Entry]:
     """Make the files of a campaign, which tell nothing of its truth, and its entry in the key."""
     name, case = named
-    drawn = draw(suite, case, np.random.default_rng([seed, 2, case.index]))
+    strokes_of = one_stroke if case.label == "one_stroke" else six_strokes
+    drawn = draw(suite, case, np.random.default_rng([seed, 2, case.index]), strokes_of)
     records = measure_strokes(suite, drawn, case.effects(), np.random.default_rng([seed, 3, case.index]))
     files = {**campaign_files(name, drawn.gyro, records), "README.md": f"# {name}\n\n{SAID}\n"}
     return files, _entry(suite, case, drawn, records)
@@ -59,7 +61,7 @@ def _entry(suite: Suite, case: Case, drawn: Drawn, records: list[Record]) -> Ent
         effects.append(planted_entry(each) | {"alone": alone.told(floor["holdout"]) if alone else None})
     fit = None
     if joint:
-        found = {name: getattr(joint.arm, name) for name in ("p0", "k", "eta3", "n")}
+        found = {name: getattr(joint.arm, name) for name in PARAMETERS}
         fit = {
             "parameters": {name: brief(value) for name, value in found.items()},
             "bias": {name: brief(value / getattr(truth, name) - 1.0) for name, value in found.items()},

@@ -37,18 +37,17 @@ class Drawn:
     trajectories: tuple[Trajectory, ...]
 
 
-def draw(suite: Suite, case: Case, rng: np.random.Generator, strokes_of: Strokes | None = None) -> Drawn:
+def draw(suite: Suite, case: Case, rng: np.random.Generator, strokes_of: Strokes) -> Drawn:
     """Draw parameters and manoeuvres until the arm, effects included, makes every stroke inside its travel.
 
-    `strokes_of` draws the manoeuvres; None: as the class of the case wants them. Raises RefusalError when no draw does.
+    `strokes_of` draws the manoeuvres. Raises RefusalError when no draw does.
     """
     noise = round(float(rng.uniform(*suite.noise_deg_s)), 4)
-    usual = _one_stroke if case.label == "one_stroke" else six_strokes
     gyro = Gyro(noise, 0.001, suite.bandwidth_hz if case.coloured else 0.0)
     for _ in range(TRIES):
         arm = draw_arm(suite, rng)
         duration = round(float(rng.uniform(*suite.duration_s)), 2)
-        strokes = strokes_of(rng) if strokes_of else usual(rng)
+        strokes = strokes_of(rng)
         found = [run(Motion(arm, manoeuvre, case.effects()), duration) for manoeuvre, _ in strokes]
         trajectories = tuple(each for each in found if each is not None)
         if len(trajectories) == len(strokes):
@@ -84,7 +83,7 @@ def six_strokes(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
     )
 
 
-def _one_stroke(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
+def one_stroke(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
     """Give the paper's lowering stroke; half of the campaigns hold a repeat of it out."""
     repeat = ((replace(PAPERS, name="again"), "holdout"),)
     return ((PAPERS, "train"), *(repeat if rng.random() < 0.5 else ()))

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from stand import RefusalError
+from stand.arm import PARAMETERS
 
 Entry = Mapping[str, Any]
-PARAMETERS = ("p0", "k", "eta3", "n")
 LARGEST_GROUP = 4
 EMPIRICAL = "unnamed:"
 
