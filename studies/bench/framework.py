@@ -25,6 +25,7 @@ from bench.measure import CPU, Bound, Row
 from bench.samples import PLANT, write_sample
 
 N_PARTICLES, N_ITERATIONS = 80, 150
+PARTS = ("simulation", "fitness", "framework")
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Spent:
     @property
     def total(self) -> float:
         """The whole time [s]."""
-        return self.simulation + self.fitness + self.framework
+        return sum(getattr(self, name) for name in PARTS)
 
 
 class Stopwatch:
@@ -80,7 +81,7 @@ def sample_replays(n_samples: int = 701) -> tuple[Replay, ...]:
     return replays(campaign.train, model, space_of(model), STANDARD)
 
 
-def identification(made_ready: tuple[Replay, ...], n_iterations: int, seed: int = 1) -> Spent:
+def identification(made_ready: tuple[Replay, ...], n_iterations: int) -> Spent:
     """Identify with the paper's swarm as `armid identify` does, and tell where the time went."""
     simulation, fitness = Stopwatch(), Stopwatch()
     watched = tuple(cast(Replay, Watched(r, simulation)) for r in made_ready)
@@ -89,18 +90,18 @@ def identification(made_ready: tuple[Replay, ...], n_iterations: int, seed: int 
     start = CPU()
     problem = IdentificationProblem(space_of(made_ready[0].model), watched, measure, meter)
     algorithm = IDENTIFIERS["pso"].build(meter.budget)
-    minimize(problem, algorithm, MeterTermination(meter), seed=seed, copy_algorithm=False)
+    minimize(problem, algorithm, MeterTermination(meter), seed=1, copy_algorithm=False)
     framework = CPU() - start - simulation.spent - fitness.spent
     return Spent(simulation.spent, fitness.spent, framework, meter.used)
 
 
-def pymoo_framework(n_iterations: int, seed: int = 1) -> float:
+def pymoo_framework(n_iterations: int) -> float:
     """Return what pymoo's own swarm spends on the sphere in 4-D at the same budget, outside the function [s]."""
     problem, watch = Sphere(4), Stopwatch()
     problem._evaluate = partial(watch.timed, problem._evaluate)
     start = CPU()
     algorithm = PSO(pop_size=N_PARTICLES)
-    minimize(problem, algorithm, ("n_eval", N_PARTICLES * n_iterations), seed=seed, copy_algorithm=False)
+    minimize(problem, algorithm, ("n_eval", N_PARTICLES * n_iterations), seed=1, copy_algorithm=False)
     return CPU() - start - watch.spent
 
 
@@ -112,8 +113,7 @@ def framework_rows(rounds: int = 6, n_iterations: int = N_ITERATIONS, n_samples:
     pairs = [(identification(made_ready, n_iterations), pymoo_framework(n_iterations)) for _ in range(rounds)]
     ours, theirs = min(s.framework for s, _ in pairs), min(t for _, t in pairs)
     whole = min((s for s, _ in pairs), key=lambda s: s.total)
-    parts = {"simulation": whole.simulation, "fitness": whole.fitness, "framework": whole.framework}
-    shares = ", ".join(f"{name} {seconds / whole.total:.0%}" for name, seconds in parts.items())
+    shares = ", ".join(f"{name} {getattr(whole, name) / whole.total:.0%}" for name in PARTS)
     size = f"{N_PARTICLES} x {n_iterations}"
     return [
         Row(f"framework of one identification, {size}", ours * 1e3, "ms", "pymoo's PSO on the sphere",

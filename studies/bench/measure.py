@@ -100,8 +100,14 @@ def bench_table(rows: Sequence[Row]) -> str:
         padded = (f"{c:<{w}}" if left else f"{c:>{w}}" for c, w, left in zip(line, widths, LEFT, strict=True))
         lines.append("  ".join(padded).rstrip())
     lines.insert(1, "-" * (sum(widths) + 2 * (len(widths) - 1)))
+    short = [
+        f"Falls short: {row.what} has a ratio of {row.ratio:.4g}, {row.wanted.text} is wanted."
+        for row in rows
+        if row.met is False and row.ratio is not None and row.wanted is not None
+    ]
+    within = f"All {sum(row.met is True for row in rows)} ratios that have a bound are within it."
     notes = [f"{row.what}: {row.note}." for row in rows if row.note]
-    return "\n".join([*lines, "", *verdict(rows), *notes, system_text()])
+    return "\n".join([*lines, "", *(short or [within]), *notes, system_text()])
 
 
 def cells(row: Row) -> tuple[str, ...]:
@@ -122,16 +128,6 @@ def number(value: float) -> str:
     if abs(value) >= 100:
         return f"{value:,.0f}"
     return f"{value:#.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.1e}"
-
-
-def verdict(rows: Sequence[Row]) -> list[str]:
-    """Return one sentence for each ratio that falls short, or one for all."""
-    short = [
-        f"Falls short: {row.what} has a ratio of {row.ratio:.4g}, {row.wanted.text} is wanted."
-        for row in rows
-        if row.met is False and row.ratio is not None and row.wanted is not None
-    ]
-    return short or [f"All {sum(row.met is True for row in rows)} ratios that have a bound are within it."]
 
 
 def system_text() -> str:

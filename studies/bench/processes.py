@@ -116,33 +116,22 @@ print(peak_memory() or -1)
 """
 
 
-def peak_apart(folder: Path) -> int:
-    """Identify a campaign as the command does, and return the peak memory of its process [byte], -1 if not known.
+def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
+    """Measure the peak memory of `armid identify` on a long record, and on many records.
 
     Raises ArmidError when it fails.
     """
-    command = [sys.executable, "-c", IDENTIFY_CHILD.format(folder=str(folder), budget=BUDGET)]
-    return int(run_apart(command, "the identification of a large campaign failed:").split()[-1])
-
-
-def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
-    """Measure the peak memory of `armid identify` on a long record, and on many records."""
-    with TemporaryDirectory(prefix="armid-") as place:
-        long = peak_apart(write_sample(Path(place) / "long", n_samples))
-        many = peak_apart(write_sample(Path(place) / "many", N_SAMPLES, n_records=n_records))
-    return [
-        scale_row(f"identify, {n_samples:,} samples", long, n_samples),
-        scale_row(f"identify, {n_records:,} records", many, n_records * N_SAMPLES),
-    ]
-
-
-def scale_row(what: str, peak: int, n_values: int) -> Row:
-    """Return the row of one peak [byte], beside what the signals of a population take."""
-    if peak < 0:
-        return Row(what, None, "MB", note=UNKNOWN)
-    signals = POPULATION * n_values * 8
-    note = f"peak of the whole process, {BUDGET} simulations in populations of {POPULATION}"
-    return Row(what, peak / MEGABYTE, "MB", "a population's signals", peak / signals, note=note)
+    sizes = {f"{n_samples:,} samples": (n_samples, 1), f"{n_records:,} records": (N_SAMPLES, n_records)}
+    note, rows = f"peak of the whole process, {BUDGET} simulations in populations of {POPULATION}", []
+    for what, (length, count_of) in sizes.items():
+        with TemporaryDirectory(prefix="armid-") as place:
+            campaign = write_sample(Path(place) / "campaign", length, n_records=count_of)
+            command = [sys.executable, "-c", IDENTIFY_CHILD.format(folder=str(campaign), budget=BUDGET)]
+            peak = int(run_apart(command, "the identification of a large campaign failed:").split()[-1])
+        ratio = peak / (POPULATION * length * count_of * 8)
+        known = Row(f"identify, {what}", peak / MEGABYTE, "MB", "a population's signals", ratio, note=note)
+        rows.append(known if peak > 0 else Row(known.what, None, "MB", note=UNKNOWN))
+    return rows
 
 
 ARMID = (sys.executable, "-m", "armid")
