@@ -16,6 +16,7 @@ from stand.blind.campaign import campaign_files, measure_strokes, planted_entry
 from stand.blind.draw import Drawn, draw, run, six_strokes
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Kind, Suite, kind_of, made_of_table, make_suite
+from stand.gyro import Record
 from stand.motion import Motion
 from stand.score.judge import read_json
 
@@ -89,33 +90,32 @@ class First:
         return Case(self.place, "single", (kind.planted(1, sign),), coloured=False)
 
 
-def drawn_of(proof: Proof, first: First) -> Drawn:
-    """Draw arm, manoeuvres and noise of a campaign, the same ones each time; all of its strokes are to train on."""
+def started(proof: Proof, first: First) -> tuple[Drawn, list[Record], Entry]:
+    """Draw and measure a campaign of few strokes, the same one each time; give its entry in the key as well."""
 
     def strokes(rng: np.random.Generator) -> Any:
         return tuple((manoeuvre, "train") for manoeuvre, _ in six_strokes(rng) if manoeuvre.name in first.pair.strokes)
 
-    return draw(proof.suite, first.case(), np.random.default_rng([*first.key, 1]), strokes)
-
-
-def make_first(proof: Proof, first: First) -> tuple[dict[str, str], Entry]:
-    """Make the files of a campaign, which tell nothing of its truth, and its entry in the key."""
-    drawn = drawn_of(proof, first)
-    records = measure_strokes(proof.suite, drawn, first.case().effects(), np.random.default_rng([*first.key, 2]))
-    return campaign_files(first.name, drawn.gyro, records), entry_of(first, drawn)
-
-
-def entry_of(first: First, drawn: Drawn) -> Entry:
-    return {
+    case = first.case()
+    drawn = draw(proof.suite, case, np.random.default_rng([*first.key, 1]), strokes)
+    records = measure_strokes(proof.suite, drawn, case.effects(), np.random.default_rng([*first.key, 2]))
+    entry = {
         "class": "pair",
         "pair": list(first.pair.names),
         "place": first.place,
         "parameters": {name: getattr(drawn.arm, name) for name in PARAMETERS},
-        "effects": [planted_entry(each) for each in first.case().planted],
+        "effects": [planted_entry(each) for each in case.planted],
         "noise": {"kind": "white", "rms_deg_s": drawn.gyro.noise_deg_s},
         "floor": {"train": None, "holdout": None},
         "declared_fit": None,
     }
+    return drawn, records, entry
+
+
+def make_first(proof: Proof, first: First) -> tuple[dict[str, str], Entry]:
+    """Make the files of a campaign, which tell nothing of its truth, and its entry in the key."""
+    drawn, records, entry = started(proof, first)
+    return campaign_files(first.name, drawn.gyro, records), entry
 
 
 CHOICES = ("advised", "random")
@@ -134,8 +134,8 @@ def make_second(
     make, counted from 1, and is None where it could make none of them: then the campaign is the first one again.
     """
     first, asked, choice = named
-    drawn, effects, found, added = drawn_of(proof, first), first.case().effects(), None, None
-    records = measure_strokes(proof.suite, drawn, effects, np.random.default_rng([*first.key, 2]))
+    (drawn, records, entry), effects = started(proof, first), first.case().effects()
+    found = added = None
     for rank, manoeuvre in _advised(asked) if choice == "advised" else _random(first):
         trajectory = run(Motion(drawn.arm, manoeuvre, effects), drawn.duration_s, must_close=False)
         if trajectory:
@@ -143,7 +143,7 @@ def make_second(
             more = replace(drawn, strokes=((manoeuvre, "train"),), trajectories=(trajectory,))
             records += measure_strokes(proof.suite, more, effects, np.random.default_rng([*first.key, 3]))
             break
-    entry = entry_of(first, drawn) | {
+    entry |= {
         "choice": choice, "base": first.name, "rank": found, "power": asked[0]["power"], "next": added,
         "tried": proof.tried, "in_doubt": counts[first.pair.letter],
     }  # fmt: skip
