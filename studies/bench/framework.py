@@ -1,8 +1,7 @@
 """What one identification spends on simulation, on fitness, and on everything around them."""
 
-from collections.abc import Callable
+from collections import defaultdict
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, cast
@@ -43,34 +42,26 @@ class Spent:
         return sum(getattr(self, name) for name in PARTS)
 
 
-class Stopwatch:
-    """Add up the time spent in calls."""
-
-    def __init__(self) -> None:
-        self.spent = 0.0
-
-    def timed(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-        """Return what a function returns, and add the time it took."""
-        start = CPU()
-        result = function(*arguments, **named)
-        self.spent += CPU() - start
-        return result
-
-
 class Watched:
-    """Stand in for a replay or a fitness, and time its work."""
+    """Stand in for a replay, a fitness or a function, and add the time of its work to what was spent on `name` [s]."""
 
-    def __init__(self, thing: Any, watch: Stopwatch) -> None:
-        self._thing, self._watch = thing, watch
+    def __init__(self, thing: Any, spent: dict[str, float], name: str) -> None:
+        self._thing, self._spent, self._name = thing, spent, name
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._thing, name)
 
     def runs(self, candidates: NDArray[np.float64]) -> Any:
-        return self._watch.timed(self._thing.runs, candidates)
+        return self._timed(self._thing.runs, candidates)
 
-    def __call__(self, *arguments: Any) -> Any:
-        return self._watch.timed(self._thing, *arguments)
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self._timed(self._thing, *arguments, **named)
+
+    def _timed(self, function: Any, *arguments: Any, **named: Any) -> Any:
+        start = CPU()
+        result = function(*arguments, **named)
+        self._spent[self._name] += CPU() - start
+        return result
 
 
 def sample_replays(n_samples: int = 701) -> tuple[Replay, ...]:
@@ -83,26 +74,26 @@ def sample_replays(n_samples: int = 701) -> tuple[Replay, ...]:
 
 def identification(made_ready: tuple[Replay, ...], n_iterations: int) -> Spent:
     """Identify with the paper's swarm as `armid identify` does, and tell where the time went."""
-    simulation, fitness = Stopwatch(), Stopwatch()
-    watched = tuple(cast(Replay, Watched(r, simulation)) for r in made_ready)
-    measure = cast(Fitness, Watched(FITNESS["similarity"], fitness))
+    spent = defaultdict[str, float](float)
+    watched = tuple(cast(Replay, Watched(r, spent, "simulation")) for r in made_ready)
+    measure = cast(Fitness, Watched(FITNESS["similarity"], spent, "fitness"))
     meter = Meter(N_PARTICLES * n_iterations)
     start = CPU()
     problem = IdentificationProblem(space_of(made_ready[0].model), watched, measure, meter)
     algorithm = IDENTIFIERS["pso"].build(meter.budget)
     minimize(problem, algorithm, MeterTermination(meter), seed=1, copy_algorithm=False)
-    framework = CPU() - start - simulation.spent - fitness.spent
-    return Spent(simulation.spent, fitness.spent, framework, meter.used)
+    framework = CPU() - start - sum(spent.values())
+    return Spent(spent["simulation"], spent["fitness"], framework, meter.used)
 
 
 def pymoo_framework(n_iterations: int) -> float:
     """Return what pymoo's own swarm spends on the sphere in 4-D at the same budget, outside the function [s]."""
-    problem, watch = Sphere(4), Stopwatch()
-    problem._evaluate = partial(watch.timed, problem._evaluate)
+    problem, spent = Sphere(4), defaultdict[str, float](float)
+    problem._evaluate = Watched(problem._evaluate, spent, "sphere")
     start = CPU()
     algorithm = PSO(pop_size=N_PARTICLES)
     minimize(problem, algorithm, ("n_eval", N_PARTICLES * n_iterations), seed=1, copy_algorithm=False)
-    return CPU() - start - watch.spent
+    return CPU() - start - sum(spent.values())
 
 
 def framework_rows(rounds: int = 6, n_iterations: int = N_ITERATIONS, n_samples: int = 701) -> list[Row]:

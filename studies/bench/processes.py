@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -52,10 +53,8 @@ def peak_memory() -> int | None:
 
 def forget_peak() -> None:
     """Let the peak start anew from what is resident now, where the system allows it (Linux)."""
-    try:
+    with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        return
 
 
 def beyond_output(n_candidates: int, n_samples: int) -> int:
