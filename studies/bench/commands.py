@@ -14,7 +14,6 @@ import argparse
 import csv
 import os
 import resource
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,12 +27,12 @@ from scipy.integrate import solve_ivp
 
 from bench.engine import engine_rows, threads_row
 from bench.measure import number, system_text
+from bench.processes import ARMID, run_apart
 from bench.samples import child_environment
 
 Array = NDArray[np.float64]
 STUDIES = Path(__file__).parents[1]
 MACHINE = STUDIES / "your_own_machine"
-ARMID = (sys.executable, "-m", "armid")
 REFERENCE = (sys.executable, "-c", "import numpy as np; a = np.random.default_rng(1).random((400, 400));"
              "[np.linalg.svd(a) for _ in range(8)]; sum(i * i for i in range(3_000_000))")  # fmt: skip
 
@@ -54,6 +53,9 @@ class Command:
 
 IDENTIFY = ("identify", "{studies}/campaigns/paper_arm", "--identifier", "least_squares", "--fitness", "rmse")
 LOOP = ("close-loop", "{studies}/campaigns/rocking_shell", "--out", "{out}")
+# Undeclared effects of a campaign of the arm, SYNTHETIC, which the simulator of each checkout makes.
+SIX = ("--manoeuvres", "lower,raise,short,empty", "--effect", "coulomb=40", "drag=15", "tilt_deg=3", "brush_drop=1.5",
+       "supply_sag=0.01", "rocking_hz=10")  # fmt: skip
 PLANT = ("--plugin", "{studies}/your_own_machine/plant.py:boom")
 COMMANDS = (
     Command("armid --version", ("--version",), 0.2),
@@ -82,15 +84,13 @@ wear = Effect("wear", parameters=(Parameter("level", "effort/speed", 0.0, 0.5, n
 '''
 
 
-def cpu_seconds(command: Sequence[str], environment: dict[str, str]) -> float:
+def cpu_seconds(command: Sequence[str], **environment: str) -> float:
     """Return the CPU time of a command and its children [s].
 
-    Raises RuntimeError with the last thing it said when it fails.
+    Raises ArmidError with the last thing it said when it fails.
     """
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    if done.returncode:
-        raise RuntimeError(f"`{' '.join(command)}` failed: {(done.stderr.strip() or 'nothing said').splitlines()[-1]}")
+    run_apart(command, **environment)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
@@ -101,19 +101,18 @@ def measure(commands: Sequence[Command], folder: Path, before: Path | None = Non
     It is the shortest of three warm runs, of one where it takes more than 20 s, and of one cold run. Above 150 s it is
     the run that fills the cache: compiling is a small part of it.
     """
-    environment = child_environment()
-    trees = {"cpu_s": (STUDIES, environment)}
+    trees: dict[str, tuple[Path, dict[str, str]]] = {"cpu_s": (STUDIES, {})}
     if before is not None:
-        path = f"{before / 'src'}{os.pathsep}{environment['PYTHONPATH']}"
-        trees["before_cpu_s"] = before / "studies", environment | {"PYTHONPATH": path}
-    reference = min(cpu_seconds(REFERENCE, environment) for _ in range(3))
+        path = f"{before / 'src'}{os.pathsep}{child_environment()['PYTHONPATH']}"
+        trees["before_cpu_s"] = before / "studies", {"PYTHONPATH": path}
+    reference = min(cpu_seconds(REFERENCE) for _ in range(3))
     yield {"what": "reference computation", "cpu_s": number(reference)}
     made = {"effect": folder / "wear.py", "stranger": folder / "stranger"}
     made["effect"].write_text(EFFECT, encoding="utf-8")
     if any("{stranger}" in c.arguments for c in commands):
         write_strangers_machine(made["stranger"])
     for tree, (studies, own) in trees.items() if any("{six}" in c.arguments for c in commands) else ():
-        write_six_effects(folder / f"six_{tree}", studies, own)
+        cpu_seconds([sys.executable, str(studies / "test_stand.py"), str(folder / f"six_{tree}"), *SIX], **own)
     for k, command in enumerate(commands):
         best = {}
         for tree, (studies, own) in trees.items():
@@ -123,7 +122,7 @@ def measure(commands: Sequence[Command], folder: Path, before: Path | None = Non
                 place = made | own_place | {"out": folder / f"out{k}_{tree}_{len(times)}"}
                 cache = folder / (f"cold{k}_{tree}" if command.cold else f"cache_{tree}")
                 given = [part.format(**place) for part in command.arguments]
-                times.append(cpu_seconds([*ARMID, *given], own | {"ARMID_CACHE": str(cache)}))
+                times.append(cpu_seconds([*ARMID, *given], **own, ARMID_CACHE=str(cache)))
             best[tree] = min(times[1:] or times)
         yield {"what": command.what, "target_cpu_s": number(command.target),
                "of_reference": number(best["cpu_s"] / reference), "met": MET[best["cpu_s"] <= command.target],
@@ -191,17 +190,6 @@ def write_strangers_machine(folder: Path, seed: int = 3) -> None:
         text += f'\n[[records]]\nfile = "r{k}.csv"\nrole = "{"train" if k < 8 else "holdout"}"\n'
         text += f"[records.constants]\nkp = {run.kp}\nkd = {run.kd}\n"
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
-
-
-def write_six_effects(folder: Path, studies: Path, environment: dict[str, str]) -> None:
-    """Write a campaign of the arm with six undeclared effects, by a checkout's independent simulator. SYNTHETIC.
-
-    Raises RuntimeError when it fails.
-    """
-    effects = ("coulomb=40", "drag=15", "tilt_deg=3", "brush_drop=1.5", "supply_sag=0.01", "rocking_hz=10")
-    manoeuvres = ("--manoeuvres", "lower,raise,short,empty")
-    cpu_seconds([sys.executable, str(studies / "test_stand.py"), str(folder), *manoeuvres, "--effect", *effects],
-                environment)  # fmt: skip
 
 
 if __name__ == "__main__":

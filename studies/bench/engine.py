@@ -3,10 +3,11 @@
 from functools import partial
 
 import numpy as np
+from joblib import cpu_count
 
 from armid.problem.similarity import numerical_similarity, similarity
 from bench.baselines import plain_loop, solve_with_scipy
-from bench.measure import WALL, Bound, Row, Work, available_cores, fastest, load_text
+from bench.measure import WALL, Bound, Row, Work, fastest, load_text
 from bench.samples import Array, Task, arm_task
 
 ALLOWED = 1e-5
@@ -107,7 +108,7 @@ def threads_row(rounds: int = 20, n_candidates: int = THREADED, attempts: int = 
     return Row(
         f"engine, 2 threads, population {n_candidates:,}", seconds * 1e6, "us", "the speed of 1 thread",
         best[1] / best[2], wanted, 1 / seconds, task.error(task.run(2).output, task.reference()),
-        f"{available_cores()} cores, load {load_text()}; {'the same' if same else 'NOT the same'} bits as 1 thread",
+        f"{cpu_count()} cores, load {load_text()}; {'the same' if same else 'NOT the same'} bits as 1 thread",
     )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """What one identification spends on simulation, on fitness, and on everything around them."""
 
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -8,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.algorithms.soo.nonconvex.pso import PSO
-from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
+from pymoo.problems.single.sphere import Sphere
 
 from armid.engine import STANDARD
 from armid.identifiers import IDENTIFIERS
@@ -19,10 +20,11 @@ from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem, Replay, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
-from bench.measure import CPU, Bound, Row, Stopwatch
+from bench.measure import CPU, Bound, Row
 from bench.samples import PLANT, write_sample
 
 N_PARTICLES, N_ITERATIONS = 80, 150
+PARTS = ("simulation", "fitness", "framework")
 
 
 @dataclass(frozen=True)
@@ -37,34 +39,29 @@ class Spent:
     @property
     def total(self) -> float:
         """The whole time [s]."""
-        return self.simulation + self.fitness + self.framework
+        return sum(getattr(self, name) for name in PARTS)
 
 
 class Watched:
-    """Stand in for a replay or a fitness, and time its work."""
+    """Stand in for a replay, a fitness or a function, and add the time of its work to what was spent on `name` [s]."""
 
-    def __init__(self, thing: Any, watch: Stopwatch) -> None:
-        self._thing, self._watch = thing, watch
+    def __init__(self, thing: Any, spent: dict[str, float], name: str) -> None:
+        self._thing, self._spent, self._name = thing, spent, name
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._thing, name)
 
     def runs(self, candidates: NDArray[np.float64]) -> Any:
-        return self._watch.timed(self._thing.runs, candidates)
+        return self._timed(self._thing.runs, candidates)
 
-    def __call__(self, *arguments: Any) -> Any:
-        return self._watch.timed(self._thing, *arguments)
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self._timed(self._thing, *arguments, **named)
 
-
-class Sphere(Problem):
-    """The sum of squares in four dimensions: as good as no work, so that what is left is pymoo's own."""
-
-    def __init__(self) -> None:
-        super().__init__(n_var=4, n_obj=1, xl=-1.0, xu=1.0)
-        self.watch = Stopwatch()
-
-    def _evaluate(self, X: NDArray[np.float64], out: dict[str, Any], *_: Any, **__: Any) -> None:
-        out["F"] = self.watch.timed(np.sum, X**2, axis=1, keepdims=True)
+    def _timed(self, function: Any, *arguments: Any, **named: Any) -> Any:
+        start = CPU()
+        result = function(*arguments, **named)
+        self._spent[self._name] += CPU() - start
+        return result
 
 
 def sample_replays(n_samples: int = 701) -> tuple[Replay, ...]:
@@ -75,27 +72,28 @@ def sample_replays(n_samples: int = 701) -> tuple[Replay, ...]:
     return replays(campaign.train, model, space_of(model), STANDARD)
 
 
-def identification(made_ready: tuple[Replay, ...], n_iterations: int, seed: int = 1) -> Spent:
+def identification(made_ready: tuple[Replay, ...], n_iterations: int) -> Spent:
     """Identify with the paper's swarm as `armid identify` does, and tell where the time went."""
-    simulation, fitness = Stopwatch(), Stopwatch()
-    watched = tuple(cast(Replay, Watched(r, simulation)) for r in made_ready)
-    measure = cast(Fitness, Watched(FITNESS["similarity"], fitness))
+    spent = defaultdict[str, float](float)
+    watched = tuple(cast(Replay, Watched(r, spent, "simulation")) for r in made_ready)
+    measure = cast(Fitness, Watched(FITNESS["similarity"], spent, "fitness"))
     meter = Meter(N_PARTICLES * n_iterations)
     start = CPU()
     problem = IdentificationProblem(space_of(made_ready[0].model), watched, measure, meter)
     algorithm = IDENTIFIERS["pso"].build(meter.budget)
-    minimize(problem, algorithm, MeterTermination(meter), seed=seed, copy_algorithm=False)
-    framework = CPU() - start - simulation.spent - fitness.spent
-    return Spent(simulation.spent, fitness.spent, framework, meter.used)
+    minimize(problem, algorithm, MeterTermination(meter), seed=1, copy_algorithm=False)
+    framework = CPU() - start - sum(spent.values())
+    return Spent(spent["simulation"], spent["fitness"], framework, meter.used)
 
 
-def pymoo_framework(n_iterations: int, seed: int = 1) -> float:
-    """Return what pymoo's own swarm spends on the sphere at the same budget, outside the function [s]."""
-    problem = Sphere()
+def pymoo_framework(n_iterations: int) -> float:
+    """Return what pymoo's own swarm spends on the sphere in 4-D at the same budget, outside the function [s]."""
+    problem, spent = Sphere(4), defaultdict[str, float](float)
+    problem._evaluate = Watched(problem._evaluate, spent, "sphere")
     start = CPU()
     algorithm = PSO(pop_size=N_PARTICLES)
-    minimize(problem, algorithm, ("n_eval", N_PARTICLES * n_iterations), seed=seed, copy_algorithm=False)
-    return CPU() - start - problem.watch.spent
+    minimize(problem, algorithm, ("n_eval", N_PARTICLES * n_iterations), seed=1, copy_algorithm=False)
+    return CPU() - start - sum(spent.values())
 
 
 def framework_rows(rounds: int = 6, n_iterations: int = N_ITERATIONS, n_samples: int = 701) -> list[Row]:
@@ -106,8 +104,7 @@ def framework_rows(rounds: int = 6, n_iterations: int = N_ITERATIONS, n_samples:
     pairs = [(identification(made_ready, n_iterations), pymoo_framework(n_iterations)) for _ in range(rounds)]
     ours, theirs = min(s.framework for s, _ in pairs), min(t for _, t in pairs)
     whole = min((s for s, _ in pairs), key=lambda s: s.total)
-    parts = {"simulation": whole.simulation, "fitness": whole.fitness, "framework": whole.framework}
-    shares = ", ".join(f"{name} {seconds / whole.total:.0%}" for name, seconds in parts.items())
+    shares = ", ".join(f"{name} {getattr(whole, name) / whole.total:.0%}" for name in PARTS)
     size = f"{N_PARTICLES} x {n_iterations}"
     return [
         Row(f"framework of one identification, {size}", ours * 1e3, "ms", "pymoo's PSO on the sphere",

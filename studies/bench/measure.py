@@ -6,7 +6,9 @@ import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any, TypeVar
+from typing import TypeVar
+
+from joblib import cpu_count
 
 Key = TypeVar("Key", bound=Hashable)
 Clock = Callable[[], float]
@@ -89,20 +91,6 @@ def shortest(work: Work, clock: Clock, slot: float) -> float:
             return best
 
 
-class Stopwatch:
-    """Add up the time spent in calls."""
-
-    def __init__(self, clock: Clock = CPU) -> None:
-        self.clock, self.spent = clock, 0.0
-
-    def timed(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-        """Return what a function returns, and add the time it took."""
-        start = self.clock()
-        result = function(*arguments, **named)
-        self.spent += self.clock() - start
-        return result
-
-
 def bench_table(rows: Sequence[Row]) -> str:
     """Return every row as one line of a table, then what falls short, the notes and the system, as plain text."""
     table = [HEADER, *(cells(row) for row in rows)]
@@ -112,8 +100,14 @@ def bench_table(rows: Sequence[Row]) -> str:
         padded = (f"{c:<{w}}" if left else f"{c:>{w}}" for c, w, left in zip(line, widths, LEFT, strict=True))
         lines.append("  ".join(padded).rstrip())
     lines.insert(1, "-" * (sum(widths) + 2 * (len(widths) - 1)))
+    short = [
+        f"Falls short: {row.what} has a ratio of {row.ratio:.4g}, {row.wanted.text} is wanted."
+        for row in rows
+        if row.met is False and row.ratio is not None and row.wanted is not None
+    ]
+    within = f"All {sum(row.met is True for row in rows)} ratios that have a bound are within it."
     notes = [f"{row.what}: {row.note}." for row in rows if row.note]
-    return "\n".join([*lines, "", *verdict(rows), *notes, system_text()])
+    return "\n".join([*lines, "", *(short or [within]), *notes, system_text()])
 
 
 def cells(row: Row) -> tuple[str, ...]:
@@ -136,29 +130,13 @@ def number(value: float) -> str:
     return f"{value:#.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.1e}"
 
 
-def verdict(rows: Sequence[Row]) -> list[str]:
-    """Return one sentence for each ratio that falls short, or one for all."""
-    short = [
-        f"Falls short: {row.what} has a ratio of {row.ratio:.4g}, {row.wanted.text} is wanted."
-        for row in rows
-        if row.met is False and row.ratio is not None and row.wanted is not None
-    ]
-    return short or [f"All {sum(row.met is True for row in rows)} ratios that have a bound are within it."]
-
-
 def system_text() -> str:
     """Return what it ran on."""
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba", "pymoo"))
     return (
-        f"{available_cores()} cores ({platform.machine()}), load {load_text()}; "
+        f"{cpu_count()} cores ({platform.machine()}), load {load_text()}; "
         f"Python {platform.python_version()}, {packages}."
     )
-
-
-def available_cores() -> int:
-    """Return how many cores this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def load_text() -> str:

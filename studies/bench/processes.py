@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -28,12 +29,11 @@ def run_apart(command: Sequence[str], failed: str = "", **environment: str) -> s
 
     Raises ArmidError with the last thing it said when it fails; failed: the words before that.
     """
-    environment = child_environment() | environment
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=child_environment() | environment)
     if done.returncode:
         said = done.stderr.strip().splitlines() or ["nothing"]
-        words = " ".join(command)
-        raise ArmidError(f"{failed or f'`{words}` failed and said:'} {said[-1]}")
+        words = failed or f"`{' '.join(command)}` failed and said:"
+        raise ArmidError(f"{words} {said[-1]}")
     return done.stdout
 
 
@@ -53,10 +53,8 @@ def peak_memory() -> int | None:
 
 def forget_peak() -> None:
     """Let the peak start anew from what is resident now, where the system allows it (Linux)."""
-    try:
+    with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        return
 
 
 def beyond_output(n_candidates: int, n_samples: int) -> int:
@@ -117,42 +115,26 @@ print(peak_memory() or -1)
 """
 
 
-def peak_apart(folder: Path) -> int:
-    """Identify a campaign as the command does, and return the peak memory of its process [byte], -1 if not known.
+def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
+    """Measure the peak memory of `armid identify` on a long record, and on many records.
 
     Raises ArmidError when it fails.
     """
-    command = [sys.executable, "-c", IDENTIFY_CHILD.format(folder=str(folder), budget=BUDGET)]
-    return int(run_apart(command, "the identification of a large campaign failed:").split()[-1])
-
-
-def scale_rows(n_samples: int = 1_000_000, n_records: int = 500) -> list[Row]:
-    """Measure the peak memory of `armid identify` on a long record, and on many records."""
-    with TemporaryDirectory(prefix="armid-") as place:
-        long = peak_apart(write_sample(Path(place) / "long", n_samples))
-        many = peak_apart(write_sample(Path(place) / "many", N_SAMPLES, n_records=n_records))
-    return [
-        scale_row(f"identify, {n_samples:,} samples", long, n_samples),
-        scale_row(f"identify, {n_records:,} records", many, n_records * N_SAMPLES),
-    ]
-
-
-def scale_row(what: str, peak: int, n_values: int) -> Row:
-    """Return the row of one peak [byte], beside what the signals of a population take."""
-    if peak < 0:
-        return Row(what, None, "MB", note=UNKNOWN)
-    signals = POPULATION * n_values * 8
-    note = f"peak of the whole process, {BUDGET} simulations in populations of {POPULATION}"
-    return Row(what, peak / MEGABYTE, "MB", "a population's signals", peak / signals, note=note)
+    sizes = {f"{n_samples:,} samples": (n_samples, 1), f"{n_records:,} records": (N_SAMPLES, n_records)}
+    note, rows = f"peak of the whole process, {BUDGET} simulations in populations of {POPULATION}", []
+    for what, (length, count_of) in sizes.items():
+        with TemporaryDirectory(prefix="armid-") as place:
+            campaign = write_sample(Path(place) / "campaign", length, n_records=count_of)
+            command = [sys.executable, "-c", IDENTIFY_CHILD.format(folder=str(campaign), budget=BUDGET)]
+            peak = int(run_apart(command, "the identification of a large campaign failed:").split()[-1])
+        ratio = peak / (POPULATION * length * count_of * 8)
+        known = Row(f"identify, {what}", peak / MEGABYTE, "MB", "a population's signals", ratio, note=note)
+        rows.append(known if peak > 0 else Row(known.what, None, "MB", note=UNKNOWN))
+    return rows
 
 
 ARMID = (sys.executable, "-m", "armid")
 IMPORTS = (sys.executable, "-c", "import numpy, scipy, pandas")
-
-
-def compiled_files() -> set[tuple[str, int]]:
-    """Return the files of the cache with the time of their last change."""
-    return {(str(f), f.stat().st_mtime_ns) for f in cache_folder().rglob("*") if f.is_file()}
 
 
 def startup_row(rounds: int = 8, command: Sequence[str] = ARMID, n_samples: int = 701) -> Row:
@@ -163,6 +145,9 @@ def startup_row(rounds: int = 8, command: Sequence[str] = ARMID, n_samples: int 
     with TemporaryDirectory(prefix="armid-bench-") as folder:
         campaign = write_sample(Path(folder) / "campaign", n_samples)
         numbers = count()
+
+        def compiled_files() -> set[tuple[str, int]]:
+            return {(str(f), f.stat().st_mtime_ns) for f in cache_folder().rglob("*") if f.is_file()}
 
         def simulate_again() -> None:
             run_apart([*command, "simulate", str(campaign), "--out", f"{folder}/out{next(numbers)}"])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import armid
 from armid.engine import Schedule, Simulation, calibrate, probes, simulate
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
-from armid.problem.space import Space, space_of
+from armid.problem.space import space_of
 from armid.record import write_campaign
 
 Array = NDArray[np.float64]
@@ -42,7 +42,6 @@ class Task:
 
     model: Model
     manoeuvre: Manoeuvre
-    space: Space
     population: Array
     schedule: Schedule
 
@@ -64,7 +63,6 @@ def arm_task(
     n_samples: int = N_SAMPLES,
     effects: tuple[str, ...] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    seed: int = 1,
 ) -> Task:
     """Return the declared arm with effects, a random population and the engine's standard schedule.
 
@@ -75,17 +73,17 @@ def arm_task(
     space = space_of(model, bounds=bounds)
     low, high = space.low[space.free], space.high[space.free]
     schedule = calibrate(model, manoeuvre, space.complete(probes(low, high))).schedule
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     population = space.complete(low + (high - low) * rng.random((n_candidates, low.size)))
-    return Task(model, manoeuvre, space, population, schedule)
+    return Task(model, manoeuvre, population, schedule)
 
 
-def write_sample(folder: Path, n_samples: int = 701, seed: int = 2, n_records: int = 1) -> Path:
+def write_sample(folder: Path, n_samples: int = 701, n_records: int = 1) -> Path:
     """Write the campaign: 0.1 s of rest, then n_samples at 1 kHz, with white noise of 0.2 deg/s.
 
     n_records: of the same motion, each with noise of its own.
     """
-    task, rng = arm_task(1, n_samples), np.random.default_rng(seed)
+    task, rng = arm_task(1, n_samples), np.random.default_rng(2)
     speed = np.concatenate([np.zeros(REST), task.run().output[0]])
     times = np.arange(-REST, n_samples) * task.manoeuvre.interval
     names = [f"lower_{i}.csv" if i else "lower.csv" for i in range(n_records)]

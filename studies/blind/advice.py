@@ -78,12 +78,11 @@ def rates(rows: DataFrame) -> DataFrame:
         if pair != ALL:
             line |= {"tried": part["tried"].iloc[0], "in_doubt": part["in_doubt"].iloc[0]}
         for choice in CHOICES:
-            found = apart[choice].astype(bool)
-            low, high = wilson(int(found.sum()), len(found))
+            low, high = wilson(int(apart[choice].sum()), len(apart))
             wrong = int(((part["choice"] == choice) & (part["answer"] == WRONG)).sum())
-            line |= {choice: found.mean(), f"{choice}_low": low, f"{choice}_high": high, f"{choice}_wrong": wrong}
-        advised, random = (apart[choice].astype(bool) for choice in CHOICES)
-        wins, losses = int((advised & ~random).sum()), int((random & ~advised).sum())
+            share = apart[choice].mean()
+            line |= {choice: share, f"{choice}_low": low, f"{choice}_high": high, f"{choice}_wrong": wrong}
+        wins, losses = (int((apart[one] & ~apart[other]).sum()) for one, other in (CHOICES, CHOICES[::-1]))
         line["power"] = part.loc[part["choice"] == ADVISED, "power"].mean()
         line["p"] = binomtest(wins, wins + losses, alternative="greater").pvalue if wins + losses else 1.0
         lines.append(line)

@@ -21,11 +21,12 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from matplotlib.figure import Figure
-from pandas import DataFrame
+from pandas import DataFrame, crosstab
 
 from blind import advice, families, tables
 from blind.figures import advice_figure, counts_figure, held_out_figure
 from stand import RefusalError
+from stand.command import Parser, carry_out
 from stand.score.judge import judge_all, read_json
 from stand.score.targets import Target, aim, targets_of
 
@@ -61,27 +62,23 @@ Times = Mapping[str, tuple[float, float]]
 
 def main(words: Sequence[str]) -> int:
     """Score as the command line says; give the exit code, 2 with a sentence on stderr when refused."""
-    parser = argparse.ArgumentParser(prog="score.py", description="Score closed loops on blind campaigns.")
+    parser = Parser(prog="score.py", description="Score closed loops on blind campaigns.")
     parser.add_argument("results", type=Path, metavar="RESULTS", help="what `armid study` wrote, or folder of reports")
     parser.add_argument("--key", type=Path, required=True, help="the truth, as the test stand wrote it")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where page, tables and figures go")
-    options = parser.parse_args(words)
+    return carry_out(_score, words, parser)
+
+
+def _score(options: argparse.Namespace) -> str:
     try:
         key = read_json(options.key)["campaigns"]
         reports, times = read_results(options.results)
         options.out.mkdir(parents=True, exist_ok=True)
-        told = score(key, reports, times, options.out, options.results.name)
-    except RefusalError as refusal:
-        print(f"score: {refusal}", file=sys.stderr)
-        return 2
+        return score(key, reports, times, options.out, options.results.name)
     except (KeyError, TypeError) as error:
-        print(f"score: {error} of {options.key} or of a report is not as expected", file=sys.stderr)
-        return 2
+        raise RefusalError(f"{error} of {options.key} or of a report is not as expected") from error
     except OSError as error:
-        print(f"score: {options.out} cannot be written: {error.strerror or error}", file=sys.stderr)
-        return 2
-    print(told)
-    return 0
+        raise RefusalError(f"{options.out} cannot be written: {error.strerror or error}") from error
 
 
 def read_results(folder: Path) -> tuple[dict[str, Any], Times]:
@@ -158,7 +155,10 @@ def suite_parts(
     if len(single):
         held, effects = single["matters"].astype(bool), sorted(set(single["truth"]))
         halves = {"moves the held-out error by more than 20 %": single[held], "moves it less": single[~held]}
-        counts = {t: tables.answer_counts(p).reindex(effects, fill_value=0) for t, p in halves.items() if len(p)}
+        counts = {
+            title: crosstab(part["truth"], part["answer"]).reindex(index=effects, columns=tables.ANSWERS, fill_value=0)
+            for title, part in halves.items() if len(part)
+        }  # fmt: skip
         sections["Answers"] += [
             tables.answers_by_effect(rows),
             drawn(out, "confusion", "True effect and answer", CONFUSION, counts_figure(counts)),

@@ -7,7 +7,7 @@ import numpy as np
 from pandas import DataFrame, Series
 from scipy.stats import binomtest
 
-from stand.score.judge import PARAMETERS
+from stand.arm import PARAMETERS
 from stand.score.targets import RIGHT, Target
 
 Row = dict[str, Any]
@@ -24,7 +24,7 @@ WIDE = {"class": "campaigns", "n": ("n", ".0f")}
 class Table(NamedTuple):
     """A table: `frame` goes to NAME.csv in SI, `show` says the heading and format of each column on the page.
 
-    A format of "%" shows a share in per cent, "" a text. A table without columns to show is a file alone.
+    A format of "%" shows a share in per cent, "" a text.
     """
 
     name: str
@@ -58,8 +58,7 @@ def rows_of(judgements: Sequence[Row]) -> DataFrame:
     rows = DataFrame(judgements)
     rows["truth"] = rows["truth"].replace("", NOTHING)
     numbers = ["floor", "before", "after", "before_over_floor", "after_over_floor", "cut", "excess_cut"]
-    for name in numbers:
-        rows[name] = rows[name].astype(float) if name in rows else np.nan
+    rows[numbers] = rows[numbers].astype(float)
     rows["answer"] = [answer(row) for row in rows.to_dict("records")]
     return rows
 
@@ -276,9 +275,3 @@ def times(rows: DataFrame) -> Table:
     )
     show = WIDE | {f"{k}_{word}": (f"{kind} {word} [s]", ".3g") for k, kind in kinds.items() for word in summary}
     return Table("times", "Times", words, DataFrame(lines), show)
-
-
-def answer_counts(rows: DataFrame) -> DataFrame:
-    """Return true effect x answer: numbers of campaigns, every answer a column."""
-    counts = rows.groupby(["truth", "answer"]).size().unstack(fill_value=0)
-    return counts.reindex(columns=list(ANSWERS), fill_value=0)

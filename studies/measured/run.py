@@ -66,23 +66,19 @@ def closed(case: Case, data: Path, out: Path) -> tuple[Report, float]:
             call(str(HERE / case.machine / "make_campaign.py"), "--data", str(data / case.machine), "--out",
                  str(campaign), *case.options)  # fmt: skip
         plugin = ("--plugin", f"{HERE / case.machine / 'plant.py'}:{case.plant}") if case.plant else ()
-        before = spent()
-        call("-m", "armid", "close-loop", str(campaign), "--out", str(result), *plugin)
-        cost.write_text(f"{spent() - before:.0f}\n", encoding="utf-8")
+        seconds = call("-m", "armid", "close-loop", str(campaign), "--out", str(result), *plugin)
+        cost.write_text(f"{seconds:.0f}\n", encoding="utf-8")
     return json.loads((result / "report.json").read_text(encoding="utf-8")), float(cost.read_text(encoding="utf-8"))
 
 
-def call(*words: str) -> None:
-    """Run Python with some words; a failure ends the program."""
+def call(*words: str) -> float:
+    """Run Python with some words, and return the processor time it took [s]; a failure ends the program."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run([sys.executable, *words], stdout=subprocess.DEVNULL, check=False)
     if done.returncode:
         sys.exit(f"run.py: python {' '.join(words)} ended with {done.returncode}")
-
-
-def spent() -> float:
-    """Return the processor time of all programs that were run [s]."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def row(case: Case, report: Report, cpu: float, roles: Mapping[str, str]) -> str:

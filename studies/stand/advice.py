@@ -11,20 +11,12 @@ from typing import Any
 import numpy as np
 
 from stand import RefusalError
-from stand.arm import TRAVEL_DEG, Manoeuvre
-from stand.blind.campaign import (
-    Entry,
-    campaign_files,
-    key_path,
-    make_as_told,
-    manoeuvre_entry,
-    measure_strokes,
-    planted_entry,
-    suite_parser,
-    write_campaigns,
-)
+from stand.arm import PARAMETERS, TRAVEL_DEG, Manoeuvre
+from stand.blind.campaign import campaign_files, measure_strokes, planted_entry
 from stand.blind.draw import Drawn, draw, run, six_strokes
-from stand.blind.suite import Case, Kind, Suite, made_of_table, make_suite
+from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
+from stand.blind.suite import Case, Kind, Suite, kind_of, made_of_table, make_suite
+from stand.gyro import Record
 from stand.motion import Motion
 from stand.score.judge import read_json
 
@@ -60,16 +52,13 @@ class Proof:
 def read_proof(path: Path) -> Proof:
     """Read the [suite] table of a proof. Raises RefusalError with one sentence when that is none."""
 
-    def kind(entry: Mapping[str, Any]) -> Kind:
-        form, signed = "the library's", entry.get("signed", False)
-        return Kind(entry["name"], entry["port"], form, (entry["size"],), signed=signed)
-
     def make(table: Mapping[str, Any]) -> Proof:
-        pairs = tuple(
-            Pair(letter, (kind(entry["first"]), kind(entry["second"])), tuple(entry["strokes"]))
-            for letter, entry in zip(ascii_lowercase, table["pairs"], strict=False)
-        )
-        return Proof(make_suite(table), pairs, int(table["tried"]), int(table["taken"]))
+        pairs = []
+        for letter, entry in zip(ascii_lowercase, table["pairs"], strict=False):
+            both = (entry["first"], entry["second"])
+            first, second = (kind_of({"form": "the library's", "sizes": [each["size"]], **each}) for each in both)
+            pairs.append(Pair(letter, (first, second), tuple(entry["strokes"])))
+        return Proof(make_suite(table), tuple(pairs), int(table["tried"]), int(table["taken"]))
 
     proof = made_of_table(path, make, "proof of advice")
     if not 1 <= proof.taken <= proof.tried <= MOST:
@@ -101,33 +90,32 @@ class First:
         return Case(self.place, "single", (kind.planted(1, sign),), coloured=False)
 
 
-def drawn_of(proof: Proof, first: First) -> Drawn:
-    """Draw arm, manoeuvres and noise of a campaign, the same ones each time; all of its strokes are to train on."""
+def started(proof: Proof, first: First) -> tuple[Drawn, list[Record], Entry]:
+    """Draw and measure a campaign of few strokes, the same one each time; give its entry in the key as well."""
 
     def strokes(rng: np.random.Generator) -> Any:
         return tuple((manoeuvre, "train") for manoeuvre, _ in six_strokes(rng) if manoeuvre.name in first.pair.strokes)
 
-    return draw(proof.suite, first.case(), np.random.default_rng([*first.key, 1]), strokes)
-
-
-def make_first(proof: Proof, first: First) -> tuple[dict[str, str], Entry]:
-    """Make the files of a campaign, which tell nothing of its truth, and its entry in the key."""
-    drawn, rng = drawn_of(proof, first), np.random.default_rng([*first.key, 2])
-    records = measure_strokes(proof.suite, drawn, first.case().effects(), rng)
-    return campaign_files(first.name, drawn.gyro, records), entry_of(first, drawn)
-
-
-def entry_of(first: First, drawn: Drawn) -> Entry:
-    return {
+    case = first.case()
+    drawn = draw(proof.suite, case, np.random.default_rng([*first.key, 1]), strokes)
+    records = measure_strokes(proof.suite, drawn, case.effects(), np.random.default_rng([*first.key, 2]))
+    entry = {
         "class": "pair",
         "pair": list(first.pair.names),
         "place": first.place,
-        "parameters": {name: getattr(drawn.arm, name) for name in ("p0", "k", "eta3", "n")},
-        "effects": [planted_entry(each) for each in first.case().planted],
+        "parameters": {name: getattr(drawn.arm, name) for name in PARAMETERS},
+        "effects": [planted_entry(each) for each in case.planted],
         "noise": {"kind": "white", "rms_deg_s": drawn.gyro.noise_deg_s},
         "floor": {"train": None, "holdout": None},
         "declared_fit": None,
     }
+    return drawn, records, entry
+
+
+def make_first(proof: Proof, first: First) -> tuple[dict[str, str], Entry]:
+    """Make the files of a campaign, which tell nothing of its truth, and its entry in the key."""
+    drawn, records, entry = started(proof, first)
+    return campaign_files(first.name, drawn.gyro, records), entry
 
 
 CHOICES = ("advised", "random")
@@ -135,13 +123,6 @@ TRIES = 200
 APART_DEG, SUPPLY = 15.0, (24.0, 28.0)
 Advice = Sequence[Mapping[str, Any]]
 """What a report advises, the best first, each with its manoeuvre and the power that is promised."""
-
-
-def asked_in(report: Mapping[str, Any], pair: Sequence[str]) -> Advice:
-    """Give what a report advises to tell a pair apart; nothing where it is not in doubt about it."""
-    if report["verdict"] != "cannot_tell_apart":
-        return []
-    return [each for each in report["advice"] if set(pair) <= set(each["separates"])]
 
 
 def make_second(
@@ -153,19 +134,20 @@ def make_second(
     make, counted from 1, and is None where it could make none of them: then the campaign is the first one again.
     """
     first, asked, choice = named
-    drawn, effects, found = drawn_of(proof, first), first.case().effects(), None
-    records = measure_strokes(proof.suite, drawn, effects, np.random.default_rng([*first.key, 2]))
+    (drawn, records, entry), effects = started(proof, first), first.case().effects()
+    found = added = None
     for rank, manoeuvre in _advised(asked) if choice == "advised" else _random(first):
         trajectory = run(Motion(drawn.arm, manoeuvre, effects), drawn.duration_s, must_close=False)
         if trajectory:
-            found = {"rank": rank, "next": manoeuvre_entry(manoeuvre)}
+            found, added = rank, manoeuvre.told()
             more = replace(drawn, strokes=((manoeuvre, "train"),), trajectories=(trajectory,))
             records += measure_strokes(proof.suite, more, effects, np.random.default_rng([*first.key, 3]))
             break
-    told = {"choice": choice, "base": first.name, "rank": found["rank"] if found else None}
-    told |= {"power": asked[0]["power"], "next": found["next"] if found else None}
-    told |= {"tried": proof.tried, "in_doubt": counts[first.pair.letter]}
-    return campaign_files(f"{first.name}_{choice}", drawn.gyro, records), entry_of(first, drawn) | told
+    entry |= {
+        "choice": choice, "base": first.name, "rank": found, "power": asked[0]["power"], "next": added,
+        "tried": proof.tried, "in_doubt": counts[first.pair.letter],
+    }  # fmt: skip
+    return campaign_files(f"{first.name}_{choice}", drawn.gyro, records), entry
 
 
 def _advised(asked: Advice) -> Iterator[tuple[int, Manoeuvre]]:
@@ -221,7 +203,9 @@ def _make_more(options: argparse.Namespace) -> str:
         raise RefusalError(f"{options.base} was made with seed {key['seed']}, not {options.seed}")
     doubts: dict[str, list[tuple[First, Advice]]] = {pair.letter: [] for pair in proof.pairs}
     for first in _firsts(proof, options.seed):
-        asked = asked_in(read_json(options.reports / first.name / "report.json"), first.pair.names)
+        report, pair = read_json(options.reports / first.name / "report.json"), {*first.pair.names}
+        told = report["advice"] if report["verdict"] == "cannot_tell_apart" else []
+        asked = [each for each in told if pair <= {*each["separates"]}]
         if asked:
             doubts[first.pair.letter].append((first, asked))
     named = {
@@ -230,5 +214,5 @@ def _make_more(options: argparse.Namespace) -> str:
     }  # fmt: skip
     counts = {letter: len(some) for letter, some in doubts.items()}
     write_campaigns(options, named, partial(make_second, proof, counts))
-    told = ", ".join(f"{' and '.join(p.names)} {counts[p.letter]} of {proof.tried}" for p in proof.pairs)
-    return f"{options.folder}: {len(named)} campaigns with one record more, SYNTHETIC; in doubt were {told}"
+    doubted = ", ".join(f"{' and '.join(p.names)} {counts[p.letter]} of {proof.tried}" for p in proof.pairs)
+    return f"{options.folder}: {len(named)} campaigns with one record more, SYNTHETIC; in doubt were {doubted}"

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 from stand import RefusalError
 
+PARAMETERS = ("p0", "k", "eta3", "n")
+"""What an identifier must find."""
 GRAVITY = 9.81
+State = dict[str, float]
+"""What the equations know of an instant, by name."""
 SHELL_INERTIA = 45.5 * 0.85**2
 """Inertia of the shell about the trunnion [kg m2]: 45.5 kg at 0.85 m, both estimates."""
 
@@ -58,7 +62,7 @@ class Arm:
     switch_distance: float = math.radians(25.0)
 
     def __post_init__(self) -> None:
-        for name in ("p0", "k", "eta3", "n"):
+        for name in PARAMETERS:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise RefusalError(f"{name} must be a positive number, not {value}")
@@ -125,6 +129,11 @@ class Manoeuvre:
     def target(self) -> float:
         """Give theta_D [rad]."""
         return math.radians(self.target_deg)
+
+    def told(self) -> dict[str, float | bool]:
+        """Tell what it is by the keys of campaign.toml."""
+        angles = {"start_angle_deg": self.start_deg, "target_angle_deg": self.target_deg}
+        return {**angles, "shell": self.shell, "supply_V": self.supply_volt}
 
 
 KNOWN = {

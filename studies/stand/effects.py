@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from stand import RefusalError
-from stand.arm import Arm, Manoeuvre
+from stand.arm import Arm, Manoeuvre, State
 
 POSITIVE = ("_width", "_speed", "_exponent", "_radius", "_width_deg", "_fade_deg", "base_hz", "_stiffness")
 """Ends of the names of details that divide, so that 0 has no meaning."""
@@ -168,14 +168,6 @@ def read_effects(words: Iterable[str]) -> Effects:
     return Effects(**sizes)
 
 
-def describe_effects() -> str:
-    """List each effect with its unit and meaning, one line each."""
-    return "\n".join(f"  {each.name} [{each.metadata['unit']}]: {each.metadata['note']}" for each in fields(Effects))
-
-
-State = dict[str, float]
-
-
 def command(arm: Arm, effects: Effects, manoeuvre: Manoeuvre, seen: State, closed_loop: bool) -> float:
     """Give the voltage demanded of the drive [V]: full supply before E; after it K_p (theta_D - theta) - K_d k omega.
 
@@ -212,6 +204,16 @@ def flux(arm: Arm, effects: Effects, now: State) -> float:
     if effects.flux_saturation:
         ampere /= 1.0 + ampere / effects.flux_saturation
     return arm.excitation * ampere / (1.0 + effects.motor_fade * now.get("charge", 0.0))
+
+
+def current_rate(arm: Arm, effects: Effects, now: State, demand: float) -> float:
+    """L dI/dt = u - 2 R_s I - R I - E - V_b sgn(I), E = C_e Phi i1 omega, signed current (Eq 7) [A/s]."""
+    current = now["current"]
+    voltage = demand - 2.0 * effects.supply_sag * current
+    emf = arm.emf_constant * flux(arm, effects, now) * arm.ratio_motor * now.get("drive_speed", now["speed"])
+    resistance = arm.resistance * (1.0 + effects.winding_heating * now.get("heat", 0.0))
+    brushes = effects.brush_drop * smooth_sign(current, effects.brush_width, effects.brush_tanh)
+    return (voltage - resistance * current - emf - brushes) / arm.inductance
 
 
 def drive(arm: Arm, effects: Effects, now: State) -> float:
@@ -337,10 +339,3 @@ def unlisted_torque(arm: Arm, effects: Effects, now: State, start: float, balanc
         ripple = effects.slipping_ripple * math.sin(arm.ratio_worm * angle + effects.slip_hz * turn)
         total += ripple + effects.sway * math.sin(effects.sway_hz * turn + math.radians(effects.sway_phase_deg))
     return total
-
-
-def base_rate(effects: Effects, now: State, reaction: float) -> float:
-    """Give the acceleration of the base's tilt [rad/s2]: w^2 (c M - beta) - 2 z w beta', M the reaction [N m]."""
-    natural = 2.0 * math.pi * effects.base_hz
-    pull = effects.base_compliance * reaction - now["base"]
-    return natural * (natural * pull - 2.0 * effects.base_damping * now["base_speed"])

@@ -20,30 +20,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from stand import RefusalError
-from stand.arm import Arm
-from stand.blind.campaign import (
-    SUITE,
-    Entry,
-    campaign_files,
-    key_path,
-    make_as_told,
-    measure_strokes,
-    noise_floor,
-    planted_entry,
-    record_entry,
-    suite_parser,
-    write_campaigns,
-)
-from stand.blind.draw import Drawn, draw_arm, rms, run, six_strokes
+from stand.arm import PARAMETERS, Arm
+from stand.blind.campaign import SUITE, campaign_files, measure_strokes, noise_floor, planted_entry, record_entry
+from stand.blind.draw import Drawn, draw_arm, run, six_strokes
+from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Suite, read_suite, signed
 from stand.campaign import record_text
 from stand.effects import Effects
-from stand.gyro import Gyro
+from stand.gyro import Gyro, rms
 from stand.motion import Motion
 
 FAULTS = ("late", "start", "offset", "drift", "gain", "label", "clipped", "gap", "spikes", "stuck")
 DIRT = ("none", "jitter", "hum", "gap")
-FIXED = ("p0", "k", "eta3", "n", "travel")
 # Sets of three effects of different ports, which are told apart on six strokes.
 THREE = (
     ("coulomb", "flux_saturation", "tachometer_lag"), ("viscous", "gas_heat_loss", "tilt"),
@@ -53,8 +41,8 @@ THREE = (
 FAMILIES = ("control", "fault", "constant", "constants", "two", "three", "trend")
 # An effect that moves no record by more than its noise is hardly there: the arm is drawn anew until each does.
 LEAST = 1.0
-# What changes from record to record in a trend, by how much from the first to the last.
-TRENDS, TREND = ("p0", "k", "eta3", "n"), (0.02, 0.08)
+# By how much a parameter changes from the first record to the last in a trend.
+TREND = (0.02, 0.08)
 
 
 def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str], Entry]:
@@ -72,11 +60,11 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
         place = int(rng.integers(len(strokes)))
         moved = [differing(m, fault, rng) if i == place else m for i, (m, _) in enumerate(strokes)]
         trend = {} if family != "trend" else {
-            "kind": "trend", "parameter": TRENDS[index % len(TRENDS)],
+            "kind": "trend", "parameter": PARAMETERS[index % len(PARAMETERS)],
             "size": float(rng.uniform(*TREND) * rng.choice([-1.0, 1.0]))}  # fmt: skip
         trained = [m for m, role in strokes if role == "train"]
-        arms = [at_its_place(arm, trend, trained.index(m) / (len(trained) - 1)) if m in trained else arm
-                for m, _ in strokes]  # fmt: skip
+        arms = [changed(arm, trend["parameter"], trend["size"] * (trained.index(m) / (len(trained) - 1) - 0.5))
+                if trend and m in trained else arm for m, _ in strokes]  # fmt: skip
         found = [run(Motion(a, m, truth.effects()), duration) for a, m in zip(arms, moved, strict=True)]
         told = run(Motion(arm, strokes[place][0], truth.effects()), duration)
         if told is None or not all(found):
@@ -128,29 +116,23 @@ def moves(drawn: Drawn, effects: Effects, others: Effects) -> float:
     return max(changes) / drawn.gyro.noise_deg_s
 
 
-def at_its_place(arm: Arm, trend: dict[str, Any], place: float) -> Arm:
-    """Return the arm as it is in a record, by the place of that in the order of all, 0 to 1; as told in the middle."""
-    if not trend:
-        return arm
-    name = trend["parameter"]
-    return replace(arm, **{name: getattr(arm, name) * (1.0 + trend["size"] * (place - 0.5))})
+def changed(arm: Any, name: str, share: float) -> Any:
+    """Return the arm with one of its numbers, or of its loads' (LOAD.NUMBER), changed by a share."""
+    load, dot, part = name.partition(".")
+    value = changed(getattr(arm, load), part, share) if dot else getattr(arm, name) * (1.0 + share)
+    return replace(arm, **{load: value})
 
 
 def off_constants(arm: Arm, family: str, rng: np.random.Generator) -> tuple[Arm, dict[str, float]]:
     """Return the arm with one constant, or with all, off by 2 to 5 %; and by how much."""
     if not family.startswith("constant"):
         return arm, {}
-    plain = [name for name, value in vars(arm).items() if isinstance(value, float) and name not in FIXED]
+    plain = [name for name, value in vars(arm).items() if isinstance(value, float) and name not in PARAMETERS]
     names = [*plain, *(f"{load}.{part}" for load in ("loaded", "empty") for part in ("mass", "lever", "inertia"))]
     chosen = names if family == "constants" else [names[int(rng.integers(len(names)))]]
     off = {name: float(rng.uniform(0.02, 0.05) * rng.choice([-1.0, 1.0])) for name in chosen}
     for name, share in off.items():
-        load, dot, part = name.partition(".")
-        if dot:
-            old = getattr(arm, load)
-            arm = replace(arm, **{load: replace(old, **{part: getattr(old, part) * (1.0 + share)})})
-        else:
-            arm = replace(arm, **{name: getattr(arm, name) * (1.0 + share)})
+        arm = changed(arm, name, share)
     return arm, off
 
 
@@ -211,19 +193,17 @@ def main(words: Sequence[str]) -> int:
 
 
 def _make_families(options: argparse.Namespace) -> str:
-    wanted = [_counted(text) for text in options.families]
+    wanted = []
+    for text in options.families:
+        family, _, count = text.partition("=")
+        if family not in FAMILIES or not count.isdecimal():
+            raise RefusalError(f"{text!r} is no FAMILY=N: one of {', '.join(FAMILIES)} with a whole number is expected")
+        wanted.append((family, int(count)))
     # In turn, so that a study that is cut short has seen all families alike.
     parts = [((index + 0.5) / count, family, index) for family, count in wanted for index in range(count)]
     named = {f"c{place:03d}": (family, index) for place, (_, family, index) in enumerate(sorted(parts))}
     write_campaigns(options, named, partial(make, read_suite(options.suite), options.seed))
     return f"{options.folder}: {len(named)} campaigns, SYNTHETIC; key: {key_path(options.folder)}"
-
-
-def _counted(text: str) -> tuple[str, int]:
-    family, _, count = text.partition("=")
-    if family not in FAMILIES or not count.isdecimal():
-        raise RefusalError(f"{text!r} is no FAMILY=N: one of {', '.join(FAMILIES)} with a whole number is expected")
-    return family, int(count)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,14 @@
-"""How the simulated arm is measured."""
+"""How the simulated arm is measured: the gyro, its noise, a record."""
 
 import math
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from stand import RefusalError
+from stand.arm import Manoeuvre
 from stand.motion import SAMPLES_PER_SECOND, Trajectory
 
 FloatArray = npt.NDArray[np.float64]
@@ -80,3 +82,32 @@ def noise(size: int, gyro: Gyro, rng: np.random.Generator) -> FloatArray:
     response = np.exp(-NOISE_DAMPING * natural * time) * ringing
     white = rng.standard_normal(size + memory - 1)
     return gyro.noise_deg_s * np.convolve(white, response / np.linalg.norm(response), mode="valid")
+
+
+@dataclass(frozen=True)
+class Record:
+    """Hold one record: file name, manoeuvre, role, the file it repeats, times [s], speeds [deg/s].
+
+    `noise` is the rms of what was written less what the arm did, from t = 0 on [rad/s].
+    """
+
+    file: str
+    manoeuvre: Manoeuvre
+    role: str
+    repeat_of: str | None
+    time_s: FloatArray
+    speed_deg_s: FloatArray
+    noise: float
+
+
+def recorded(
+    trajectory: Trajectory, gyro: Gyro, bias_deg_s: float, rng: np.random.Generator, rest_samples: int, *told: Any
+) -> Record:
+    """Measure a trajectory; `told` are the first four of a record."""
+    speed = measure(trajectory, gyro, bias_deg_s, rng, rest_samples)
+    left = rms(np.radians(speed[rest_samples:]) - trajectory.gyro)
+    return Record(*told, record_times(trajectory, rest_samples), speed, left)
+
+
+def rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

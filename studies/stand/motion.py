@@ -11,20 +11,8 @@ import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from stand import RefusalError
-from stand.arm import GRAVITY, SHELL_INERTIA, Arm, Manoeuvre
-from stand.effects import (
-    Effects,
-    State,
-    base_rate,
-    command,
-    coupling,
-    drive,
-    flux,
-    friction,
-    hysteresis_rates,
-    smooth_sign,
-    unlisted_torque,
-)
+from stand.arm import GRAVITY, SHELL_INERTIA, Arm, Manoeuvre, State
+from stand.effects import Effects, command, coupling, current_rate, drive, friction, hysteresis_rates, unlisted_torque
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -90,42 +78,32 @@ class Motion:
         known = now if seen is None else dict(zip(self.start, seen.tolist(), strict=True))
         torque = self._torque(now)
         voltage = command(self.arm, self.effects, self.manoeuvre, known, closed_loop)
-        rate = {"angle": now["speed"], "speed": torque / self.inertia, "current": self._current_rate(now, voltage)}
-        rate |= self._added_rates(now, torque)
+        rate = {"angle": now["speed"], "speed": torque / self.inertia} | self._added_rates(now, torque)
+        rate["current"] = current_rate(self.arm, self.effects, now, voltage)
         return [rate[name] for name in self.start]
 
     def _torque(self, now: State) -> float:
-        """Sum the torques on the arm [N m]."""
-        arm, effects = self.arm, self.effects
-        balance = self._balance(now)
+        """Sum the torques on the arm [N m]: of the drive, T_R = l S p (Eq 6), T_G = m g L cos(theta + alpha) (Eq 4).
+
+        The pressure is a state when the gas exchanges heat, and a narrow oil line adds c omega abs(omega) to it; tilts
+        of the trunnion and of the base are added to alpha. Cogging is A sin(w theta) + second A sin(2 w theta).
+        """
+        arm, effects, load = self.arm, self.effects, self.arm.load(self.manoeuvre.shell)
+        pressure = now["pressure"] if "pressure" in now else arm.pressure(now["angle"])
+        pressure += effects.line_loss * now["speed"] * abs(now["speed"])
+        balance = arm.piston_lever * arm.piston_area * pressure
+        tilt = math.radians(effects.tilt_deg) + now.get("base", 0.0)
+        gravity = load.mass * GRAVITY * load.lever * math.cos(now["angle"] + arm.gravity_angle + tilt)
+        waves = effects.cogging_waves * now["angle"]
+        cogging = effects.cogging * (math.sin(waves) + effects.cogging_second * math.sin(2.0 * waves))
         passed = coupling(effects, now) if "drive_angle" in now else self._drive(now)
-        declared = passed - balance + self._gravity(now) + self._cogging(now)
+        declared = passed - balance + gravity + cogging
         unlisted = unlisted_torque(arm, effects, now, self.manoeuvre.start, balance)
         return declared - friction(arm, effects, now) - self._tray(now) + effects.torque_offset + unlisted
 
     def _drive(self, now: State) -> float:
         """Give the torque of the drive at the arm [N m], which an actuator may follow late."""
         return now["drive_torque"] if "drive_torque" in now else drive(self.arm, self.effects, now)
-
-    def _cogging(self, now: State) -> float:
-        """A sin(w theta) + second A sin(2 w theta) [N m]."""
-        waves = self.effects.cogging_waves * now["angle"]
-        return self.effects.cogging * (math.sin(waves) + self.effects.cogging_second * math.sin(2.0 * waves))
-
-    def _gravity(self, now: State) -> float:
-        """T_G = m g L cos(theta + alpha) [N m] (Eq 4), the tilt of the trunnion and of the base added to alpha."""
-        load = self.arm.load(self.manoeuvre.shell)
-        tilt = math.radians(self.effects.tilt_deg) + now.get("base", 0.0)
-        return load.mass * GRAVITY * load.lever * math.cos(now["angle"] + self.arm.gravity_angle + tilt)
-
-    def _balance(self, now: State) -> float:
-        """T_R = l S p [N m] (Eq 6); the pressure is a state when the gas exchanges heat.
-
-        A narrow oil line adds c omega abs(omega) to it.
-        """
-        pressure = now["pressure"] if "pressure" in now else self.arm.pressure(now["angle"])
-        pressure += self.effects.line_loss * now["speed"] * abs(now["speed"])
-        return self.arm.piston_lever * self.arm.piston_area * pressure
 
     def _tray(self, now: State) -> float:
         """J_s (w^2 s (1 + (s/s_0)^2) + 2 z w s') [N m], w = 2 pi f: what the tray's spring and damper pass on.
@@ -144,15 +122,6 @@ class Motion:
             stretch *= 1.0 + (stretch / effects.rocking_stop) ** 2
         return SHELL_INERTIA * natural * (natural * stretch + 2.0 * effects.rocking_damping * slip)
 
-    def _current_rate(self, now: State, command_volt: float) -> float:
-        """L dI/dt = u - 2 R_s I - R I - E - V_b sgn(I), E = C_e Phi i1 omega, signed current (Eq 7) [A/s]."""
-        arm, effects, current = self.arm, self.effects, now["current"]
-        voltage = command_volt - 2.0 * effects.supply_sag * current
-        emf = arm.emf_constant * flux(arm, effects, now) * arm.ratio_motor * now.get("drive_speed", now["speed"])
-        resistance = arm.resistance * (1.0 + effects.winding_heating * now.get("heat", 0.0))
-        brushes = effects.brush_drop * smooth_sign(current, effects.brush_width, effects.brush_tanh)
-        return (voltage - resistance * current - emf - brushes) / arm.inductance
-
     def _added_rates(self, now: State, torque: float) -> State:
         """Give the rates of the states that effects appended."""
         arm, effects = self.arm, self.effects
@@ -168,7 +137,11 @@ class Motion:
         if "shell_speed" in now:
             rate |= {"shell_angle": now["shell_speed"], "shell_speed": self._tray(now) / SHELL_INERTIA}
         if "base" in now:
-            rate |= {"base": now["base_speed"], "base_speed": base_rate(effects, now, -torque)}
+            # w^2 (c M - beta) - 2 z w beta' [rad/s2], w = 2 pi f, M the reaction to the torque
+            natural = 2.0 * math.pi * effects.base_hz
+            pull = natural * (effects.base_compliance * -torque - now["base"])
+            rate["base"] = now["base_speed"]
+            rate["base_speed"] = natural * (pull - 2.0 * effects.base_damping * now["base_speed"])
         if "gyro" in now:
             # y'' = w^2 (omega - y) - 2 z w y', w = 2 pi f, of the gyro's own mass [rad/s3]
             natural = 2.0 * math.pi * effects.gyro_bandwidth_hz
@@ -180,10 +153,8 @@ class Motion:
         if "drive_torque" in now:
             wanted = drive(arm, effects, now)
             rate["drive_torque"] = (wanted - now["drive_torque"]) / effects.actuator_lag
-        rate |= hysteresis_rates(effects, now)
-        if "heat" in now:
-            rate["heat"] = now["current"] ** 2 - effects.winding_cooling * now["heat"]
-        return rate | {"charge": abs(now["current"]), "clock": 1.0}
+        heat = now["current"] ** 2 - effects.winding_cooling * now.get("heat", 0.0)
+        return rate | hysteresis_rates(effects, now) | {"heat": heat, "charge": abs(now["current"]), "clock": 1.0}
 
 
 MOST_RATES = 300_000

@@ -41,9 +41,7 @@ def main() -> None:
     if not given.pflacco.exists():
         parser.error(f"{given.pflacco} does not exist: the Python of an environment with pflacco is expected")
     given.out.mkdir(parents=True, exist_ok=True)
-    samples = {}
-    for name, X, y in sampled():
-        samples |= {f"{name}|x": X, f"{name}|y": y}
+    samples = {f"{name}|{axis}": values for name, X, y in sampled() for axis, values in (("x", X), ("y", y))}
     np.savez(given.out / "samples.npz", **samples)
     features = Path(__file__).with_name("landscape_features.py")
     subprocess.run([str(given.pflacco), str(features), str(given.out)], check=True)

@@ -24,35 +24,25 @@ FILES = {
     "steps": "sinal2_degraus_malha_fechada.csv",
     "swept": "sinal3_swept_sine_malha_fechada.csv",
 }
-COLUMNS = ("Tempo_s", "Saida_y", "Controle_u")
+COLUMNS = {"Tempo_s": "time_s", "Saida_y": "angle_deg", "Controle_u": "command_percent"}
 RATE_HZ, FROM_S, TO_S, EVERY, TRAIN = 100.0, 20.0, 80.0, 5, 0.8
-
-
-def parts(folder: Path) -> dict[str, tuple[str, pd.DataFrame]]:
-    """Return part -> role and table (time_s, angle_deg, command_percent) at 20 Hz."""
-    found = {}
-    for name, file in FILES.items():
-        whole = pd.DataFrame(read_columns(folder / file, str(folder / file), COLUMNS))
-        kept = whole[(whole["Tempo_s"] >= FROM_S - 1e-9) & (whole["Tempo_s"] < TO_S - 1e-9)].iloc[::EVERY]
-        table = pd.DataFrame({"time_s": kept["Tempo_s"].to_numpy(), "angle_deg": kept["Saida_y"].to_numpy(),
-                              "command_percent": kept["Controle_u"].to_numpy()})  # fmt: skip
-        cut = int(TRAIN * len(table)) if name != "swept" else 0
-        if cut:
-            found[f"{name}_train"] = "train", table[:cut]
-        found[f"{name}_test"] = "holdout", table[cut:]
-    return found
 
 
 def make(folder: Path, out: Path) -> Path:
     """Write the campaign and return its folder."""
-    records, found = [], parts(folder)
-    for name, (role, table) in found.items():
-        angle = np.radians(table["angle_deg"].to_numpy())
-        slope = savgol_filter(angle, 11, 3, deriv=1, delta=EVERY / RATE_HZ)
-        start = {"start_angle": float(angle[0]), "start_speed": float(slope[0])}
-        records.append((f"{name}.csv", role, {}, start))
+    records, tables = [], {}
+    for name, file in FILES.items():
+        whole = pd.DataFrame(read_columns(folder / file, str(folder / file), list(COLUMNS))).rename(columns=COLUMNS)
+        kept = whole[(whole["time_s"] >= FROM_S - 1e-9) & (whole["time_s"] < TO_S - 1e-9)].iloc[::EVERY]
+        cut = int(TRAIN * len(kept)) if name != "swept" else 0
+        for word, role, part in (("train", "train", kept[:cut]), ("test", "holdout", kept[cut:])):
+            if len(part):
+                angle = np.radians(part["angle_deg"].to_numpy())
+                slope = savgol_filter(angle, 11, 3, deriv=1, delta=EVERY / RATE_HZ)
+                start = {"start_angle": float(angle[0]), "start_speed": float(slope[0])}
+                records.append((f"{name}_{word}.csv", role, {}, start))
+                tables[f"{name}_{word}.csv"] = part
     source = "github.com/helonayala/sysid, commit 3802c648c330 (Unlicense)"
-    tables = {f"{name}.csv": table for name, (_, table) in found.items()}
     return written(out, "quarter_drone", "quarter_drone", source, records, tables)
 
 

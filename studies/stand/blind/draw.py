@@ -14,7 +14,7 @@ from stand import RefusalError
 from stand.arm import GRAVITY, Arm, Manoeuvre
 from stand.blind.suite import Case, Suite
 from stand.effects import Effects
-from stand.gyro import Gyro
+from stand.gyro import Gyro, rms
 from stand.motion import SAMPLES_PER_SECOND, Motion, Trajectory, simulate
 
 TOLERANCE = 1e-9
@@ -37,18 +37,17 @@ class Drawn:
     trajectories: tuple[Trajectory, ...]
 
 
-def draw(suite: Suite, case: Case, rng: np.random.Generator, strokes_of: Strokes | None = None) -> Drawn:
+def draw(suite: Suite, case: Case, rng: np.random.Generator, strokes_of: Strokes) -> Drawn:
     """Draw parameters and manoeuvres until the arm, effects included, makes every stroke inside its travel.
 
-    `strokes_of` draws the manoeuvres; None: as the class of the case wants them. Raises RefusalError when no draw does.
+    `strokes_of` draws the manoeuvres. Raises RefusalError when no draw does.
     """
     noise = round(float(rng.uniform(*suite.noise_deg_s)), 4)
-    usual = _one_stroke if case.label == "one_stroke" else six_strokes
     gyro = Gyro(noise, 0.001, suite.bandwidth_hz if case.coloured else 0.0)
     for _ in range(TRIES):
         arm = draw_arm(suite, rng)
         duration = round(float(rng.uniform(*suite.duration_s)), 2)
-        strokes = strokes_of(rng) if strokes_of else usual(rng)
+        strokes = strokes_of(rng)
         found = [run(Motion(arm, manoeuvre, case.effects()), duration) for manoeuvre, _ in strokes]
         trajectories = tuple(each for each in found if each is not None)
         if len(trajectories) == len(strokes):
@@ -84,7 +83,7 @@ def six_strokes(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
     )
 
 
-def _one_stroke(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
+def one_stroke(rng: np.random.Generator) -> tuple[tuple[Manoeuvre, str], ...]:
     """Give the paper's lowering stroke; half of the campaigns hold a repeat of it out."""
     repeat = ((replace(PAPERS, name="again"), "holdout"),)
     return ((PAPERS, "train"), *(repeat if rng.random() < 0.5 else ()))
@@ -194,13 +193,8 @@ def fit_declared(manoeuvres: Sequence[Manoeuvre], speeds: FloatArray, truth: Arm
         forward, backward = found[1 : 1 + width.size], found[1 + width.size :]
         return found[0], (forward - backward).T / (2.0 * DIFFERENCE)
 
-    def missed(point: FloatArray) -> FloatArray:
-        return tried(tuple(point.tolist()))[0]
-
-    def slopes(point: FloatArray) -> FloatArray:
-        return tried(tuple(point.tolist()))[1]
-
     start = (np.array([getattr(truth, name) for name in ranges]) - low) / width
+    missed, slopes = (lambda point, i=i: tried(tuple(point.tolist()))[i] for i in (0, 1))
     best = least_squares(missed, start, slopes, bounds=(0.0, 1.0), ftol=1e-4, xtol=1e-4, max_nfev=20)
     return arm_at(best.x)
 
@@ -247,10 +241,6 @@ def weigh_alone(drawn: Drawn, effects: Effects, ranges: Ranges) -> Weight | None
     except RefusalError:
         return None
     return weigh(drawn, np.array(speeds), ranges)
-
-
-def rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def brief(value: float | None) -> float | None:

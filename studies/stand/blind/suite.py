@@ -90,8 +90,8 @@ def made_of_table(path: Path, make: Callable[[Mapping[str, Any]], T], what: str)
 
 def make_suite(table: Mapping[str, Any]) -> Suite:
     return Suite(
-        effects=tuple(_kind(each, True) for each in table.get("effects", [])),
-        unlisted=tuple(_kind(each, False) for each in table.get("unlisted", [])),
+        effects=tuple(kind_of(each) for each in table.get("effects", [])),
+        unlisted=tuple(kind_of(each, False) for each in table.get("unlisted", [])),
         pairs=tuple((first, second) for first, second in table.get("two", {}).get("pairs", [])),
         one_stroke=tuple(table.get("one_stroke", {}).get("effects", [])),
         controls=int(table.get("controls", 0)),
@@ -104,7 +104,7 @@ def make_suite(table: Mapping[str, Any]) -> Suite:
     )
 
 
-def _kind(entry: Mapping[str, Any], listed: bool) -> Kind:
+def kind_of(entry: Mapping[str, Any], listed: bool = True) -> Kind:
     """Read one effect and let the stand refuse sizes that mean nothing to it."""
     sizes = tuple({**entry.get("shape", {}), **size} for size in entry["sizes"])
     for size in sizes:
@@ -119,8 +119,6 @@ def _range(edges: Any) -> tuple[float, float]:
 
 
 CLASSES = ("control", "single", "two", "unlisted", "one_stroke")
-LARGEST = 2**32
-"""Seeds of a suite lie below this, so that they fit any generator."""
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from stand import RefusalError
+from stand.arm import PARAMETERS
 
 Entry = Mapping[str, Any]
-PARAMETERS = ("p0", "k", "eta3", "n")
 LARGEST_GROUP = 4
 EMPIRICAL = "unnamed:"
 
@@ -42,18 +42,12 @@ def read_claim(report: Entry) -> Claim:
     return Claim(groups, empirical, report["verdict"])
 
 
-@dataclass(frozen=True)
-class Matched:
-    """Hold which truths are named, which are held by a group alone, and which names belong to no truth."""
+def match(truths: Sequence[str], claim: Claim) -> tuple[list[str], list[str], list[str]]:
+    """Give which truths are named, which are held by a group alone, and which names belong to no truth.
 
-    named: tuple[str, ...]
-    grouped: tuple[str, ...]
-    extra: tuple[str, ...]
-
-
-def match(truths: Sequence[str], claim: Claim) -> Matched:
-    """Give each truth the name that is its own, else one group that holds it; a group of more than 4 holds nothing."""
-    named = tuple(truth for truth in truths if truth in claim.groups)
+    Each truth has the name that is its own, else one group that holds it; a group of more than 4 holds nothing.
+    """
+    named = [truth for truth in truths if truth in claim.groups]
     free = {name: group for name, group in claim.groups.items() if name not in named}
     grouped = []
     for truth in truths:
@@ -61,10 +55,10 @@ def match(truths: Sequence[str], claim: Claim) -> Matched:
         if truth not in named and holds:
             grouped.append(truth)
             del free[holds[0]]
-    return Matched(named, tuple(grouped), tuple(free))
+    return named, grouped, list(free)
 
 
-def judgement(label: str, truths: Sequence[str], claim: Claim, matched: Matched) -> str:
+def judgement(label: str, truths: Sequence[str], claim: Claim) -> str:
     """Give one word for a campaign of a class.
 
     control: right, false_alarm. unlisted: claimed (a library's names alone are said to explain all), else empirical,
@@ -72,30 +66,21 @@ def judgement(label: str, truths: Sequence[str], claim: Claim, matched: Matched)
     half_with_extra (of two), wrong, cannot_tell, empirical, none.
     """
     if label == "unlisted":
-        return _of_unlisted(claim)
-    if truths:
-        return _of_listed(truths, claim, matched)
-    silent = not claim.groups and not claim.empirical
-    return "right" if silent and claim.verdict == "no_discrepancy" else "false_alarm"
-
-
-def _of_unlisted(claim: Claim) -> str:
-    if claim.groups and claim.verdict == "explained":
-        return "claimed"
-    return "empirical" if claim.empirical else "partial" if claim.groups else "none"
-
-
-def _of_listed(truths: Sequence[str], claim: Claim, matched: Matched) -> str:
-    found = len(matched.named) + len(matched.grouped)
-    if found == 0 and claim.groups:
+        quiet = "empirical" if claim.empirical else "partial" if claim.groups else "none"
+        return "claimed" if claim.groups and claim.verdict == "explained" else quiet
+    if not truths:
+        silent = not claim.groups and not claim.empirical and claim.verdict == "no_discrepancy"
+        return "right" if silent else "false_alarm"
+    named, grouped, extra = match(truths, claim)
+    found = len(named) + len(grouped)
+    if not found and not claim.groups:
+        return "empirical" if claim.empirical else "cannot_tell" if claim.verdict == "cannot_tell_apart" else "none"
+    if not found:
         return "wrong"
-    if found == 0:
-        quiet = "cannot_tell" if claim.verdict == "cannot_tell_apart" else "none"
-        return "empirical" if claim.empirical else quiet
     whole = "right" if found == len(truths) else "half"
-    if matched.extra:
+    if extra:
         return f"{whole}_with_extra"
-    return "group" if whole == "right" and matched.grouped else whole
+    return "group" if whole == "right" and grouped else whole
 
 
 def judge(campaign: str, entry: Entry, report: Entry) -> dict[str, Any]:
@@ -105,22 +90,26 @@ def judge(campaign: str, entry: Entry, report: Entry) -> dict[str, Any]:
     """
     claim = read_claim(report)
     truths = [each["name"] for each in entry["effects"] if each["listed"]]
-    matched = match(truths, claim)
     own = [len(group) for name, group in claim.groups.items() if group & set(truths)]
-    wrong = [len(claim.groups[name]) for name in matched.extra]
+    wrong = [len(claim.groups[name]) for name in match(truths, claim)[2]]
     row = {
         **told(campaign, entry),
         "verdict": claim.verdict,
         "named": claim.said,
         "first": next(iter((*claim.groups, *claim.empirical)), "nothing"),
-        "judgement": judgement(entry["class"], truths, claim, matched),
+        "judgement": judgement(entry["class"], truths, claim),
         "wrong_alone": 1 in wrong,
         "wrong_group": any(size > 1 for size in wrong),
         "largest_group": max((len(group) for group in claim.groups.values()), default=0),
         "group_of_truth": max(own, default=0),
         "has_empirical": bool(claim.empirical),
+        **_errors(entry, report),
     }
-    return row | _errors(entry, report) | _parameters(entry, report)
+    for name in PARAMETERS:
+        for when in ("before", "after"):
+            row[f"bias_{when}_{name}"] = report["parameters"][when][name]["value"] / entry["parameters"][name] - 1.0
+        row[f"trusted_{name}"] = bool(report["parameters"]["after"][name]["trusted"])
+    return row
 
 
 def judge_all(key: Mapping[str, Any], reports: Mapping[str, Any]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -178,14 +167,3 @@ def _errors(entry: Entry, report: Entry) -> dict[str, float | None]:
         "cut": 1.0 - after / before,
         "excess_cut": 1.0 - excess[1] / excess[0] if excess[0] else None,
     }
-
-
-def _parameters(entry: Entry, report: Entry) -> dict[str, Any]:
-    """Give the relative error of each parameter before and after, and whether it is trusted after."""
-    row: dict[str, Any] = {}
-    for name in PARAMETERS:
-        truth = entry["parameters"][name]
-        for when in ("before", "after"):
-            row[f"bias_{when}_{name}"] = report["parameters"][when][name]["value"] / truth - 1.0
-        row[f"trusted_{name}"] = bool(report["parameters"]["after"][name]["trusted"])
-    return row

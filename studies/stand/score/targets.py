@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from statistics import fmean, median
 from typing import Any
 
-from stand.score.judge import PARAMETERS
+from stand.arm import PARAMETERS
 
 Row = dict[str, Any]
 RIGHT = ("right", "group")
@@ -39,9 +39,22 @@ def aim(question: str, found: float | None, among: int, limit: str = "", is_shar
 
 def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
     """Reckon every target; `rows` are the judged campaigns, `missing` those without a report."""
-    first = without_report(missing, len(rows) + missing)
-    two = least("two effects: both right", _of(rows, "two"), _is_right, 0.80)
-    return [first, *_controls(rows), *_singles(rows), two, *_fits(rows), *_unlisted(rows), *_one_stroke(rows)]
+    unlisted, one = _of(rows, "unlisted"), _of(rows, "one_stroke")
+    trusted = [row for row in one if row["trusted_p0"] or row["trusted_eta3"] or row["trusted_n"]]
+    not_claimed = [row["judgement"] != "claimed" for row in unlisted]
+    return [
+        without_report(missing, len(rows) + missing),
+        *_controls(rows),
+        *_singles(rows),
+        share("two effects: both right", _of(rows, "two"), _is_right, ">= 0.8"),
+        *_fits(rows),
+        share("effects of no library: no library name said to explain all", not_claimed, bool, ">= 0.8"),
+        _summary("effects of no library: cut of the held-out error, median", _column(unlisted, "cut"), ">= 0.6"),
+        _summary("effects of no library: cut of what is above noise, median", _column(unlisted, "excess_cut")),
+        share("one stroke: wrong name alone", one, lambda row: row["wrong_alone"], "<= 0"),
+        share("one stroke: a group without the truth", one, lambda row: row["wrong_group"]),
+        Target("one stroke: p0, eta3 or n trusted", len(trusted), len(one), "= 0", not trusted if one else None),
+    ]
 
 
 def without_report(missing: int, among: int) -> Target:
@@ -49,22 +62,24 @@ def without_report(missing: int, among: int) -> Target:
 
 
 def _controls(rows: Sequence[Row]) -> list[Target]:
-    controls = _of(rows, "control")
-    lines = [most("controls: false alarms", controls, _is_alarm, 0.02)]
-    for noise in ("white", "coloured"):
-        some = [row for row in controls if row["noise"] == noise]
-        lines.append(share(f"controls with {noise} noise: false alarms", some, _is_alarm))
+    lines = []
+    for words, noise, limit in (("", ("white", "coloured"), "<= 0.02"), (" with white noise", ("white",), ""),
+                                (" with coloured noise", ("coloured",), "")):  # fmt: skip
+        some = [row for row in _of(rows, "control") if row["noise"] in noise]
+        lines.append(share(f"controls{words}: false alarms", some, lambda row: row["judgement"] != "right", limit))
     return lines
 
 
 def _singles(rows: Sequence[Row]) -> list[Target]:
     singles = _of(rows, "single")
     weighty = [row for row in singles if row["matters"]]
+    alone = [row["judgement"] == "wrong" and row["wrong_alone"] for row in weighty]
     held = "single effects that move the held-out error by more than 20 %"
     lines = [
-        least(f"{held}: share of all", singles, lambda row: row["matters"], 0.70),
-        least(f"{held}: right name, or a group that holds it", weighty, _is_right, 0.95),
-        most(f"{held}: wrong name alone", weighty, _is_wrong_alone, 0.02),
+        share(f"{held}: share of all", singles, lambda row: row["matters"], ">= 0.7"),
+        share(f"{held}: right name, or a group that holds it", weighty, _is_right, ">= 0.95"),
+        # the truth is in no name and no group, and a name stands without a group
+        share(f"{held}: wrong name alone", alone, bool, "<= 0.02"),
     ]
     for word, count in sorted(Counter(row["judgement"] for row in weighty).items()):
         lines.append(Target(f"{held}: judged {word}", count / len(weighty), len(weighty), is_share=True))
@@ -101,41 +116,12 @@ def _fits(rows: Sequence[Row]) -> list[Target]:
     return lines
 
 
-def _unlisted(rows: Sequence[Row]) -> list[Target]:
-    some, held = _of(rows, "unlisted"), "effects of no library"
-    return [
-        least(f"{held}: no library name said to explain all", some, lambda row: row["judgement"] != "claimed", 0.80),
-        _summary(f"{held}: cut of the held-out error, median", _column(some, "cut"), ">= 0.6"),
-        _summary(f"{held}: cut of what is above noise, median", _column(some, "excess_cut")),
-    ]
-
-
-def _one_stroke(rows: Sequence[Row]) -> list[Target]:
-    some = _of(rows, "one_stroke")
-    trusted = [row for row in some if row["trusted_p0"] or row["trusted_eta3"] or row["trusted_n"]]
-    met = None if not some else not trusted
-    return [
-        most("one stroke: wrong name alone", some, lambda row: row["wrong_alone"], 0.0),
-        share("one stroke: a group without the truth", some, lambda row: row["wrong_group"]),
-        Target("one stroke: p0, eta3 or n trusted", len(trusted), len(some), "= 0", met),
-    ]
-
-
 def _of(rows: Sequence[Row], label: str) -> list[Row]:
     return [row for row in rows if row["class"] == label]
 
 
 def _is_right(row: Row) -> bool:
     return row["judgement"] in RIGHT
-
-
-def _is_alarm(row: Row) -> bool:
-    return bool(row["judgement"] != "right")
-
-
-def _is_wrong_alone(row: Row) -> bool:
-    """Tell whether the truth is in no name and no group, and a name stands without a group."""
-    return bool(row["judgement"] == "wrong" and row["wrong_alone"])
 
 
 def _column(rows: Sequence[Row], name: str) -> list[float]:
@@ -145,14 +131,6 @@ def _column(rows: Sequence[Row], name: str) -> list[float]:
 def share(question: str, rows: Sequence[Any], test: Callable[[Any], bool], limit: str = "") -> Target:
     """Give the share of rows, or of values, that pass a test."""
     return aim(question, sum(map(test, rows)) / len(rows) if rows else None, len(rows), limit, is_share=True)
-
-
-def least(question: str, rows: Sequence[Any], test: Callable[[Any], bool], limit: float) -> Target:
-    return share(question, rows, test, f">= {limit:g}")
-
-
-def most(question: str, rows: Sequence[Any], test: Callable[[Any], bool], limit: float) -> Target:
-    return share(question, rows, test, f"<= {limit:g}")
 
 
 def _summary(question: str, values: Sequence[float], limit: str = "", of: Callable[[Any], float] = median) -> Target:
