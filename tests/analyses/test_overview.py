@@ -19,6 +19,7 @@ from armid.study.analyses.errors import (
 from armid.study.analyses.fitness_quality import fitness_quality
 from armid.study.analyses.loops import loop_runs
 from armid.study.analyses.overview import main_table, reasons, runs_table
+from armid.study.analyses.success import parts as success_parts
 from armid.study.analyses.success import success, success_figure, success_rates, wilson
 from armid.study.document import report_of, summary_of
 
@@ -89,6 +90,13 @@ def test_the_figure_of_success_has_the_best_on_top():
 @pytest.fixture(scope="module")
 def evidence(made):
     return Evidence(made(seeds=2))
+
+
+def test_success_rates_come_in_the_order_of_the_settings_not_as_the_runs_do(made):
+    evidence = Evidence(made(seeds=2))
+    evidence.runs = evidence.runs.iloc[::-1]
+    table, _ = success_parts(evidence)
+    assert list(dict.fromkeys(table.frame["setting"])) == evidence.settings
 
 
 def test_the_error_map_has_medians_in_the_orders_given(evidence):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from pandas import DataFrame
+from pandas import DataFrame, concat
 
 from armid.report.document import Column, Figure, Part, Table
 from armid.report.style import COLOURS, MARKERS, legend_below, panels, row_names
@@ -26,7 +26,7 @@ FIGURE_CAPTION = (
 def parts(evidence: Evidence) -> Sequence[Part]:
     if not evidence.knows_truth:
         return ()
-    rates = success_rates(evidence.runs)
+    rates = success_rates(concat([evidence.of(setting) for setting in evidence.settings]))
     return success(rates), Figure("success", "Success rates", FIGURE_CAPTION, lambda: success_figure(rates))
 
 
