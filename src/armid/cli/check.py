@@ -75,8 +75,8 @@ def limited(points: "Iterator[ContractPoint]", seconds: float) -> "Iterator[Cont
         except StopIteration:
             return
         except TimeoutError:
-            yield ContractPoint("time limit", False, f"point {place} takes longer than {seconds:g} s; those after "
-                                "it were not tried")  # fmt: skip
+            text = f"point {place} takes longer than {seconds:g} s, what had to be compiled counted"
+            yield ContractPoint("time limit", False, f"{text}; those after it were not tried; --time-limit gives more")
             return
         yield point
 

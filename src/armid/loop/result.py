@@ -223,7 +223,7 @@ def estimates(
     """Return the parameters of the declared model and of the effects added, under their public names.
 
     discrepancy: whether a significant one remains. biases: see `unseen_biases_of`. members: other models over which the
-    intervals of the declared model's own parameters reach.
+    intervals of the declared model's own parameters reach; an effect that one of them does without is not trusted.
     """
     views = [interval_view(fit, members, {})]
     views.append(interval_view(fit, members, library.tolerances) if library.tolerances else views[0])
@@ -242,12 +242,15 @@ def estimates(
             continue
         i = space.free_names.index(name)
         share, effect = next((b for b in biases.get(name, ()) if b[1] not in present), (0.0, ""))
+        instead = set() if owner is None else {n for m in members if owner.public not in m.names for n in m.names}
+        rivals = sorted(instead - present)
         told = []
         for intervals, strongest in views:
             low, high = intervals[name]
             given = 0.5 * (views[0][0][name][1] - views[0][0][name][0])
             doubts_of = [REMAINS] if discrepancy else []
             doubts_of += [HELD] if held[i] else []
+            doubts_of += [f"{' or '.join(rivals)} would do in the place of {owner.public}"] if owner and rivals else []
             if not max(value - low, high - value) <= WIDEST * abs(value):
                 doubts_of.append(f"half of its interval exceeds {WIDEST:.0%} of the value")
             if strongest[i] > STRONGEST:
