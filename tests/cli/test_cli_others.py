@@ -192,8 +192,13 @@ def test_a_campaign_is_read_moves_and_says_that_it_is_synthetic(run, tmp_path):
     checked = run("check", "my_axis")
     assert checked.code == 0
     assert re.search(r"^(\d+) of \1 points hold$", checked.out, re.MULTILINE)
-    text = (tmp_path / "my_axis" / "campaign.toml").read_text()
+    path = tmp_path / "my_axis" / "campaign.toml"
+    text = path.read_text()
     assert text.startswith("# SYNTHETIC: no machine was measured.")
+    assert "constants: taken as exact: gain;" in checked.out
+    path.write_text(text.replace("# [tolerances]\n# default", "[tolerances]\ndefault"))
+    assert "taken as exact" not in run("check", "my_axis").out
+    path.write_text(text)
     files = [r["file"] for r in tomllib.loads(text)["records"]]
     assert files == ["synthetic_train.csv", "synthetic_holdout.csv"]
 

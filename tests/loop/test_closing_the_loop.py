@@ -64,6 +64,10 @@ def test_effects_that_leave_the_same_trace_are_one_group_and_get_advice(closed):
     assert {found.steps[0].effect, *found.steps[0].alternatives} == {"coulomb", "seal_friction"}
     assert found.advice
     assert {"coulomb", "seal_friction"} >= set(found.advice[0].separates)
+    # The arm is known whichever of them it is; its strength is not, as it may have none.
+    trusted = {e.name.partition(".")[0] for e in found.after.estimates if e.trusted_given_constants}
+    assert trusted == set(TRUTH)
+    assert any("would do in the place of" in d for e in found.after.estimates for d in e.doubts)
 
 
 def test_what_no_candidate_can_do_is_not_called_explained(closed):

@@ -180,7 +180,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         yield ContractPoint("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")
         if campaign.taken_as_exact:
             names = ", ".join(campaign.taken_as_exact)
-            text = f"{names} count as exact; [tolerances] of campaign.toml says how well they are known"
+            text = f"taken as exact: {names}; [tolerances] of campaign.toml says how well each is known"
             yield ContractPoint("constants", True, text)
         middle = space.complete(0.5 * (space.low + space.high)[np.newaxis, space.free])
         for replay in (one for record in campaign.records for one in replay_at(middle, record, model).each):
