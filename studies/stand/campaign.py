@@ -57,8 +57,8 @@ def check_place(folder: Path, force: bool, stranger: Callable[[list[str]], str],
     taken = [folder] if there else [each for each in beside if each.exists()]
     if taken and not force:
         raise RefusalError(f"{taken[0]} is there and not empty; give --force to replace it")
-    if there and stranger(there):
-        raise RefusalError(f"{folder} holds {stranger(there)}, so --force will not replace it")
+    if there and (kept := stranger(there)):
+        raise RefusalError(f"{folder} holds {kept}, so --force will not replace it")
 
 
 @contextmanager

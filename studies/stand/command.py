@@ -160,7 +160,7 @@ def make_records(settings: Settings, rng: np.random.Generator) -> list[Record]:
         for count in range(1, 1 + (settings.repeats if index == 0 else 1)):
             original = f"{manoeuvre.name}.csv" if count > 1 else None
             told = (f"{manoeuvre.name}_{count}.csv" if original else f"{manoeuvre.name}.csv", manoeuvre, role, original)
-            records.append(recorded(trajectory, settings.gyro, bias, rng, settings.rest_samples, *told))
+            records.append(recorded(trajectory, settings.gyro, bias, rng, settings.rest_samples, told))
     return records
 
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -101,9 +100,10 @@ class Record:
 
 
 def recorded(
-    trajectory: Trajectory, gyro: Gyro, bias_deg_s: float, rng: np.random.Generator, rest_samples: int, *told: Any
-) -> Record:
-    """Measure a trajectory; `told` are the first four of a record."""
+    trajectory: Trajectory, gyro: Gyro, bias_deg_s: float, rng: np.random.Generator, rest_samples: int,
+    told: tuple[str, Manoeuvre, str, str | None],
+) -> Record:  # fmt: skip
+    """Measure a trajectory; `told` are file, manoeuvre, role and the file it repeats."""
     speed = measure(trajectory, gyro, bias_deg_s, rng, rest_samples)
     left = rms(np.radians(speed[rest_samples:]) - trajectory.gyro)
     return Record(*told, record_times(trajectory, rest_samples), speed, left)

@@ -82,14 +82,13 @@ def known(*fits):
 
 def test_what_is_found_of_a_size_later_takes_the_place_of_its_best(monkeypatch):
     """The right pair turned up only as an exchange beside a third effect, which does not earn its place then."""
-    earned, not_earned, fit = EARNED, NOT_EARNED, a_fit
-    none, one, wrong, right, three = map(fit, (1e6, 1e5, 1e4, 101.0, 100.0), ("", "a", "bc", "ad", "abd"))
-    levels = [SearchLevel((none,)), SearchLevel((one,), earned), SearchLevel((wrong,), earned)]
-    monkeypatch.setattr(Search, "judged", lambda _, fits, smaller: SearchLevel(tuple(fits), earned))
+    none, one, wrong, right, three = map(a_fit, (1e6, 1e5, 1e4, 101.0, 100.0), ("", "a", "bc", "ad", "abd"))
+    levels = [SearchLevel((none,)), SearchLevel((one,), EARNED), SearchLevel((wrong,), EARNED)]
+    monkeypatch.setattr(Search, "judged", lambda _, fits, smaller: SearchLevel(tuple(fits), EARNED))
     monkeypatch.setattr(Search, "note_round", lambda *_: None)
     search = Search(None, known(none, one, wrong, right, three))
-    assert [level.best for level in search.renewed([*levels, SearchLevel((three,), not_earned)])] == [none, one, right]
-    assert search.renewed([*levels, SearchLevel((three,), earned)])[-1].best is three
+    assert [level.best for level in search.renewed([*levels, SearchLevel((three,), NOT_EARNED)])] == [none, one, right]
+    assert search.renewed([*levels, SearchLevel((three,), EARNED)])[-1].best is three
     del search.fits[frozenset(right.active)]
     assert search.renewed(levels) == levels
 

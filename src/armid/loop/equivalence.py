@@ -121,17 +121,17 @@ def substitutes(fit: Fit, library: Library) -> list[Substitute]:
     """
     changes = {key: change_by(fit, key) for key in fit.active}
     bases = {key: basis_of_others(fit, key) for key in fit.active}
+    mine, others = declared_keys(fit.active), {key.public for key in library.joinable(fit.active)}
 
     def places_of(candidate: EffectKey) -> list[Substitute]:
         """Return the effects of the fit that a candidate moves the records like."""
         records = library.problem((*fit.active, candidate), fit.values)
         grid, _ = activation_grid(records, candidate)
         near = [(key, likest(changes[key], responses(fit, records, grid, without=key), bases[key]))
-                for key in fit.active if candidate.public in (key.public, *others)]  # fmt: skip
+                for key in fit.active if candidate.public in others or candidate.public == key.public]  # fmt: skip
         return [Substitute(key, candidate, best[1], fit.values | grid[best[0]].at(float(np.clip(best[2], 0.01, 1.0))))
                 for key, best in near if best is not None]  # fmt: skip
 
-    mine, others = declared_keys(fit.active), {key.public for key in library.joinable(fit.active)}
     each = library.each(places_of, [key for key in library.candidates if key not in mine])
     found = sorted(chain.from_iterable(each), key=lambda r: -r.correlation)
     return [r for place in fit.active for r in [r for r in found if r.place == place][:MOST_SUBSTITUTES]]

@@ -242,15 +242,17 @@ def estimates(
             continue
         i = space.free_names.index(name)
         share, effect = next((b for b in biases.get(name, ()) if b[1] not in present), (0.0, ""))
-        instead = set() if owner is None else {n for m in members if owner.public not in m.names for n in m.names}
-        rivals = sorted(instead - present)
+        rivals = [] if owner is None else sorted(
+            {n for m in members if owner.public not in m.names for n in m.names} - present
+        )  # fmt: skip
+        in_doubt = [f"{' or '.join(rivals)} would do in the place of {public.partition('.')[0]}"] if rivals else []
         told = []
         for intervals, strongest in views:
             low, high = intervals[name]
             given = 0.5 * (views[0][0][name][1] - views[0][0][name][0])
             doubts_of = [REMAINS] if discrepancy else []
             doubts_of += [HELD] if held[i] else []
-            doubts_of += [f"{' or '.join(rivals)} would do in the place of {owner.public}"] if owner and rivals else []
+            doubts_of += in_doubt
             if not max(value - low, high - value) <= WIDEST * abs(value):
                 doubts_of.append(f"half of its interval exceeds {WIDEST:.0%} of the value")
             if strongest[i] > STRONGEST:

@@ -37,7 +37,7 @@ def measure_strokes(suite: Suite, drawn: Drawn, effects: Effects, rng: np.random
     rest, bias, records = round(suite.rest_s * SAMPLES_PER_SECOND), effects.gyro_bias_deg_s, []
     for (manoeuvre, role), trajectory in zip(drawn.strokes, drawn.trajectories, strict=True):
         told = (f"{manoeuvre.name}.csv", manoeuvre, role, "lower.csv" if manoeuvre.name == "again" else None)
-        records.append(recorded(trajectory, drawn.gyro, bias, rng, rest, *told))
+        records.append(recorded(trajectory, drawn.gyro, bias, rng, rest, told))
     return records
 
 
