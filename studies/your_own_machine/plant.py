@@ -15,9 +15,9 @@ def voltage(demand, supply):
     return np.minimum(np.maximum(demand, -supply), supply)
 
 
-def current(voltage, motor_constant, v, resistance, drive_on):
-    """Current of the motor [A]; none while the drive is switched off."""
-    return drive_on * (voltage - motor_constant * v) / resistance
+def current(voltage, winding, motor_constant, v, resistance, drive_on):
+    """Current of the motor [A]; none while the drive is switched off. Effects add to the voltage at `winding`."""
+    return drive_on * (voltage + winding - motor_constant * v) / resistance
 
 
 def drive_effort(motor_constant, current):
@@ -90,7 +90,7 @@ boom = Plant(
         Input("supply", "V", ("supply_V",), typical=(20.0, 24.0)),
         Input("drive_on", "1", ("drive_on",), required=False, default=1.0, hold="zero", typical=(0.0, 1.0)),
     ),
-    ports={"torque": "N m", "drive": "N m", "output": "rad/s"},
+    ports={"torque": "N m", "drive": "N m", "winding": "V", "output": "rad/s"},
     guards=(Guard("upper_limit", to_upper_limit), Guard("lower_limit", to_lower_limit)),
     aliases={"omega": "v", "theta": "q", "load_effort": "gravity_effort"},
     output="recorded_speed",

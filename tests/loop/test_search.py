@@ -14,7 +14,7 @@ from armid.loop.constants import ConstantModel, is_outdone
 from armid.loop.equivalence import substitutes
 from armid.loop.fit import Comparison
 from armid.loop.search import Search, SearchLevel, best_along, finished, with_free_shapes
-from armid.loop.suspects import is_earned
+from armid.loop.suspects import is_earned, is_next_to_nothing
 from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
@@ -68,6 +68,7 @@ def test_a_narrow_valley_is_found_along_one_parameter():
 
 
 EARNED, NOT_EARNED = Comparison(1.0, 0.0, (2.0, 1.0)), Comparison(-1.0, 1.0, (np.nan, np.nan))
+PREDICTS_WORSE = Comparison(1.0, 0.0, (1.0, 2.0))
 
 
 def a_fit(chi2, names, rough=False):
@@ -110,6 +111,9 @@ def test_a_rival_of_a_fault_may_be_a_better_model_of_the_same_size(monkeypatch):
     assert search.fits == known(wrong, right, more)
     assert Search(library, known(wrong)).further(SearchLevel((wrong,)), 50.0) is None
     assert Search(library, known(right)).further(SearchLevel((right,)), 200.0) is None
+    # a model that fits better and predicts worse speaks against a fault as well
+    monkeypatch.setattr(Search, "next_level", lambda *_: SearchLevel((more,), PREDICTS_WORSE))
+    assert Search(library, known(wrong)).further(SearchLevel((wrong,)), 200.0) is more
 
 
 def test_a_search_goes_on_from_levels_that_are_known(monkeypatch):
@@ -195,6 +199,14 @@ def test_a_fault_that_changes_next_to_nothing_accuses_nobody():
     assert not is_earned(before, before, 4856.1, 40)
     assert not is_earned(before, before, 4856.5 * np.exp(-16.0 / 4234.0), 40)
     assert is_earned(before, before, 4856.5 * np.exp(-18.0 / 4234.0), 40)
+
+
+def test_next_to_nothing_is_left_only_of_what_was_clearly_more_than_noise():
+    """Where the level of the noise is known too high, chi2 is below its expectation, and any fault would do."""
+    assert is_next_to_nothing(5001.0, 6000.0, 5000)
+    assert not is_next_to_nothing(5020.0, 6000.0, 5000)
+    assert not is_next_to_nothing(4844.0, 4910.0, 5000)
+    assert not is_next_to_nothing(4990.0, 5200.0, 5000)
 
 
 def test_keys_and_what_they_own():

@@ -38,7 +38,7 @@ MAGNITUDES = {
 
 
 def test_ranges_cover_what_a_real_arm_has_with_room():
-    forms = [form for effect in applicable(EFFECTS, ARM).values() for form in effect.every_form]
+    forms = [f for effect in applicable(EFFECTS, ARM).values() for f in effect.every_form if not refusal_of(f, ARM)]
     resolved = {name: p for form in reversed(forms) for name, p in (Model(ARM) + form).parameters.items()}
     for name, (weak, strong) in MAGNITUDES.items():
         p = resolved[name]
@@ -92,8 +92,12 @@ def level(level):
 
 def test_forms_stand_under_one_name():
     forms = {name: [e.form for e in EFFECTS[name].every_form] for name in EFFECTS if EFFECTS[name].forms}
-    assert forms.items() >= {"presliding": ["dahl", "lugre", "bouc_wen"], "drive_lag": ["current_loop", "actuator"],
-                             "controller_delay": ["feedback", "command"]}.items()  # fmt: skip
+    assert forms.items() >= {"presliding": ["dahl", "lugre", "bouc_wen"],
+                             "drive_lag": ["current_loop", "actuator", "voltage"],
+                             "controller_delay": ["feedback", "command", "voltage"]}.items()  # fmt: skip
+    late, lagging = (EFFECTS[name].in_form("voltage") for name in ("controller_delay", "drive_lag"))
+    assert "is for plants without the port 'command'" in refusal_of(late, ARM)
+    assert "'winding'" in refusal_of(lagging, PLANTS["driven_axis"])
     flux = EFFECTS["flux_saturation"]
     assert [e.form for e in flux.every_form] == ["rational", "arctangent"]
     assert flux.in_form("arctangent").name == "flux_saturation"

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from armid.contract.check import check_thing
-from armid.model import Model, Output
+from armid.contract.equations import check_effect
+from armid.loop import close_loop
+from armid.model import EFFECTS, Model, Output, is_late_as_a_whole
+from armid.model.effect import zero
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.problem import replays
 from armid.problem.space import space_of
@@ -50,6 +53,38 @@ def identified(folder, plugin, tmp_path_factory):
 def test_the_plant_keeps_the_contract(plugin):
     plant = load_registry([plugin]).plants["boom"]
     assert [f"{f.name}: {f.sentence}" for f in check_thing("plants", "boom", plant) if not f.passed] == []
+
+
+@pytest.mark.slow
+def test_a_late_voltage_is_no_late_torque(folder, plugin):
+    """Told as one, for want of a port at the winding, it gives another inertia, which is not trusted then."""
+    boom = load_registry([plugin]).plants["boom"]
+    for name in ("controller_delay", "drive_lag"):
+        points = list(check_effect(EFFECTS[name], {"boom": boom}))
+        assert [f.sentence for f in points if not f.passed] == []
+        assert any(f.name == "compiled on boom in rad/s in the form voltage" for f in points), points
+    ports = {name: unit for name, unit in boom.ports.items() if name != "winding"}
+    torque_alone = replace(boom, ports=ports, quantities={**boom.quantities, "winding": zero})
+    assert (is_late_as_a_whole(boom), is_late_as_a_whole(torque_alone)) == (False, True)
+    said = [p.sentence for p in check_thing("plants", "boom", torque_alone) if p.name.startswith("late drive")]
+    assert len(said) == 1
+    assert "add a port `winding` [V]" in said[0]
+    truth = {"inertia": 0.8, "motor_constant": 1.6, "boom_moment": 4.0, "controller_delay.delay": 0.008}
+    model = Model(boom) + EFFECTS["controller_delay"].in_form("voltage")
+    space, rng = space_of(model, fixed=truth), np.random.default_rng(7)
+    records = []
+    for replay in replays(read_campaign(folder / "campaign", {"boom": boom}).records, model, space):
+        signal = replay.signal(space.complete(np.empty((1, 0))))[0]
+        signal = signal + replay.record.noise.rms * rng.standard_normal(signal.shape)
+        pieces = tuple(replace(p, measured=signal[p.start_index :][: len(p.measured)]) for p in replay.record.pieces)
+        records.append(replace(replay.record, measured=signal, pieces=pieces))
+    for plant in (boom, torque_alone):
+        campaign = replace(read_campaign(folder / "campaign", {"boom": plant}), records=tuple(records))
+        found = close_loop(Model(plant), campaign, {n: EFFECTS[n] for n in ("controller_delay", "output_lag")})
+        assert [s.effect for s in found.steps] == ["controller_delay"]
+        inertia = found.after.estimates[0]
+        assert (inertia.low < truth["inertia"] < inertia.high) == (plant is boom)
+        assert any("were the voltage alone late" in d for d in inertia.doubts) == (plant is torque_alone)
 
 
 def test_what_is_read(folder, plugin):

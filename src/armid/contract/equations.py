@@ -23,7 +23,7 @@ from armid.contract.trials import (
 from armid.engine import FINE, along, calibrate, simulate
 from armid.engine.calibrate import difference
 from armid.errors import ArmidError
-from armid.model import PLANTS, Effect, Manoeuvre, Model, Plant
+from armid.model import PLANTS, Effect, Manoeuvre, Model, Plant, is_late_as_a_whole
 from armid.model.effect import Equation
 
 Array = NDArray[np.float64]
@@ -57,6 +57,10 @@ def plant_points(model: Model) -> Iterator[ContractPoint]:
     yield from check_parameters(plant.parameters)
     is_printed = all(o.signal in str(model) for o in plant.outputs)
     yield ContractPoint("printed", is_printed, "print(model) shows its equations")
+    if is_late_as_a_whole(plant):
+        text = ("a part of drive_effort follows the motion: a late voltage is told as a late drive and another "
+                "inertia; name what drives the motor `voltage` and add a port `winding` [V] to it")  # fmt: skip
+        yield ContractPoint("late drive", True, text)
     used = f"all of {len(plant.guards)} guards are used"
     yield finding("guards", idle, "nothing depends on guard {}, or it never moves", used)
     manoeuvres, x = trial_manoeuvres(plant), nominal(model)
@@ -88,9 +92,12 @@ def check_effects(
     for k in range(max((len(effect.every_form) for effect in effects), default=0)):
         forms = {effect.name: effect.every_form[k] for effect in effects if k < len(effect.every_form)}
         fits: dict[str, list[Model]] = {}
-        for name, form in forms.items():
-            fits[name], refusals = composed(form, plants)
-            yield from ((name, of_form(p, form)) for p in declared(form, fits[name], refusals, strict))
+        for effect in effects:
+            if (form := forms.get(effect.name)) is not None:
+                fits[form.name], refusals = composed(form, plants)
+                is_taken = any(composed(other, plants)[0] for other in effect.every_form)
+                told = declared(form, fits[form.name], refusals, is_taken, strict)
+                yield from ((form.name, of_form(p, form)) for p in told)
         for plant in siblings(plants):
             models = {name: model for name, several in fits.items() for model in several if model.plant is plant}
             joint = joint_model(plant, [forms[name] for name in models])
@@ -116,8 +123,13 @@ def composed(form: Effect, plants: Mapping[str, Plant]) -> tuple[list[Model], li
     return models, refusals
 
 
-def declared(form: Effect, models: Sequence[Model], refusals: list[str], strict: bool) -> list[ContractPoint]:
-    """Tell which plants take an effect, else why none does; and what its declaration says."""
+def declared(
+    form: Effect, models: Sequence[Model], refusals: list[str], is_taken: bool, strict: bool
+) -> list[ContractPoint]:
+    """Tell which plants take a form of an effect, else why none does; and what its declaration says.
+
+    is_taken: whether a plant takes any form of it.
+    """
     fits = f"fits {', '.join(m.plant.name for m in models)}" if models else (
         f"fits no plant ({'; '.join(refusals)}); --plugin FILE.py:attribute has it tried on your own")  # fmt: skip
     nulls = [p.name for p in form.parameters if p.null is not None]
@@ -125,7 +137,7 @@ def declared(form: Effect, models: Sequence[Model], refusals: list[str], strict:
     silent = [name for name, f in functions_of(form) if not (f.__doc__ or "").strip()]
     documented = finding("documented", silent, "no docstring: {}", "every function has a docstring")
     return [
-        ContractPoint("binds", bool(models), fits),
+        ContractPoint("binds", is_taken, fits),
         *check_parameters(form.parameters),
         ContractPoint("null values", bool(nulls), vanishes),
         replace(documented, passed=not (silent and strict)),

@@ -370,7 +370,14 @@ def calibrated_replays(
         if name in near:
             ends = sorted((near[name] / NEAR, near[name] * NEAR))
             low[i], high[i] = max(low[i], ends[0]), min(high[i], ends[1])
-    spread = space.complete(probes(low, np.maximum(high, low), N_PROBES))
+    rows = probes(low, np.maximum(high, low), N_PROBES)
+    # What is tried first is weak, and a short lag may ask for finer steps than all that the box is likely to hold.
+    nulls = {i: model.parameters[n].null for i, n in enumerate(space.free_names) if n not in near}
+    if weak := {i: null for i, null in nulls.items() if null is not None}:
+        rows = np.vstack([rows, 0.5 * (low + high)])
+        for i, null in weak.items():
+            rows[-1, i] = null + STRENGTHS[0] * (max(low[i], high[i], key=lambda end: abs(end - null)) - null)
+    spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
     allowed: dict[str, Array] = {}
     for record, rms in zip(records, noise or (), strict=noise is not None):

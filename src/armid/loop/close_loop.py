@@ -242,8 +242,12 @@ def settled(library_for: LibraryFor, train: tuple[Record, ...], implausible: boo
 
 
 def suspected_again(library_for: LibraryFor, found: "Decision", train: tuple[Record, ...]) -> Settled:
-    """Suspect the records where what was found leaves more than noise, as `settled` does."""
-    if found.constants is None and is_significant(found.largest):
+    """Suspect the records where what was found leaves more than noise, as `settled` does.
+
+    Not where one effect more leaves noise, though it does not earn its place: that speaks for it, not against a record.
+    """
+    more = found.search.of_size(len(found.largest.active) + 1)[:1]
+    if found.constants is None and all(is_significant(f) for f in (found.largest, *more)):
         apart = disagreeing_record([found.declared, found.largest])
         if apart is not None:
             train = tuple(r for r in train if r.file != apart.record)

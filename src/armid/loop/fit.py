@@ -265,6 +265,11 @@ class Comparison:
         return not self.why
 
     @property
+    def fits_better(self) -> bool:
+        """Whether it is significant and cheaper by the criterion, whatever it predicts."""
+        return self.p < FAMILYWISE and self.gain > 0.0
+
+    @property
     def why(self) -> str:
         """Which threshold was not reached, in words; "" where all were."""
         if self.p >= FAMILYWISE:

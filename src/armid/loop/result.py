@@ -21,7 +21,7 @@ from armid.loop.missing_signal import Missing
 from armid.loop.score_test import Score, rest_of, score
 from armid.loop.search import Search
 from armid.loop.suspects import Suspect
-from armid.model import Model
+from armid.model import Model, is_late_as_a_whole
 from armid.problem.problem import Replay
 from armid.record import Campaign
 from armid.report.document import curve_entry, finite
@@ -41,6 +41,8 @@ BIASED = 0.01
 RESTS_ON = 2.0
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
+# Doubt of every value where an effect delays what the motor induces with what drives it.
+LATE = "is told of all the drive, of which a part follows the motion: were the voltage alone late, it would be another"
 # Candidates whose predicted change of the residual is drawn.
 MOST_DRAWN = 4
 # Half of the 95 % interval may be this share of the value; correlations may be this strong.
@@ -230,6 +232,7 @@ def estimates(
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
     present = {key.public for key in fit.active}
+    late = present & {"controller_delay", "drive_lag"} if is_late_as_a_whole(library.declared.plant) else ()
     found = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
@@ -253,6 +256,7 @@ def estimates(
             doubts_of = [REMAINS] if discrepancy else []
             doubts_of += [HELD] if held[i] else []
             doubts_of += in_doubt
+            doubts_of += [f"{' and '.join(sorted(late))} {LATE}"] if late else []
             if not max(value - low, high - value) <= WIDEST * abs(value):
                 doubts_of.append(f"half of its interval exceeds {WIDEST:.0%} of the value")
             if strongest[i] > STRONGEST:

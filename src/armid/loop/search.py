@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.least_squares import REACH, held_by_bound, spread_starts
 from armid.loop.candidates import Active, EffectKey, Library, declared_keys
-from armid.loop.diagnose import is_significant, train_residuals
+from armid.loop.diagnose import SIGNIFICANCE, is_significant, train_residuals
 from armid.loop.equivalence import WITHIN, substitutes
 from armid.loop.fit import Comparison, Fit, behind, compare, criterion, fit_from, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
@@ -30,7 +30,8 @@ N_EXCHANGES = 3
 # Models of a round that the log tells.
 N_LOGGED = 5
 # Where no test of what remains is more striking than this, all together, no second effect is looked for: it would need
-# more of the residual than the tests would overlook, and looking costs more than everything before.
+# more of the residual than the tests would overlook, and looking costs more than everything before. Beyond the sets
+# looked at ahead, and one more in which a wrong one is mended, it ends where the tests call it noise.
 QUIET = 0.1
 # Of so many of the best the fixed shapes are set free: a rival must not lose by the width of a sign alone.
 N_FREED, FREED_WITHIN = 4, 4.0
@@ -105,9 +106,10 @@ class Search:
         return self.fits[frozenset()]
 
     def further(self, level: SearchLevel, limit: float, to_noise: bool = True) -> Fit | None:
-        """Return the best model with one effect more, if it earns it, chi2 is below a limit, and noise is left.
+        """Return the best model with one effect more, if it fits better, chi2 is below a limit, and noise is left.
 
-        Or of as many effects, if a better one is found on the way. to_noise: whether it must leave noise.
+        Or of as many effects, if a better one is found on the way. What it predicts of records left out is not asked:
+        what is looked for here speaks against the fault of one. to_noise: whether it must leave noise.
         """
         library = self.library.about(level.best.records.replays, level.best.misfit)
         beside = replace(self, library=library, fits=dict(self.fits), rounds=[], limit=limit)
@@ -116,7 +118,7 @@ class Search:
         self.fits |= {active: f for active, f in beside.fits.items() if f.chi2 < limit and not f.rough}
         alike = self.of_size(len(level.best.active))[0]
         rivals = [alike] if far_behind(level.best, alike) > WITHIN else []
-        rivals += [found.best] if found is not None and found.earned else []
+        rivals += [found.best] if found is not None and found.comparison and found.comparison.fits_better else []
         good = [f for f in rivals if f.chi2 <= limit and not (to_noise and is_significant(f))]
         return min(good, key=lambda f: f.chi2, default=None)
 
@@ -166,8 +168,9 @@ class Search:
         smaller: the model with which they are compared.
         """
         size = len(last.best.active) + 1
-        if last.best.active and (p := train_residuals(last.best).diagnosis.p) > QUIET and not self.is_clear(last.best):
-            self.note_round(size, f"what is left is noise (chance {p:.2g}; below {QUIET:g} the search goes on)")
+        quiet = QUIET if size <= LOOK_AHEAD + 1 else SIGNIFICANCE
+        if last.best.active and (p := train_residuals(last.best).diagnosis.p) > quiet and not self.is_clear(last.best):
+            self.note_round(size, f"what is left is noise (chance {p:.2g}; below {quiet:g} the search goes on)")
             return None
         self.extend(last.best)
         while self.reach_further(size):
@@ -196,7 +199,7 @@ class Search:
 
         smaller: the best that the round before had found.
         """
-        for _ in range(N_EXCHANGES):
+        for _ in range(N_EXCHANGES if size <= LOOK_AHEAD + 1 else 1):
             best = self.of_size(size)[0]
             reduced = [self.reduced_again(best, tuple(k for k in best.active if k != key)) for key in best.active]
             less = self.of_size(size - 1)[0]

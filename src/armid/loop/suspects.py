@@ -16,7 +16,7 @@ from scipy.special import chdtri
 from armid.errors import ArmidError
 from armid.estimation.information import NORMAL_95, start_changes
 from armid.loop.candidates import Library
-from armid.loop.diagnose import holdout_residuals, is_significant
+from armid.loop.diagnose import holdout_residuals, is_significant, train_residuals
 from armid.loop.fit import FAMILYWISE, Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.search import start_of, unless_diverged
 from armid.loop.whitening import WhiteRecords, with_samples
@@ -43,8 +43,10 @@ DISAGREE = 0.5
 SHARE = 0.2
 # A fault that moves the record by less than this many times its noise accuses nobody.
 MOVES = 0.7
-# A fault is told that leaves noise, or so little of what was more than noise.
-LEFT = 0.01
+# A fault is told that leaves noise, or so little of what was more than noise, by so many times its scatter.
+LEFT, SCATTER = 0.01, 3.0
+# Where noise leaves as much more often than this, no record is left out that would leave noise.
+STRIKING = 1e-4
 # Samples on either side from which one between them is made.
 REACH = 32
 # A push lasts for less than this share of a record, and holds this share of what is more than noise in it.
@@ -320,10 +322,14 @@ def mended_records(declared: Fit, library: Library) -> list[Mended]:
     library.say("asking whether one record disagrees with the others")
     found = library.each(lambda t: unless_diverged(lambda: mended(declared, *t[1:])),
                          [*sized, *(t for t in tried if t[0] == np.inf)])  # fmt: skip
-    few = n + LEFT * (declared.chi2 - n)
     good = [m for m in found if m is not None and is_earned(declared, m.fit, m.chi2, len(tried))
-            and (m.chi2 < few or not is_significant(m.fit))]  # fmt: skip
+            and (is_next_to_nothing(m.chi2, declared.chi2, n) or not is_significant(m.fit))]  # fmt: skip
     return sorted(good, key=lambda m: m.chi2)
+
+
+def is_next_to_nothing(after: float, before: float, n: int) -> bool:
+    """Tell whether of what chi2 of so many samples clearly had above the noise next to nothing is left."""
+    return before - n > SCATTER * np.sqrt(2.0 * n) and after - n < LEFT * (before - n)
 
 
 def is_earned(before: Fit, after: Fit, chi2: float, n_tried: int) -> bool:
@@ -400,7 +406,7 @@ def suspect_held_out(
     unseen = holdout_residuals(fit, tuple(records), library)
     if unseen is None or not unseen.diagnosis.significant:
         return best, None
-    few = LEFT * (float(unseen.residual @ unseen.residual) - len(unseen.residual))
+    before, n = float(unseen.residual @ unseen.residual), len(unseen.residual)
     base = WhiteRecords(unseen.replays, fit.records.space, unseen.data)
     files = [record.file for record in records]
     for index, record in enumerate(base.data.records):
@@ -413,8 +419,9 @@ def suspect_held_out(
             changed = (*records[:place], there, *records[place + 1 :])
             left = holdout_residuals(fit, changed, library)
             assert left is not None
-            chi2 = float(left.residual @ left.residual) - len(left.residual)
-            if chi2 < least and (chi2 < few or not left.diagnosis.significant):
+            # A record that is cut to what was measured has fewer samples.
+            chi2 = float(left.residual @ left.residual) + n - len(left.residual)
+            if chi2 < least and (is_next_to_nothing(chi2, before, n) or not left.diagnosis.significant):
                 suspect = Mended(fit, index, fault, value, deviation, chi2).suspect(record, plant, REPORTED)
                 least, best = chi2, changed
     return best, suspect
@@ -425,7 +432,7 @@ def disagreeing_record(fits: Sequence[Fit]) -> Suspect | None:
 
     fits: models to try, the smallest first. Where what it leaves there is in one stretch, that is a push.
     """
-    for fit in fits:
+    for fit in (f for f in fits if train_residuals(f).diagnosis.p < STRIKING):
         base = fit.records
         first_of = {r.file: i for i, r in reversed([*enumerate(base.data.records)])}
         found = []

@@ -59,6 +59,7 @@ class Effect:
 
     form, forms: where one effect has several published forms, `form` says in a word which one this is and `forms` holds
     the others, whole effects of the same name. A model takes one of them; who looks for an effect tries `every_form`.
+    unless: a port; a plant that offers it refuses this form, as another acts there.
 
     Raises ArmidError when it adds nothing, names something twice, or has a form of another name or without a word.
     """
@@ -73,6 +74,7 @@ class Effect:
     binds: Mapping[str, str] = field(default_factory=dict)
     form: str = ""
     forms: tuple["Effect", ...] = ()
+    unless: str = ""
 
     def __post_init__(self) -> None:
         check_name(self.name, "effect")

@@ -89,6 +89,11 @@ class Graph:
             return node.kind in STATIC_LEAVES
         return all(self.is_static(k) for k in node.needs)
 
+    def moves(self, key: str) -> bool:
+        """Tell whether a node depends on a state."""
+        node = self.nodes[key]
+        return node.kind == "state" or any(self.moves(k) for k in node.needs)
+
 
 def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:
     graph = Graph()
@@ -157,6 +162,8 @@ def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
         for name, function in plant.quantities.items():
             equation(name, "quantity", function, f"quantity '{name}'")
     else:
+        if effect.unless in plant.ports:
+            raise ArmidError(f"{who} is for plants without the port '{effect.unless}'")
         for port, function in effect.adds.items():
             if port not in plant.ports:
                 raise ArmidError(f"{who} adds to the port '{port}', which plant '{plant.name}' does not offer: "

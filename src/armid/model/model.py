@@ -107,3 +107,14 @@ def applicable(effects: Mapping[str, Effect], plant: Plant) -> dict[str, Effect]
     """
     fitting = {name: [e for e in effect.every_form if not refusal_of(e, plant)] for name, effect in effects.items()}
     return {name: forms[0] for name, forms in fitting.items() if forms}
+
+
+def is_late_as_a_whole(plant: Plant) -> bool:
+    """Tell whether an effect can only delay the drive with the part of it that follows the motion, as a back-EMF does.
+
+    A late voltage then moves the machine as a late torque and another inertia do, and cannot be told from them. Where
+    the plant offers the quantity or input `voltage` and the port `winding`, the voltage can be late alone.
+    """
+    drive, graph = plant.aliases.get("drive_effort", "drive_effort"), Model(plant).graph
+    offers_voltage = "winding" in plant.ports and plant.aliases.get("voltage", "voltage") in graph.nodes
+    return drive in graph.nodes and graph.moves(drive) and not offers_voltage

@@ -1,5 +1,7 @@
 """Control: what it senses, when it acts, how strongly."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from armid.model.effect import Effect, Guard, State, drive_now, slope_itself, start_speed, zero
@@ -146,8 +148,15 @@ dead_time = Effect(
     note="the command acts a dead time late",
     source="Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9",
 )  # fmt: skip
+# Behind a motor that induces a voltage of its own a late voltage is no late torque: told as one it bends the inertia.
+# Where the plant holds the control itself, with a port for its command, that is what is late.
+late_voltage = replace(
+    dead_time, form="voltage", adds={"winding": late_drive}, binds={"drive_effort": "voltage"}, unless="command",
+    states=tuple(replace(s, unit=s.unit.replace("effort", "V")) for s in dead_time.states),
+    note="the voltage at the motor comes a dead time late",
+)  # fmt: skip
 controller_delay = Effect(
-    name="controller_delay", form="feedback", forms=(dead_time,),
+    name="controller_delay", form="feedback", forms=(dead_time, late_voltage),
     adds={"feedback": late_feedback, "command": late_command},
     states=(
         State("smooth", "rad/s", slope_itself, start_speed),

@@ -41,8 +41,15 @@ actuator_lag = Effect(
     note="the actuator follows late, first order, up to half a second",
     source="Mahony, Kumar, Corke 2012, doi:10.1109/MRA.2012.2206474 (rotors)",
 )  # fmt: skip
+# Where it is offered, and why it is another, see late_voltage in control.py.
+voltage_lag = replace(
+    actuator_lag, form="voltage", unless="command", adds={"winding": drive_lag_effort},
+    states=(State("lagging", "V", drive_lag_rate, drive_now),), binds={"drive_effort": "voltage"},
+    parameters=(Parameter("time_constant", "s", 0.0, 0.05, null=0.0, note="of the amplifier"),),
+    note="the voltage at the motor follows late, first order",
+)  # fmt: skip
 drive_lag = replace(
-    actuator_lag, form="current_loop", forms=(actuator_lag,),
+    actuator_lag, form="current_loop", forms=(actuator_lag, voltage_lag),
     parameters=(Parameter("time_constant", "s", 0.0, 0.05, null=0.0, note="of the drive's current loop"),),
     note="the drive follows late, first order",
     source="Leonhard, Control of Electrical Drives, doi:10.1007/978-3-642-56649-3",
