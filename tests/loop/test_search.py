@@ -1,5 +1,6 @@
 """What the search finds: free shapes, other forms, smaller models found later, sets beside constants; shared work."""
 
+import sys
 import threading
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ from armid.estimation.least_squares import side_by_side
 from armid.loop import constants
 from armid.loop import search as search_of
 from armid.loop.candidates import EffectKey, Library, library_of
+from armid.loop.close_loop import Decision, unless_belied
 from armid.loop.constants import ConstantModel, is_outdone
 from armid.loop.equivalence import substitutes
 from armid.loop.fit import Comparison
@@ -199,6 +201,21 @@ def test_a_fault_that_changes_next_to_nothing_accuses_nobody():
     assert not is_earned(before, before, 4856.1, 40)
     assert not is_earned(before, before, 4856.5 * np.exp(-16.0 / 4234.0), 40)
     assert is_earned(before, before, 4856.5 * np.exp(-18.0 / 4234.0), 40)
+
+
+def test_a_fault_that_left_noise_is_belied_by_more_effects(monkeypatch):
+    """Without the record four effects were found where two and its clock had left noise: an effect of no library."""
+    monkeypatch.setattr(sys.modules[Decision.__module__], "is_significant", lambda fit: fit.chi2 > 150.0)
+
+    def claimed(beside, chosen):
+        fit = a_fit(100.0, chosen)
+        decided = Decision(None, None, fit, fit, fit, (), frozenset(chosen))
+        return unless_belied(SimpleNamespace(fit=beside), decided).claimed
+
+    assert claimed(a_fit(100.0, "ab"), "abcd") == frozenset()
+    assert claimed(a_fit(100.0, "ab"), "ac") == {"a", "c"}
+    # it left more than noise, though next to nothing of what there was
+    assert claimed(a_fit(1000.0, ""), "a") == {"a"}
 
 
 def test_next_to_nothing_is_left_only_of_what_was_clearly_more_than_noise():

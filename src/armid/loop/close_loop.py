@@ -261,7 +261,10 @@ def suspected_again(library_for: LibraryFor, found: "Decision", train: tuple[Rec
 def decided_without_fault(
     library_for: LibraryFor, mended: Sequence[Mended], library: Library, train: tuple[Record, ...]
 ) -> Settled:
-    """Return what is decided on records without the best of some faults, as `settled` does."""
+    """Return what is decided on records without the best of some faults, as `settled` does.
+
+    A fault that left noise is belied where more effects are found without it: then none of these is claimed.
+    """
     best, plant, measured = mended[0], library.declared.plant, library.data.records
     faulty = measured[best.index]
     alike = [m for m in mended if m.chi2 < best.chi2 + WITHIN and measured[m.index].file == faulty.file]
@@ -269,12 +272,17 @@ def decided_without_fault(
     # Which of two faults it is makes parameters differ by more than their intervals.
     if len(alike) > 1 and len(rest) > 1:
         suspects = [m.suspect(measured[m.index], plant, LEFT_OUT) for m in alike]
-        return decide(Search(library_for(rest))), suspects, rest
+        return unless_belied(best, decide(Search(library_for(rest)))), suspects, rest
     train = tuple(best.fault.trimmed(r, best.value, plant, faulty) if r.file == faulty.file else r for r in train)
     there = library_for(train)
     if best.fault.kind != "label":
         there = with_unknown(there, best.column(there.problem(best.fit.active, best.fit.values)))
-    return decide(Search(there)), [best.suspect(faulty, plant, FREED)], train
+    return unless_belied(best, decide(Search(there))), [best.suspect(faulty, plant, FREED)], train
+
+
+def unless_belied(fault: Mended, decided: "Decision") -> "Decision":
+    is_belied = len(decided.chosen.active) > len(fault.fit.active) and not is_significant(fault.fit)
+    return replace(decided, claimed=frozenset()) if is_belied else decided
 
 
 def decided_without_trend(
