@@ -23,7 +23,7 @@ from armid.contract.trials import (
 from armid.engine import FINE, along, calibrate, simulate
 from armid.engine.calibrate import difference
 from armid.errors import ArmidError
-from armid.model import PLANTS, Effect, Manoeuvre, Model, Plant, is_late_as_a_whole
+from armid.model import PLANTS, Effect, Manoeuvre, Model, Plant, is_late_as_a_whole, refusal_of
 from armid.model.effect import Equation
 
 Array = NDArray[np.float64]
@@ -89,15 +89,13 @@ def check_effects(
     All effects that a plant takes stand in one model, which is compiled once; all but the one that is tried are at
     their nulls, where they add exactly nothing. Further forms of effects share a model in the same way.
     """
+    taken = {e.name for e in effects if any(not refusal_of(f, p) for f in e.every_form for p in siblings(plants))}
     for k in range(max((len(effect.every_form) for effect in effects), default=0)):
         forms = {effect.name: effect.every_form[k] for effect in effects if k < len(effect.every_form)}
         fits: dict[str, list[Model]] = {}
-        for effect in effects:
-            if (form := forms.get(effect.name)) is not None:
-                fits[form.name], refusals = composed(form, plants)
-                is_taken = any(composed(other, plants)[0] for other in effect.every_form)
-                told = declared(form, fits[form.name], refusals, is_taken, strict)
-                yield from ((form.name, of_form(p, form)) for p in told)
+        for name, form in forms.items():
+            fits[name], refusals = composed(form, plants)
+            yield from ((name, of_form(p, form)) for p in declared(form, fits[name], refusals, name in taken, strict))
         for plant in siblings(plants):
             models = {name: model for name, several in fits.items() for model in several if model.plant is plant}
             joint = joint_model(plant, [forms[name] for name in models])

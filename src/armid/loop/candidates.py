@@ -346,6 +346,9 @@ N_PROBES, NEAR, SUBSTEPS = 8, 2.0, (1, 2, 4, 8)
 # From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
 # in which a step is uncertain by such a share of the range of a state.
 FEWEST_SPARED, SHARES = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
+# Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
+STRENGTHS, STRENGTHS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
+SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
 # What the engine's error may add to chi2 of a residual that is noise, and in proportion to one that is more.
 HIDDEN = 0.1
 
@@ -372,11 +375,13 @@ def calibrated_replays(
             low[i], high[i] = max(low[i], ends[0]), min(high[i], ends[1])
     rows = probes(low, np.maximum(high, low), N_PROBES)
     # What is tried first is weak, and a short lag may ask for finer steps than all that the box is likely to hold.
-    nulls = {i: model.parameters[n].null for i, n in enumerate(space.free_names) if n not in near}
-    if weak := {i: null for i, null in nulls.items() if null is not None}:
-        rows = np.vstack([rows, 0.5 * (low + high)])
-        for i, null in weak.items():
-            rows[-1, i] = null + STRENGTHS[0] * (max(low[i], high[i], key=lambda end: abs(end - null)) - null)
+    nulls = {i: null for i, n in enumerate(space.free_names)
+             if n not in near and (null := model.parameters[n].null) is not None}  # fmt: skip
+    if nulls:
+        weak = 0.5 * (low + high)
+        for i, null in nulls.items():
+            weak[i] = null + STRENGTHS[0] * max(low[i] - null, high[i] - null, key=abs)
+        rows = np.vstack([rows, weak])
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
     allowed: dict[str, Array] = {}
@@ -445,9 +450,6 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
 
-# Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
-STRENGTHS, STRENGTHS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
-SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
 # From this ratio of its bounds on, points along a range are even in the logarithm.
 WIDE = 5.0
 

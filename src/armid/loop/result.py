@@ -232,7 +232,7 @@ def estimates(
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
     present = {key.public for key in fit.active}
-    late = present & {"controller_delay", "drive_lag"} if is_late_as_a_whole(library.declared.plant) else ()
+    late = delays_of_the_drive(fit, library) if is_late_as_a_whole(library.declared.plant) else []
     found = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
@@ -256,7 +256,7 @@ def estimates(
             doubts_of = [REMAINS] if discrepancy else []
             doubts_of += [HELD] if held[i] else []
             doubts_of += in_doubt
-            doubts_of += [f"{' and '.join(sorted(late))} {LATE}"] if late else []
+            doubts_of += [f"{' and '.join(late)} {LATE}"] if late else []
             if not max(value - low, high - value) <= WIDEST * abs(value):
                 doubts_of.append(f"half of its interval exceeds {WIDEST:.0%} of the value")
             if strongest[i] > STRONGEST:
@@ -271,6 +271,12 @@ def estimates(
         doubts = tuple(d if d in given_doubts else f"{d}, the tolerances of the constants counted" for d in doubts)
         found.append(Estimate(public, value, unit, low, high, doubts, given_low, given_high, given_doubts))
     return tuple(found)
+
+
+def delays_of_the_drive(fit: Fit, library: Library) -> list[str]:
+    """Return the names of the effects that follow the drive with states of their own, and act in its place."""
+    effects = {key.public: library.candidates[key.declared] for key in fit.active}
+    return sorted(name for name, effect in effects.items() if effect.states and "drive" in effect.adds)
 
 
 def interval_view(

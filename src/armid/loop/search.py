@@ -31,8 +31,8 @@ N_EXCHANGES = 3
 N_LOGGED = 5
 # Where no test of what remains is more striking than this, all together, no second effect is looked for: it would need
 # more of the residual than the tests would overlook, and looking costs more than everything before. Beyond the sets
-# looked at ahead, and one more in which a wrong one is mended, it ends where the tests call it noise.
-QUIET = 0.1
+# looked at ahead, and one more in which a wrong one is mended, it ends where the tests call it noise, and is brief.
+QUIET, THOROUGH = 0.1, LOOK_AHEAD + 1
 # Of so many of the best the fixed shapes are set free: a rival must not lose by the width of a sign alone.
 N_FREED, FREED_WITHIN = 4, 4.0
 # Scores are a linear guess: refit at least and at most so many, and those within a factor of the best.
@@ -168,7 +168,7 @@ class Search:
         smaller: the model with which they are compared.
         """
         size = len(last.best.active) + 1
-        quiet = QUIET if size <= LOOK_AHEAD + 1 else SIGNIFICANCE
+        quiet = QUIET if size <= THOROUGH else SIGNIFICANCE
         if last.best.active and (p := train_residuals(last.best).diagnosis.p) > quiet and not self.is_clear(last.best):
             self.note_round(size, f"what is left is noise (chance {p:.2g}; below {quiet:g} the search goes on)")
             return None
@@ -199,7 +199,7 @@ class Search:
 
         smaller: the best that the round before had found.
         """
-        for _ in range(N_EXCHANGES if size <= LOOK_AHEAD + 1 else 1):
+        for _ in range(N_EXCHANGES if size <= THOROUGH else 1):
             best = self.of_size(size)[0]
             reduced = [self.reduced_again(best, tuple(k for k in best.active if k != key)) for key in best.active]
             less = self.of_size(size - 1)[0]
