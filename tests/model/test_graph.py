@@ -91,6 +91,13 @@ def test_what_depends_on_parameters_alone_is_static() -> None:
     assert static == [True, True, True, False]
 
 
+def test_what_follows_the_motion_depends_on_it_through_rates_too() -> None:
+    """A motor current does, by the back-EMF; the state of an actuator that takes an input alone does not."""
+    fed = with_state(lambda x, U: U - x, lambda: 0.0)
+    graph = (Model(ARM) + fed).graph
+    assert [graph.depends_on(k, ("omega", "theta")) for k in ("e__x", "current", "omega")] == [False, True, True]
+
+
 def with_state(rate: Callable[..., float], start: Callable[..., float]) -> Effect:
     return Effect("e", LEVEL, {"torque": lambda x: x}, (State("x", "1", rate, start),))
 

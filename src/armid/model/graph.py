@@ -89,10 +89,15 @@ class Graph:
             return node.kind in STATIC_LEAVES
         return all(self.is_static(k) for k in node.needs)
 
-    def moves(self, key: str) -> bool:
-        """Tell whether a node depends on a state."""
-        node = self.nodes[key]
-        return node.kind == "state" or any(self.moves(k) for k in node.needs)
+    def depends_on(self, key: str, others: Iterable[str]) -> bool:
+        """Tell whether a node depends on one of some others, directly or through the rates of states."""
+        left, seen = [key], set[str]()
+        while left:
+            near = left.pop()
+            if near not in seen:
+                seen.add(near)
+                left += [f"rate__{near}"] if self.nodes[near].kind == "state" else self.nodes[near].needs
+        return not seen.isdisjoint(others)
 
 
 def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:

@@ -115,6 +115,7 @@ def is_late_as_a_whole(plant: Plant) -> bool:
     A late voltage then moves the machine as a late torque and another inertia do, and cannot be told from them. Where
     the plant offers the quantity or input `voltage` and the port `winding`, the voltage can be late alone.
     """
-    drive, graph = plant.aliases.get("drive_effort", "drive_effort"), Model(plant).graph
-    offers_voltage = "winding" in plant.ports and plant.aliases.get("voltage", "voltage") in graph.nodes
-    return drive in graph.nodes and graph.moves(drive) and not offers_voltage
+    drive, voltage, *motion = (plant.aliases.get(a, a) for a in ("drive_effort", "voltage", "omega", "theta"))
+    graph = Model(plant).graph
+    offers_voltage = "winding" in plant.ports and voltage in graph.nodes
+    return drive in graph.nodes and graph.depends_on(drive, motion) and not offers_voltage
