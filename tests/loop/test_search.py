@@ -75,7 +75,13 @@ PREDICTS_WORSE = Comparison(1.0, 0.0, (1.0, 2.0))
 
 def a_fit(chi2, names, rough=False):
     """Return what a search asks of a fit; each letter is an effect."""
-    known = {"residual": np.ones(9), "independent": 100.0, "misfit": 1.0, "records": SimpleNamespace(replays=())}
+    known = {
+        "residual": np.ones(9),
+        "independent": 100.0,
+        "misfit": 1.0,
+        "is_noise": False,
+        "records": SimpleNamespace(replays=()),
+    }
     return SimpleNamespace(active=tuple(map(EffectKey, names)), chi2=chi2, n_free=len(names), rough=rough, **known)
 
 
@@ -96,22 +102,39 @@ def test_what_is_found_of_a_size_later_takes_the_place_of_its_best(monkeypatch):
     assert search.renewed(levels) == levels
 
 
+def test_in_a_large_set_effects_are_exchanged_only_where_it_earns_them(monkeypatch):
+    sizes = [a_fit(10.0 ** (7 - n), "abcde"[:n]) for n in range(6)]
+    monkeypatch.setattr(search_of, "train_residuals", lambda _: SimpleNamespace(diagnosis=SimpleNamespace(p=0.0)))
+    for name, result in {"extend": None, "reach_further": False, "note_round": None}.items():
+        monkeypatch.setattr(Search, name, lambda *_, result=result: result)
+    exchanged = []
+    monkeypatch.setattr(Search, "exchange", lambda _, size, smaller: exchanged.append(size))
+    for comparison in (EARNED, NOT_EARNED):
+        monkeypatch.setattr(Search, "judged", lambda _, fits, smaller, c=comparison: SearchLevel(tuple(fits), c))
+        for size in (4, 5):
+            Search(None, known(*sizes)).next_level(SearchLevel((sizes[size - 1],)), sizes[size - 1])
+    assert exchanged == [4, 5, 4]
+
+
 def test_a_rival_of_a_fault_may_be_a_better_model_of_the_same_size(monkeypatch):
     """It turned up while one effect more was looked for; without it a sound record would be accused."""
     monkeypatch.setattr(search_of, "is_significant", lambda fit: fit.chi2 > 150.0)
-    wrong, right, more, given_up = a_fit(1e4, "bc"), a_fit(101.0, "ad"), a_fit(100.0, "abd"), a_fit(9e3, "ac")
+    wrong, right, more, low = a_fit(1e4, "bc"), a_fit(101.0, "ad"), a_fit(100.0, "abd"), a_fit(45.0, "a", rough=True)
+    given_up, alone = a_fit(9e3, "ac", rough=True), a_fit(9e3, "c", rough=True)
 
     def found_on_the_way(beside, level, smaller):
-        beside.fits |= known(right, more, given_up, a_fit(120.0, "cd", rough=True))
+        beside.fits |= known(right, more, given_up, low, alone)
         return SearchLevel((more,), NOT_EARNED)
 
     library = SimpleNamespace(about=lambda *_: None)
     monkeypatch.setattr(Search, "next_level", found_on_the_way)
     search = Search(library, known(wrong))
     assert search.further(SearchLevel((wrong,)), 200.0) is right
-    # what was given up above the limit, or is rough, will be fitted when it is asked for
-    assert search.fits == known(wrong, right, more)
-    assert Search(library, known(wrong)).further(SearchLevel((wrong,)), 50.0) is None
+    assert search.fits == known(wrong, right, more, given_up, low, alone)
+    # what was given up above the limit will be fitted when it is asked for, unless the best is far below that limit
+    search = Search(library, known(wrong))
+    assert search.further(SearchLevel((wrong,)), 50.0) is None
+    assert search.fits == known(wrong, right, more, low)
     assert Search(library, known(right)).further(SearchLevel((right,)), 200.0) is None
     # a model that fits better and predicts worse speaks against a fault as well
     monkeypatch.setattr(Search, "next_level", lambda *_: SearchLevel((more,), PREDICTS_WORSE))

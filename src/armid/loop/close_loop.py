@@ -400,11 +400,11 @@ def steps_of(found: Decision, judged: Sequence[Judgement]) -> tuple[Step, ...]:
     """Return one step for each effect of the chosen model, or one for the constants that take their place."""
     if found.constants is not None:
         name, group = found.constants.name, found.groups[0]
-        return (Step(name, "", group.alike, False, True, found.constants.moved, judged[0], group),)
+        return (Step(name, "", group.rivals, False, True, found.constants.moved, judged[0], group),)
     candidates, others, steps = found.library.candidates, constants_beside(found.equal), []
     for key, after, group in zip(found.chosen.active, judged, found.groups, strict=True):
-        constants = tuple(n for n in (group.name, *group.alike) if n.startswith(CONSTANT))
-        effects = tuple(n for n in group.alike if n not in constants)
+        constants = tuple(n for n in (group.name, *group.rivals) if n.startswith(CONSTANT))
+        effects = tuple(n for n in group.rivals if n not in constants)
         steps.append(Step(key.public, ", ".join(candidates[key.declared].adds), effects, key.is_empirical,
                           key.public in found.claimed, (*constants, *others), after, group))  # fmt: skip
     return tuple(steps)
@@ -493,7 +493,7 @@ def verdicts_of(
     denied = withdrawn is not None or after.fails_to_carry_over
     verdicts = [CARRIES_NOT] if denied else []
     is_constant = any(s.effect.startswith(NAMED) for s in steps)
-    in_doubt = any(s.alternatives or s.group.unlike or (s.constants and not is_constant) for s in steps)
+    in_doubt = any(s.alternatives or (s.constants and not is_constant) for s in steps)
     if found.refused is not None or found.rivals or in_doubt:
         verdicts.append(TOO_ALIKE)
     if not steps or withdrawn is not None:

@@ -422,8 +422,6 @@ def doubtful(found: ClosedLoop) -> str:
     said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
     said += [f"{s.effect} cannot be told from {' or '.join(s.constants)} within tolerance"
              for s in found.steps if s.constants]  # fmt: skip
-    said += [f"{s.effect} fits hardly better than {' or '.join(s.group.unlike)}"
-             for s in found.steps if s.group.unlike]  # fmt: skip
     names = " + ".join(found.effects)
     said += [f"{names} fits hardly better than {' + '.join(r.names)}" for r in found.rivals]
     rest = "a significant discrepancy remains, and" if found.after.significant else "what remains is noise, but"

@@ -12,26 +12,18 @@ from armid.loop.fit import Fit, behind, beyond, decomposed
 from armid.loop.score_test import at_null, responses, square_beyond
 
 Array = NDArray[np.float64]
-# Rivals whose refits differ by less than this in the criterion and whose responses correlate above that are one group.
-WITHIN, ALIKE, MOST = 6.0, 0.95, 4
-# A candidate whose response correlates below this is no substitute (a group asks for more); so many are worth a fit.
+# Rivals whose refits differ by less than this in the criterion are one group; so many of them are too many to name.
+WITHIN, MOST = 6.0, 4
+# A candidate whose response correlates below this is no substitute; so many are worth a fit.
 LIKELY, MOST_SUBSTITUTES = 0.9, 8
 
 
 @dataclass(frozen=True)
 class EffectGroup:
-    """Hold the name of the effect of a step with those of its rivals within the criterion.
-
-    alike: those with the same response. unlike: those with another one, that fit nearly as well.
-    """
+    """Hold the name of the effect of a step with those of its rivals within the criterion, the best first."""
 
     name: str
-    alike: tuple[str, ...]
-    unlike: tuple[str, ...] = ()
-
-    @property
-    def rivals(self) -> tuple[str, ...]:
-        return (*self.alike, *self.unlike)
+    rivals: tuple[str, ...]
 
     @property
     def too_big(self) -> bool:
@@ -42,20 +34,15 @@ class EffectGroup:
 def group_of(fit: Fit, key: EffectKey, others: Sequence[Fit]) -> EffectGroup:
     """Return the rivals of one effect of a model: models that differ in that effect alone, within the criterion."""
     kept = declared_keys(k for k in fit.active if k != key)
-    response, sensitivity = response_of(fit, key), sensitivity_of(fit, key)
-    # name -> how much worse the criterion is, how alike the responses are
-    best: dict[str, tuple[float, float]] = {}
+    gaps: dict[str, float] = {}
     for other in others:
         new = [k for k in other.active if k.declared not in kept]
         if other is fit or len(new) != 1 or len(other.active) != len(fit.active) or new[0].public == key.public:
             continue
         name, gap = new[0].public, behind(other, fit)
-        if gap < WITHIN and (name not in best or gap < best[name][0]):
-            likeness = max(abs(response @ response_of(other, new[0])), abs(sensitivity @ sensitivity_of(other, new[0])))
-            best[name] = gap, float(likeness)
-    rivals = sorted(best, key=lambda name: best[name][0])
-    alike = tuple(name for name in rivals if best[name][1] > ALIKE)
-    return EffectGroup(key.public, alike, tuple(name for name in rivals if name not in alike))
+        if gap < min(WITHIN, gaps.get(name, np.inf)):
+            gaps[name] = gap
+    return EffectGroup(key.public, tuple(sorted(gaps, key=lambda name: gaps[name])))
 
 
 def rival_models(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, ...]:
@@ -67,23 +54,6 @@ def rival_models(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, ...]:
     return tuple(sorted(found.values(), key=lambda other: behind(other, fit))[:MOST])
 
 
-def response_of(fit: Fit, key: EffectKey) -> Array:
-    """Return the change of the whitened signal by an effect, projected off the other free parameters, of length 1."""
-    return beyond_others(fit, key, change_by(fit, key))
-
-
-def sensitivity_of(fit: Fit, key: EffectKey) -> Array:
-    """Return the derivative by an effect's strength at the fit, projected off the other free parameters, of length 1.
-
-    Of several strengths the direction in which they are away from their nulls. Two models that say the same in other
-    words (a torque and an inertia in one proportion) have one sensitivity, while the changes from null to value differ
-    by what other parameters have to make up for.
-    """
-    direction, (places, away) = np.zeros(fit.n_free), fit.strengths_of(key)
-    direction[places] = away
-    return beyond_others(fit, key, fit.jacobian @ direction)
-
-
 def change_by(fit: Fit, key: EffectKey) -> Array:
     signals = fit.records.whole_signals(np.array([fit.candidate, at_null(fit.records, fit.candidate, key)]))
     return np.asarray(signals[0] - signals[1])
@@ -92,13 +62,6 @@ def change_by(fit: Fit, key: EffectKey) -> Array:
 def basis_of_others(fit: Fit, key: EffectKey) -> Array:
     """Return an orthonormal basis of what parameters other than an effect's own can do, (n_samples, rank)."""
     return decomposed(fit.jacobian[:, ~fit.owned_by(key)])[0]
-
-
-def beyond_others(fit: Fit, key: EffectKey, change: Array) -> Array:
-    """Return what parameters other than an effect's own cannot do of a change of the signal, of length 1."""
-    left = beyond(basis_of_others(fit, key), change)
-    length = float(np.linalg.norm(left))
-    return left / length if length > 0.0 else left
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,8 @@ N_EXCHANGES = 3
 N_LOGGED = 5
 # Where no test of what remains is more striking than this, all together, no second effect is looked for: it would need
 # more of the residual than the tests would overlook, and looking costs more than everything before. Beyond the sets
-# looked at ahead, and one more in which a wrong one is mended, it ends where the tests call it noise, and is brief.
+# looked at ahead, and one more in which a wrong one is mended, it ends where the tests call it noise, and is brief:
+# effects are exchanged once, and only in a set that earns them as it is.
 QUIET, THOROUGH = 0.1, LOOK_AHEAD + 1
 # Of so many of the best the fixed shapes are set free: a rival must not lose by the width of a sign alone.
 N_FREED, FREED_WITHIN = 4, 4.0
@@ -114,8 +115,10 @@ class Search:
         library = self.library.about(level.best.records.replays, level.best.misfit)
         beside = replace(self, library=library, fits=dict(self.fits), rounds=[], limit=limit)
         found = beside.next_level(level, level.best)
-        # Those that were given up above the limit are not known for good.
-        self.fits |= {active: f for active, f in beside.fits.items() if f.chi2 < limit and not f.rough}
+        # What was given up above the limit is known for good only where it would be far behind the best of its size.
+        least = {n: beside.of_size(n)[0].chi2 for n in {len(active) for active in beside.fits}}
+        self.fits |= {active: f for active, f in beside.fits.items()
+                      if f.chi2 < limit or not f.rough or least[len(active)] + WITHIN < limit}  # fmt: skip
         alike = self.of_size(len(level.best.active))[0]
         rivals = [alike] if far_behind(level.best, alike) > WITHIN else []
         rivals += [found.best] if found is not None and found.comparison and found.comparison.fits_better else []
@@ -187,7 +190,8 @@ class Search:
             return None
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
             return None
-        self.exchange(size, last.best)
+        if size <= THOROUGH or self.judged(self.of_size(size), smaller).earned:
+            self.exchange(size, last.best)
         # An exchange may have found a better model of the size before.
         smaller = self.of_size(size - 1)[0] if size - len(smaller.active) == 1 else smaller
         level = self.judged(self.of_size(size), smaller)
@@ -221,7 +225,8 @@ class Search:
                     for rival in parents([f for f in self.of_size(size) if behind(f, best) < WITHIN])[1:]:
                         self.exchange_substitutes(rival)
             self.free_shapes(f for f in self.of_size(size)[:N_FREED] if f.chi2 <= FREED_WITHIN * best.chi2)
-            if self.of_size(size)[0] is best:
+            now = self.of_size(size)[0]
+            if now is best or (size >= THOROUGH and declared_keys(now.active) == declared_keys(best.active)):
                 break
 
     def judged(self, fits: Sequence[Fit], smaller: Fit) -> SearchLevel:
