@@ -30,9 +30,9 @@ from armid.record import Record
 Array = NDArray[np.float64]
 # So many single products are refitted, of those that take away this share of what is no noise.
 MOST, HALF = 6, 0.5
-# In tolerances: how far a fit may go, and from where on one alone is no answer; at this share of the first a bound
-# holds it.
-FARTHEST, PLAUSIBLE, HELD = 4.0, 3.0, 0.99
+# In tolerances: how far a fit may go, so that no bound bars its way (seen: it crept along one to the last step allowed,
+# though the minimum was inside); from where on one constant alone is no answer, and one of many.
+FARTHEST, PLAUSIBLE, PLAUSIBLE_OF_MANY = 6.0, 3.0, 4.0
 # Relative fall of chi2 in one step at which their fit stops, a constant costs a simulation of its own; and what chi2 a
 # sample must be in reach: of noise it is 1.
 SETTLED, IN_REACH = 1e-6, 2.0
@@ -81,11 +81,11 @@ class ConstantModel:
 
     @property
     def explains(self) -> bool:
-        """Whether it leaves noise, one alone not far outside its tolerance, none of many as far as a fit may go.
+        """Whether it leaves noise, and no constant is too far outside its tolerance.
 
         What noise leaves once in a hundred campaigns asks for no sets of effects yet.
         """
-        most = PLAUSIBLE if len(self.off) == 1 else HELD * FARTHEST
+        most = PLAUSIBLE if len(self.off) == 1 else PLAUSIBLE_OF_MANY
         return max(map(abs, self.off.values())) < most and train_residuals(self.fit).diagnosis.p > FAMILYWISE
 
     @property
