@@ -21,6 +21,7 @@ from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
+closing = sys.modules[unless_belied.__module__]
 MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
 
 
@@ -239,6 +240,22 @@ def test_a_fault_that_left_noise_is_belied_by_more_effects(monkeypatch):
     assert claimed(a_fit(100.0, "ab"), "ac") == {"a", "c"}
     # it left more than noise, though next to nothing of what there was
     assert claimed(a_fit(1000.0, ""), "a") == {"a"}
+
+
+def test_beside_a_record_that_is_left_out_nothing_is_claimed(monkeypatch):
+    """Which of two faults it is cannot be told: the record may as well be sound, and deny what the others show."""
+    fit = a_fit(100.0, "b")
+    monkeypatch.setattr(closing, "decide", lambda _: Decision(None, None, fit, fit, fit, (), frozenset("b")))
+    records = tuple(SimpleNamespace(file=f"{name}.csv") for name in "abc")
+    late, label = (
+        SimpleNamespace(index=0, chi2=chi2, suspect=lambda *_, kind=kind: kind)
+        for kind, chi2 in (("late", 100.0), ("label", 102.0))
+    )
+    library = SimpleNamespace(declared=SimpleNamespace(plant=None), data=SimpleNamespace(records=records))
+    decided, suspects, rest = closing.decided_without_fault(lambda _: None, [late, label], library, records)
+    assert (decided.chosen.active, decided.claimed) == (fit.active, frozenset())
+    assert suspects == ["late", "label"]
+    assert rest == records[1:]
 
 
 def test_next_to_nothing_is_left_only_of_what_was_clearly_more_than_noise():

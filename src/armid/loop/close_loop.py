@@ -251,7 +251,7 @@ def suspected_again(library_for: LibraryFor, found: "Decision", train: tuple[Rec
         apart = disagreeing_record([found.declared, found.largest])
         if apart is not None:
             train = tuple(r for r in train if r.file != apart.record)
-            return decide(Search(library_for(train))), [apart], train
+            return unclaimed(decide(Search(library_for(train)))), [apart], train
         trends = trends_of(found.largest, found.library) if found.largest.active else []
         if trends:
             return decided_without_trend(library_for, trends, found.library, train)
@@ -263,7 +263,8 @@ def decided_without_fault(
 ) -> Settled:
     """Return what is decided on records without the best of some faults, as `settled` does.
 
-    A fault that left noise is belied where more effects are found without it: then none of these is claimed.
+    A fault that left noise is belied where more effects are found without it: then none of these is claimed, nor is
+    one beside a record that is left out.
     """
     best, plant, measured = mended[0], library.declared.plant, library.data.records
     faulty = measured[best.index]
@@ -272,7 +273,7 @@ def decided_without_fault(
     # Which of two faults it is makes parameters differ by more than their intervals.
     if len(alike) > 1 and len(rest) > 1:
         suspects = [m.suspect(measured[m.index], plant, LEFT_OUT) for m in alike]
-        return unless_belied(best, decide(Search(library_for(rest)))), suspects, rest
+        return unclaimed(decide(Search(library_for(rest)))), suspects, rest
     train = tuple(best.fault.trimmed(r, best.value, plant, faulty) if r.file == faulty.file else r for r in train)
     there = library_for(train)
     if best.fault.kind != "label":
@@ -282,7 +283,15 @@ def decided_without_fault(
 
 def unless_belied(fault: Mended, decided: "Decision") -> "Decision":
     is_belied = len(decided.chosen.active) > len(fault.fit.active) and not is_significant(fault.fit)
-    return replace(decided, claimed=frozenset()) if is_belied else decided
+    return unclaimed(decided) if is_belied else decided
+
+
+def unclaimed(decided: "Decision") -> "Decision":
+    """Return what is decided without a record that was left out, of which nothing is claimed.
+
+    It may be sound and deny the model: it is not said in numbers what is wrong with it.
+    """
+    return replace(decided, claimed=frozenset())
 
 
 def decided_without_trend(
