@@ -1,6 +1,7 @@
 """Calls by names or objects alike, results that print themselves, and searches that ignore their budget."""
 
 import inspect
+import os
 from pathlib import Path
 
 import numpy as np
@@ -150,6 +151,12 @@ def test_an_identification_and_its_parts_are_small(found, tmp_path):
         assert len(str(inspect.signature(getattr(armid, name)))) < 800
 
 
+def test_a_folder_whose_name_is_no_utf_8(found, tmp_path):
+    folder = tmp_path / os.fsdecode(b"m\xe9s")
+    assert "report.html" in found.save(folder, {"command": f"armid identify --out {folder}", "settings": {}})
+    assert r"m\udce9s" in (folder / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(("call", "said"), [
     (lambda a: armid.identify(a, identifier="leest_squares"), "did you mean 'least_squares'"),
     (lambda a: armid.identify(a, fitness="rms"), "did you mean 'rmse'"),
@@ -173,6 +180,8 @@ def test_an_identification_and_its_parts_are_small(found, tmp_path):
     (lambda a: armid.identify(3), "the campaign is a int"),
     (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]})), "needs its plant"),
     (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]}), plant="axis"), "axis"),
+    (lambda a: armid.identify({f"{a}/move": pd.DataFrame({"time_s": [0.0]})}, plant="driven_axis"),
+     "called like a path: a name without a folder is expected"),
     (lambda a: armid.simulate(a, inertai=0.05), "did you mean 'inertia'"),
     (lambda a: armid.simulate(a, inertia="much"), "a finite number is expected"),
     (lambda a: armid.examine(a, x={"inertia": 0.05, "m": 1.0}), "'m' is not in the model"),

@@ -128,6 +128,9 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
     if plant is None:
         raise ArmidError("a campaign of tables needs its plant: plant='driven_axis' or another is expected")
     names = [str(n) for n in given] if isinstance(given, Mapping) else [f"table_{i + 1}" for i in range(len(tables))]
+    for name in names:
+        if {"/", "\\"} & {*name}:
+            raise ArmidError(f"the table {quoted(name)} is called like a path: a name without a folder is expected")
     lines = ['name = "tables"', f"plant = {toml(plant.name if isinstance(plant, Plant) else plant)}"]
     with TemporaryDirectory(prefix="armid-") as folder:
         for name, each in zip(names, tables, strict=True):

@@ -9,7 +9,9 @@ from armid.errors import ArmidError
 from armid.estimation.constants import Product, columns_of, common_factors
 from armid.estimation.information import information_of
 from armid.model import PLANTS
+from armid.record import read_campaign, write_table
 from armid.record.campaign import tolerances_of
+from armid.record.table import read_table
 
 ARM = PLANTS["shell_transfer_arm"]
 
@@ -66,3 +68,14 @@ def test_tolerances_of_a_campaign_of_a_plant_and_of_neither():
     assert set(tolerances_of({"default": 0.1}, PLANTS["driven_axis"], "")) == {"gain", "gravity_moment"}
     with pytest.raises(ArmidError, match="tolerances: constant 'RR' is unknown, did you mean 'R'"):
         tolerances_of({"RR": 0.1}, ARM, "campaign.toml")
+
+
+def test_a_tolerance_counts_for_a_constant_that_the_records_alone_set(write_axis, tmp_path):
+    """The declared gravity moment is 0, of which no share is known; that of the record is not."""
+    known = []
+    for more in ("", "constants = { gravity_moment = 1.2 }\n"):
+        folder = write_axis(tmp_path / str(len(known)), more=f"{more}[tolerances]\ngravity_moment = 0.05\n")
+        columns = dict(read_table(folder / "move.csv", "move.csv").columns)
+        write_table(folder / "move.csv", columns | {"position_m": np.cumsum(columns["velocity_m_s"]) / 200.0})
+        known.append(read_campaign(folder).tolerances)
+    assert known == [{}, {"gravity_moment": 0.05}]

@@ -14,7 +14,7 @@ from made_machines import motion
 from armid.contract.check import check_campaign
 from armid.engine.simulate import Prepared
 from armid.errors import ArmidError
-from armid.estimation.mends import Mend
+from armid.estimation.mends import Mend, moved
 from armid.estimation.screen import Trial, chosen, screen, shortened
 from armid.model import EFFECTS, Model
 from armid.problem.space import space_of
@@ -118,6 +118,16 @@ def late(seconds, *files):
     return change("time_s", lambda t: np.round(t + seconds, 6), *files)
 
 
+def sparse(*files):
+    """Return a mistake that is none: records of another rate."""
+
+    def made(folder):
+        for file in files:
+            write_table(folder / file, {n: v[::10] for n, v in read_table(folder / file, file).columns.items()})
+
+    return made
+
+
 def noise(*files):
     return change(SPEED, lambda x: np.random.default_rng(5).normal(0, 20, x.size), *files)
 
@@ -185,6 +195,7 @@ MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
     "noise alone": ("one", (noise(*ONE),), "the measured angular_velocity is noise"),
     "noise held out": ("arm", (noise("raise_empty.csv"),), r"raise_empty\.csv: the measured angular_velocity is noise"),
     "late": ("arm", (late(0.15, *ALL),), "clock looks 0.1[45].* s late"),
+    "late, at two rates": ("arm", (sparse("raise.csv"), late(0.15, *ALL)), "clock looks 0.1[45].* s late"),
     "late once": ("arm", (late(0.1, "raise.csv"),), r"raise\.csv.*clock looks 0\.(09|10|1).* late"),
     "late alone": ("one", (late(0.15, *ONE),), "clock looks .* late"),
     "early": ("arm", (late(-0.15, "raise.csv"),), r"raise\.csv.*(early|not at rest)"),
@@ -258,11 +269,22 @@ def accusations(said: list[str]) -> list[str]:
     return [s for s in said if not s.endswith("whether a record is wrong cannot be told.")]
 
 
+def test_a_clock_is_moved_by_a_time_and_not_by_samples(campaign):
+    """A record of few samples of which hardly any would be left stays as it is."""
+    folder = campaign("arm")
+    sparse("raise.csv")(folder)
+    pieces = [r.pieces[0] for r in read_campaign(folder).train if r.file in ("lower.csv", "raise.csv")]
+    left = [moved(p, 0.2) for p in pieces]
+    lost = [(p.n_samples - m.n_samples) * p.manoeuvre.interval for p, m in zip(pieces, left, strict=True)]
+    assert lost == pytest.approx([0.2, 0.2])
+    assert moved(pieces[1], 5.0) is pieces[1]
+
+
 # Those that take longest, each like one of the others.
 LONG = {
     "all speeds inverted", "axis: ms", "rpm under deg/s", "rad under deg", "rad under deg once", "deg under rad",
     "deg under rad once", "tenfold", "ms once", "short and raise", "short and lower", "drive in mN m",
-    "percent, bounds", "axis: rad under deg", "late", "axis: speed inverted", "MPa, fixed", "early",
+    "percent, bounds", "axis: rad under deg", "late, at two rates", "axis: speed inverted", "MPa, fixed", "early",
     "ten times too long",
 }  # fmt: skip
 

@@ -110,6 +110,20 @@ def test_a_declared_model_that_does_not_carry_over_is_no_clean_bill(closed):
     assert "lower_low_voltage.csv is missed by" in conclusion(found)
 
 
+def test_a_record_held_out_that_makes_the_simulation_diverge_is_no_noise(closed):
+    """Of a gas without a volume; a copy of a train record under another name is told, too."""
+    sound = closed()
+    held, *_ = sound.campaign.holdout
+    gone = moved_record(held, sound.campaign.plant, {"V0": -0.999})
+    copy = replace(sound.campaign.train[0], file="copy.csv", role="holdout")
+    campaign = replace(sound.campaign, records=(*sound.campaign.train, gone, copy))
+    found = close_loop(Model(campaign.plant), campaign, CANDIDATES)
+    assert (found.verdict, found.effects) == ("does_not_carry_over", ())
+    assert f"{held.file} makes the simulation diverge" in conclusion(found)
+    assert any("copy.csv hold the same" in sentence for sentence in report_of(found)["next_steps"])
+    assert report_of(found)["error"]["after"]["holdout"]["rmse"] is None
+
+
 def test_constants_that_are_off_are_found_and_no_effect_is_named(stand):
     """The resistance is declared 4 % too high: within two tolerances of 2 %."""
     campaign = read_campaign(stand(*COMMON))

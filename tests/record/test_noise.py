@@ -61,6 +61,12 @@ def test_a_silent_rest_is_noise_free_but_for_the_steps_of_a_coarse_signal():
     assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
 
 
+def test_a_sensor_that_reads_one_value_at_rest_shows_its_noise_in_the_motion(rng):
+    noise = noise_of(np.zeros(100), MOTION + rng.normal(0, 0.005, MOTION.size), INTERVAL)
+    assert (noise.source, noise.n_samples) == ("differences", MOTION.size)
+    assert noise.rms == pytest.approx(0.005, rel=0.1)
+
+
 @pytest.mark.parametrize("n_rest", [0, 1, 49])
 def test_few_rest_samples_leave_the_differences(rng, n_rest):
     noise = noise_of(np.zeros(n_rest), MOTION + rng.normal(0, 0.005, MOTION.size), INTERVAL)

@@ -21,6 +21,7 @@ from armid.report.document import Document, Line, Listing, Section, Sentences, t
 from armid.report.files import csv, latex
 from armid.report.html import html, inline
 from armid.report.markdown import markdown
+from armid.report.result import DETAILS, MANIFEST, digest_of
 from armid.report.style import legend_below, panels, row_names, svg_text, thinned
 from armid.report.terminal import show
 from armid.study.analyses.errors import error_map_figure, valley_figure
@@ -91,6 +92,17 @@ def test_without_details_and_figures_the_page_says_so(tmp_path):
     assert "details.json is not in this folder" in page.text
     assert "svg" not in page.tags
     assert "0.3438 deg/s RMSE after" in page.text
+
+
+def test_figures_that_the_last_run_did_not_draw_are_not_shown(tmp_path):
+    folder = write_loop(tmp_path / "loop")
+    before = page_of(folder).tags.count("svg")
+    names = (LOOP.file, DETAILS, "residuals.svg", "ranking.svg", "diagnosis.svg")
+    digests = {name: digest_of(folder / name) for name in names if (folder / name).is_file()}
+    (folder / MANIFEST).write_text(json.dumps(digests), encoding="utf-8")
+    assert page_of(folder).tags.count("svg") == before
+    (folder / MANIFEST).write_text(json.dumps({LOOP.file: digests[LOOP.file]}), encoding="utf-8")
+    assert page_of(folder).tags.count("svg") == before - sum(name.endswith(".svg") for name in digests) > 0
 
 
 def test_names_of_files_cannot_break_any_renderer(tmp_path, capsys):

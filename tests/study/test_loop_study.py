@@ -41,6 +41,9 @@ def test_other_records_and_other_candidates_are_other_runs(write, tmp_path):
         file.write("0.001,0\n")
     changed = {p.case: p.run for p in read_study(write()).plan()}
     assert (changed["c000"] == before["c000"], changed["c001"] == before["c001"]) == (True, False)
+    (tmp_path / "suite" / "c000" / "runs").mkdir()
+    (tmp_path / "suite" / "c000" / "runs" / "deeper.CSV").write_text("time_s\n", encoding="utf-8")
+    assert {p.case: p.run for p in read_study(write()).plan()}["c000"] != before["c000"]
     other = {p.case: p.run for p in read_study(write('without = ["tilt"]\n')).plan()}
     assert not set(other.values()) & set(changed.values())
 

@@ -1,5 +1,7 @@
 """A study that cannot be run is refused with one sentence before anything is written."""
 
+import shutil
+
 import pytest
 
 from armid.errors import ArmidError
@@ -85,6 +87,15 @@ def test_arguments_that_no_runner_can_work_with(write_study, tmp_path, told, wor
     with pytest.raises(ArmidError, match=words.replace("?", r"\?")):
         run_study(write_study(), out=tmp_path / "out", **told)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_variant_of_a_campaign_is_no_folder(write_study, tmp_path, paper_arm_folder):
+    """Its folder would be read in its place, with other settings."""
+    (tmp_path / "c").mkdir()
+    shutil.copy(paper_arm_folder / "campaign.toml", tmp_path / "c" / "variant.toml")
+    file = write_study(change=("manoeuvres = [{ start", 'campaign = "c/variant.toml" #'))
+    with pytest.raises(ArmidError, match="is a file: a folder that holds campaign"):
+        read_study(file)
 
 
 def test_a_link_out_of_the_folder(write_study, tmp_path, paper_arm_folder):

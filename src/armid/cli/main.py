@@ -1,6 +1,7 @@
 """The command `armid`: its sub-commands, and how errors reach the user."""
 
 import gc
+import io
 import logging
 import re
 import sys
@@ -98,6 +99,10 @@ def main(arguments: list[str] | None = None) -> None:
     # imports and figures make many objects that stay: looking through them every 700 is a tenth of a short command
     gc.set_threshold(20_000)
     logging.getLogger("armid").setLevel(logging.INFO)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a path that is no UTF-8 is shown, not a reason to fail
+            stream.reconfigure(errors="backslashreplace")
     try:
         end_on_request()
         code = carried_out(arguments)

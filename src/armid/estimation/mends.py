@@ -31,6 +31,8 @@ FACTORS = {
     0.5: ("gain", "twice as large as it should be: halved"),
 }
 TURNS = (90.0, -90.0, 180.0)
+# Samples that a piece must keep.
+FEWEST_LEFT = 20
 TIMES = {
     0.001: "time_s looks like milliseconds: in seconds",
     1000.0: "time_s looks like thousands of seconds: in seconds",
@@ -97,7 +99,7 @@ def mends(plant: Plant, record: Record, shift: int) -> Iterator[Mend]:
     if shift:
         seconds = shift * record.manoeuvre.interval
         words = f"its clock looks {abs(seconds):.3g} s {'late' if shift > 0 else 'early'}: moved by that"
-        yield Mend("late", seconds, words, of_pieces(moved, shift=shift))
+        yield Mend("late", seconds, words, of_pieces(moved, seconds=seconds))
 
 
 def mends_of_sizes(plant: Plant, record: Record) -> Iterator[Mend]:
@@ -234,16 +236,20 @@ def with_input(piece: Piece, name: str, factor: float) -> Piece:
     return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs=inputs))
 
 
-def moved(piece: Piece, shift: int) -> Piece:
-    """Return a piece whose measured signal comes earlier by some samples (later where negative); what is lost goes.
+def moved(piece: Piece, seconds: float) -> Piece:
+    """Return a piece whose measured signal comes earlier by some time (later where negative); what is lost goes.
 
-    Where inputs drive the machine they come later instead, so that its measured start stays where it is.
+    Where inputs drive the machine they come later instead, so that its measured start stays where it is. A piece of
+    which hardly anything would be left stays as it is.
     """
+    shift = round(seconds / piece.manoeuvre.interval)
     n, window, inputs = len(piece.measured), piece.window, piece.manoeuvre.inputs
     if inputs:
         rows = np.clip(np.arange(n) - shift, 0, n - 1)
         return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs={k: v[rows] for k, v in inputs.items()}))
     begin, end = max(window.start, -shift), min(window.stop, n - shift)
+    if end - begin < FEWEST_LEFT:
+        return piece
     return replace(piece, measured=np.roll(piece.measured, -shift), window=slice(begin, end)).until_window_end()
 
 

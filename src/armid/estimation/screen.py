@@ -476,7 +476,7 @@ def of_position(record: Record) -> Iterator[Suspicion]:
 def of_times(record: Record) -> Iterator[Suspicion]:
     """Yield times that are those of no motor-driven machine, whatever the declared model makes of them."""
     interval = record.manoeuvre.interval
-    if interval > LONGEST_INTERVAL:
+    if interval >= LONGEST_INTERVAL:
         yield Suspicion("time", record.file, f"{record.file}: its samples are {interval:.3g} s apart, which looks like "
                         "times in ms: seconds are expected in time_s.", factor=1e-3)  # fmt: skip
 

@@ -12,7 +12,7 @@ from armid.estimation.advice import Advice, Rival, advise
 from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import Estimates, with_fitted_starts
-from armid.estimation.screen import screen
+from armid.estimation.screen import given_twice, screen
 from armid.loop.candidates import (
     CONSTANT,
     SHOWN_AS,
@@ -190,7 +190,10 @@ def close_loop(
     named = next(f for f in reversed(found.path) if not any(k.is_empirical for k in f.active))
     together = known_together(named, library)
     steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
-    said = (*(s.sentence for s in screened if s.kind in (*GROSS, "start")), *next_steps_of(found, suspects))
+    # A record held out that is one of those to train on is none.
+    screened = (*screened, *given_twice(campaign.records))
+    told_first = dict.fromkeys(s.sentence for s in screened if s.kind in (*GROSS, "start", "noise", "rest", "twice"))
+    said = (*told_first, *next_steps_of(found, suspects))
     return ClosedLoop(there, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
                       () if withdrawn else found.rivals, advice, said, together, tuple(suspects), every, library,
                       search, found.missing, term)  # fmt: skip

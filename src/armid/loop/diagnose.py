@@ -225,6 +225,8 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     good = values > 1e-7 * values.max(initial=0.0)
     spread = np.hstack([slopes, unseen.reshape(len(residual), len(within))]) @ (right[good].T / values[good])
     spread = np.column_stack([spread, *start_changes(posed, fit.z)])
+    # A simulation that diverges there is not held to any doubt.
+    spread = spread[:, np.isfinite(residual).all() & np.isfinite(spread).all(axis=0)]
     base, sizes, _ = np.linalg.svd(spread, full_matrices=False)
     left = residual - base @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (base.T @ residual))
     return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)), bool(within),
@@ -264,7 +266,12 @@ class Diagnosis:
 
 
 def diagnose(seen: Residuals) -> Diagnosis:
-    """Test a residual: its size, its correlation in time, on what it depends, and where it is."""
+    """Test a residual: its size, its correlation in time, on what it depends, and where it is.
+
+    That of a simulation that diverges is no noise, whatever these tests would make of it.
+    """
+    if not np.isfinite(seen.residual).all():
+        return Diagnosis((Finding("size", "all records", np.inf, 0.0),), seen.data.known)
     tests = (size_tests, repeat_tests, time_tests, dependence_tests, band_tests)
     return Diagnosis(tuple(f for test in tests for f in test(seen)), seen.data.known)
 

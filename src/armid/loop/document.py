@@ -400,8 +400,10 @@ def carried_sentence(found: ClosedLoop) -> str:
     assert unseen is not None
     factors = [float(np.sqrt(np.mean(raw**2))) / level.rms for raw, level in zip(unseen.raw, unseen.data.levels,
                                                                                  strict=True)]  # fmt: skip
-    worst = int(np.argmax(factors))
+    worst = int(np.argmax(np.nan_to_num(factors, nan=np.inf)))
     missed = f"{unseen.data.records[worst].file} is missed by {factors[worst]:.3g} times its noise"
+    if not np.isfinite(factors[worst]):
+        missed = f"{unseen.data.records[worst].file} makes the simulation diverge"
     if found.withdrawn is None:
         return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip

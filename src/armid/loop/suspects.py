@@ -304,7 +304,7 @@ def mended_records(declared: Fit, library: Library) -> list[Mended]:
     the library does not hide a late record. declared: the model, with effects or without.
     """
     base, n = declared.records, len(declared.residual)
-    if len(base.replays) < 2:
+    if len({r.file for r in base.data.records}) < 2:
         return []
     tried: list[tuple[float, int, Fault]] = []
     excess = [max(float(part @ part) - len(part), 0.0) for part in base.data.by_record(declared.residual)]
@@ -396,15 +396,15 @@ def suspect_held_out(
 ) -> tuple[tuple[Record, ...], Suspect | None]:
     """Return the held-out records with one fault of one of them undone that leaves noise, and the suspect.
 
-    The model stays as it is. Records as they are, and None, where none is at fault alone, or where the model leaves
-    more than noise on train: then what it misses elsewhere is its own.
+    The model stays as it is. Records as they are, and None, where none is at fault alone, where the model diverges on
+    one, or where it leaves more than noise on train: then what it misses elsewhere is its own.
     """
     plant = fit.model.plant
     least, best, suspect = np.inf, tuple(records), None
     if is_significant(fit):
         return best, None
     unseen = holdout_residuals(fit, tuple(records), library)
-    if unseen is None or not unseen.diagnosis.significant:
+    if unseen is None or not unseen.diagnosis.significant or not np.isfinite(unseen.residual).all():
         return best, None
     before, n = float(unseen.residual @ unseen.residual), len(unseen.residual)
     base = WhiteRecords(unseen.replays, fit.records.space, unseen.data)

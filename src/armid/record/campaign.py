@@ -175,8 +175,9 @@ def read_campaign(
     held = {p.name: parameters[p.name].fixed for p in plant.parameters if p.name in parameters}
     fixed = {name: value for name, value in held.items() if value is not None}
     tolerances = tolerances_of(sheet.tolerances, plant, where, fixed)
-    # of what is 0 nothing is known by a share of it
     values = {c.name: c.value for c in plant.constants} | dict(sheet.constants) | fixed
+    # of what is 0 in every record nothing is known by a share of it
+    sized = {name for name, value in values.items() if any(r.constants.get(name, value) for r in records)}
     return Campaign(
         name=sheet.name,
         folder=toml.parent,
@@ -186,9 +187,9 @@ def read_campaign(
         parameters=parameters,
         constants=dict(sheet.constants),
         gyro_range=None if sheet.gyro_range_deg_s is None else sheet.gyro_range_deg_s * DEGREE,
-        tolerances={name: t for name, t in tolerances.items() if name not in fixed and values[name]},
-        rough={name: t for name, t in tolerances.items() if t >= ROUGH and values[name]},
-        taken_as_exact=tuple(c.name for c in plant.constants if c.tolerance is None and values[c.name]
+        tolerances={name: t for name, t in tolerances.items() if name not in fixed and name in sized},
+        rough={name: t for name, t in tolerances.items() if t >= ROUGH and name in sized},
+        taken_as_exact=tuple(c.name for c in plant.constants if c.tolerance is None and c.name in sized
                              and not {c.name, DEFAULT} & {*sheet.tolerances, *set_by_records(plant)}),
         unmeasured=tuple(o for o in whole.outputs if o.name not in recorded),
     )  # fmt: skip

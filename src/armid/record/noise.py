@@ -11,6 +11,9 @@ from armid.record.record import Noise
 
 FEWEST_REST_SAMPLES = 50
 FINEST_STEP = 1e-6
+# A rest of equal values is that of a sensor that does not show its noise there, where the motion holds noise of more
+# than this share of its largest value.
+SHOWN_IN_MOTION = 1e-4
 ORDERS = range(3, 9)
 # Neighbours may correlate as the noise of a filtered sensor does: up to the longest memory, from so many standard
 # errors (about 2/sqrt(n)) on.
@@ -22,12 +25,16 @@ OUTLYING = 4.0
 def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = None) -> Noise:
     """Return the noise of a record.
 
-    rest: samples before the motion; with fewer than 50 of them the differences of `motion` are used. times: of the
-    motion [s] where they are irregular. A signal that moves in coarse steps has at least the noise step/sqrt(12).
+    rest: samples before the motion; with fewer than 50 of them, or equal ones, the differences of `motion` are used.
+    times: of the motion [s] where they are irregular. A signal that moves in coarse steps has at least the noise
+    step/sqrt(12).
     """
     floor = quantisation_step(motion) / np.sqrt(12.0)
-    if rest.size < FEWEST_REST_SAMPLES:
-        return Noise(max(difference_rms(motion, times), floor), None, 0.0, 1.0, motion.size, "differences")
+    is_short = rest.size < FEWEST_REST_SAMPLES
+    if is_short or np.ptp(rest) == 0.0:
+        apart = difference_rms(motion, times)
+        if is_short or apart > max(2.0 * floor, SHOWN_IN_MOTION * float(np.max(np.abs(motion), initial=0.0))):
+            return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
     deviations = rest - mean if np.ptp(rest) > 0 else np.zeros_like(rest)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 DETAILS, MANIFEST = "details.json", "manifest.json"
 # Room on a disk without which no search is begun: results take some MB.
 LEAST_ROOM = 3_000_000
+# How a page tells a path whose name is no UTF-8.
+ODD_NAMES = "backslashreplace"
 # Letters of a result's `repr`.
 MOST_LETTERS = 1_500
 # What making a document of damaged numbers raises.
@@ -142,18 +144,18 @@ class Result(Shown):
                 stored = {"made_by": dict(made_by or {}), **details}
                 files.path(DETAILS).write_text(json.dumps(stored, allow_nan=False) + "\n", encoding="utf-8")
             document = document_of(files.place, kind, str(folder))
-            files.path(kind.markdown).write_text(markdown(document), encoding="utf-8")
-            files.path(kind.page).write_text(html(document), encoding="utf-8")
+            files.path(kind.markdown).write_text(markdown(document), encoding="utf-8", errors=ODD_NAMES)
+            files.path(kind.page).write_text(html(document), encoding="utf-8", errors=ODD_NAMES)
         return files.names
 
 
 def document_of(folder: Path, kind: Kind, name: str) -> "Document":
     """Return the document of what a folder holds; name: of it, in the command that makes the page again."""
     result = read_json(folder / kind.file, kind.command)
-    refuse_mixed(folder, kind)
+    left_over = refuse_mixed(folder, kind)
     has_details = (folder / DETAILS).is_file() and kind is not IDENTIFIABILITY
     details = read_json(folder / DETAILS, kind.command) if has_details else {}
-    files = {figure: folder / f"{figure}.svg" for figure in kind.figures}
+    files = {figure: folder / f"{figure}.svg" for figure in kind.figures if f"{figure}.svg" not in left_over}
     try:
         svgs = {figure: path.read_text(encoding="utf-8") for figure, path in files.items() if path.is_file()}
     except UnicodeDecodeError as error:
@@ -176,15 +178,20 @@ def refuse_damaged(folder: Path, kind: Kind) -> Iterator[None]:
         ) from error
 
 
-def refuse_mixed(folder: Path, kind: Kind) -> None:
-    """Refuse files of which some are of another run than the manifest; an earlier version wrote none."""
+def refuse_mixed(folder: Path, kind: Kind) -> set[str]:
+    """Refuse files of which some are of another run than the manifest; an earlier version wrote none.
+
+    Return the figures of an earlier run, which drew what the last one did not.
+    """
+    figures = {f"{figure}.svg" for figure in kind.figures}
     if not (folder / MANIFEST).is_file():
-        return
+        return set()
     digests = read_json(folder / MANIFEST, kind.command)
-    for name in (kind.file, DETAILS, *(f"{figure}.svg" for figure in kind.figures)):
+    for name in (kind.file, DETAILS, *figures):
         if name in digests and (folder / name).is_file() and digest_of(folder / name) != digests[name]:
             raise ArmidError(f"{folder} holds the files of two runs, as one killed while it wrote leaves them: "
                              f"{name} is not that of {MANIFEST}; `{kind.command}` once more is expected")  # fmt: skip
+    return figures - digests.keys()
 
 
 def digest_of(path: Path) -> str:

@@ -172,6 +172,8 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
     if not Path(os.path.realpath(toml)).is_relative_to(os.path.realpath(folder)):
         raise ArmidError(f"{where}: campaign {quoted(campaign)} links out of the folder of the study, a folder inside "
                          "is expected")  # fmt: skip
+    if toml.name != NAME:
+        raise ArmidError(f"{where}: campaign {quoted(campaign)} is a file: a folder that holds {NAME} is expected")
     return toml.parent
 
 

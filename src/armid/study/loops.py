@@ -128,4 +128,5 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
 
 def _files(folder: Path) -> list[str]:
     """Return campaign.toml and all records of a campaign: runs on others are other runs."""
-    return sorted(name for name in os.listdir(folder) if name == NAME or name.endswith(SUFFIX))
+    found = (f for f in folder.rglob("*") if f.suffix.lower() == SUFFIX and f.is_file())
+    return sorted([NAME, *(f.relative_to(folder).as_posix() for f in found)])
