@@ -21,12 +21,12 @@ LEFT_OUT = {"versions", "seconds", "wall_s", "cpu_s", "made_by", "duration_s"}
 ENGINE = """
 from pathlib import Path
 import armid
-from armid.engine.generate import generate_module
+from armid.engine.generate import kernel_parts
 plant = armid.PLANTS["shell_transfer_arm"]
 for name in ("", "coulomb", "shell_rocking"):
     model = armid.Model(plant)
     model = model + armid.EFFECTS[name] if name else model
-    Path({folder!r}, f"engine_{{name or 'arm'}}.txt").write_text(generate_module(model, 8))
+    Path({folder!r}, f"engine_{{name or 'arm'}}.txt").write_text(kernel_parts(model, 8).text())
 """
 
 

@@ -29,15 +29,13 @@ def written(
     return write_campaign(out, "\n".join([*lines, ""]), columns)
 
 
-def main(make: Callable[..., Path], **choices: Sequence[str]) -> None:
-    """Write the campaign that `make(folder, out)` writes, as the command line says; choices: its further options."""
+def main(make: Callable[[Path, Path], Path]) -> None:
+    """Write the campaign that `make(folder, out)` writes, as the command line says."""
     parser = argparse.ArgumentParser(description="Write measured records as a campaign.", allow_abbrev=False)
     parser.add_argument("--data", type=Path, required=True, help="folder with the machine's own files")
     parser.add_argument("--out", type=Path, required=True, help="folder of the campaign, new or empty")
-    for name, words in choices.items():
-        parser.add_argument(f"--{name}", choices=words)
-    options = vars(parser.parse_args())
+    options = parser.parse_args()
     try:
-        print(f"wrote {make(options.pop('data'), options.pop('out'), **options)}")
+        print(f"wrote {make(options.data, options.out)}")
     except (ArmidError, OSError) as error:
         parser.error(str(error))

@@ -27,7 +27,8 @@ Report = Mapping[str, Any]
 class Case:
     """Hold one line of the table.
 
-    machine: folder of its maker, and of its data. options: of the maker. plant: attribute of the folder's plant.py.
+    machine: folder of its make_campaign.py, and of its data. imported: what `armid import` calls the set, with options,
+    where that makes the campaign. plant: attribute of the folder's plant.py.
     role, unit, factor: which rmse is shown, of every record of the role, and in which unit.
     published: what others reached on the same records, in that unit.
     """
@@ -39,15 +40,17 @@ class Case:
     unit: str
     factor: float
     published: str
-    options: tuple[str, ...] = ()
+    imported: tuple[str, ...] = ()
     plant: str = ""
 
 
 CASES = (
-    Case("emps", "emps", "velocity held out", "holdout", "mm/s", 1e3, "4.45 (a direct fit)"),
-    Case("dfki", "dfki_simple_pendulum", "speed, both records fitted", "train", "rad/s", 1.0, "0.18 (a direct fit)"),
+    Case("emps", "emps", "velocity held out", "holdout", "mm/s", 1e3, "4.45 (a direct fit)",
+         ("emps",)),
+    Case("dfki", "dfki_simple_pendulum", "speed, both records fitted", "train", "rad/s", 1.0, "0.18 (a direct fit)",
+         ("dfki",)),
     *(Case(f"dfki_without_{record}", "dfki_simple_pendulum", f"speed, {record} held out", "holdout", "rad/s", 1.0, "",
-           ("--holdout", record)) for record in ("direct_collocation", "ddp")),
+           ("dfki", "--holdout", record)) for record in ("direct_collocation", "ddp")),
     Case("quarter_drone", "quarter_drone", "angle held out: multisine, steps, swept sine", "holdout", "deg", DEG,
          "grey box 2.16, 4.08, 3.18; best Neural ODE 1.55, 4.00, 2.56", plant="quarter_drone"),
     Case("quanser_flexible_link", "quanser_flexible_link", "held out: hub angle, deflection", "holdout", "deg", DEG,
@@ -63,8 +66,16 @@ def closed(case: Case, data: Path, out: Path) -> tuple[Report, float]:
     cost = result / "cpu_s.txt"
     if not cost.is_file():
         if not campaign.is_dir():
-            call(str(HERE / case.machine / "make_campaign.py"), "--data", str(data / case.machine), "--out",
-                 str(campaign), *case.options)  # fmt: skip
+            files = str(data / case.machine)
+            call(
+                *(
+                    ("-m", "armid", "import", *case.imported, files)
+                    if case.imported
+                    else (str(HERE / case.machine / "make_campaign.py"), "--data", files)
+                ),
+                "--out",
+                str(campaign),
+            )
         plugin = ("--plugin", f"{HERE / case.machine / 'plant.py'}:{case.plant}") if case.plant else ()
         seconds = call("-m", "armid", "close-loop", str(campaign), "--out", str(result), *plugin)
         cost.write_text(f"{seconds:.0f}\n", encoding="utf-8")

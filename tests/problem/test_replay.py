@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid.engine import Schedule, simulate
+from armid.engine import Schedule, accuracy_against, simulate
 from armid.errors import ArmidError
-from armid.problem.problem import accuracy_for, replay_of
+from armid.problem.problem import replay_of
 from armid.problem.space import space_of
 from armid.record import read_campaign
 
@@ -48,9 +48,9 @@ def test_the_same_manoeuvre_is_calibrated_once(write_axis, axis_model, tmp_path)
 def test_noise_decides_the_accuracy(paper_arm, arm, lowering):
     record = lowering.train[0]
     quiet = replace(record, noise=replace(record.noise, rms=1e-6))
-    assert accuracy_for(record, arm) == "standard"
-    assert accuracy_for(quiet, arm) == "fine"
-    assert accuracy_for(replace(record, noise=replace(record.noise, rms=0.0)), arm) == "fine"
+    assert accuracy_against(record.noises, arm) == "standard"
+    assert accuracy_against(quiet.noises, arm) == "fine"
+    assert accuracy_against(replace(record, noise=replace(record.noise, rms=0.0)).noises, arm) == "fine"
 
 
 def test_a_given_accuracy_wins(lowering, arm, arm_space):

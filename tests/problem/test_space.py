@@ -7,14 +7,6 @@ from armid.problem.space import space_of
 from armid.record import Override
 
 
-def test_the_declared_box_of_the_arm(arm):
-    space = space_of(arm)
-    assert space.names == space.free_names == ("p0", "k", "eta3", "n")
-    assert space.units == ("Pa", "1", "1", "1")
-    np.testing.assert_array_equal(space.low, [2.6e6, 0.6, 0.45, 0.9])
-    np.testing.assert_array_equal(space.high, [3.5e6, 1.1, 0.70, 1.5])
-
-
 def test_a_fixed_parameter_of_an_effect_stays_unless_bounds_free_it(arm):
     model = arm + EFFECTS["coulomb"]
     assert space_of(model).free_names == ("p0", "k", "eta3", "n", "coulomb.level")

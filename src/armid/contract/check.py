@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from armid.contract.equations import check_effect, check_plant
 from armid.contract.identifier import check_identifier
 from armid.contract.trials import ContractPoint
-from armid.engine import calibrate
+from armid.engine import accuracy_against, calibrate
 from armid.errors import ArmidError
 from armid.estimation.mends import Suspicion
 from armid.estimation.screen import screen
 from armid.identifiers import as_identifier
 from armid.model import PLANTS, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
-from armid.problem.problem import Replay, accuracy_for
+from armid.problem.problem import Replay
 from armid.problem.space import space_of
 from armid.record import Campaign, Record
 from armid.report.style import pyplot
@@ -196,7 +196,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
 
 def replay_at(candidate: Array, record: Record, model: Model) -> Replay:
     """Make a record ready to be simulated with one candidate; to calibrate the whole box takes far longer."""
-    pieces, accuracy = tuple(p.until_window_end() for p in record.pieces), accuracy_for(record, model)
+    pieces, accuracy = tuple(p.until_window_end() for p in record.pieces), accuracy_against(record.noises, model)
     calibrations = (calibrate(model, p.manoeuvre, candidate, accuracy, spans=False) for p in pieces)
     return Replay(record, model, pieces, tuple(calibrations))
 

@@ -97,10 +97,6 @@ def kernel_parts(model: Model, width: int) -> KernelParts:
     return Emitter(model).parts(width)
 
 
-def generate_module(model: Model, width: int) -> str:
-    return kernel_parts(model, width).text()
-
-
 def listed(names: list[str], prefix: str = "") -> str:
     return "".join(f"{prefix}{n}, " for n in names)
 

@@ -112,7 +112,7 @@ def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> S
 
     def attempt(ask: Asker) -> bool:
         try:
-            routine(ask, pulled(start))
+            routine(ask, np.clip(start, PULLED, 1.0 - PULLED))
         except NoFitnessError:
             return False
         return True
@@ -120,10 +120,6 @@ def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> S
     while not (attempt(task.ask) if task.ask is not None else (yield from in_thread(attempt))):
         start = cube.drawn(task.random)
     return True
-
-
-def pulled(u: Array) -> Array:
-    return np.asarray(np.minimum(np.maximum(u, PULLED), 1.0 - PULLED))
 
 
 class Height:

@@ -59,11 +59,6 @@ def change_by(fit: Fit, key: EffectKey) -> Array:
     return np.asarray(signals[0] - signals[1])
 
 
-def basis_of_others(fit: Fit, key: EffectKey) -> Array:
-    """Return an orthonormal basis of what parameters other than an effect's own can do, (n_samples, rank)."""
-    return decomposed(fit.jacobian[:, ~fit.owned_by(key)])[0]
-
-
 @dataclass(frozen=True)
 class Substitute:
     """Hold what could stand in the place of an effect, how alike the two are, and values from which to fit it."""
@@ -83,7 +78,8 @@ def substitutes(fit: Fit, library: Library) -> list[Substitute]:
     can. Another form of an effect stands in its place alone.
     """
     changes = {key: change_by(fit, key) for key in fit.active}
-    bases = {key: basis_of_others(fit, key) for key in fit.active}
+    # of what parameters other than an effect's own can do, (n_samples, rank)
+    bases = {key: decomposed(fit.jacobian[:, ~fit.owned_by(key)])[0] for key in fit.active}
     mine, others = declared_keys(fit.active), {key.public for key in library.joinable(fit.active)}
 
     def places_of(candidate: EffectKey) -> list[Substitute]:

@@ -88,11 +88,6 @@ class Replay:
         return max(c.error for c in self.calibrations) * (sizes[self.place] / sizes[0])
 
 
-def accuracy_for(record: Record, model: Model) -> str:
-    """Return "fine" for a record whose noise would not hide the engine's standard error, else "standard"."""
-    return accuracy_against(record.noises, model)
-
-
 def replay_of(
     record: Record, model: Model, space: Space, accuracy: str | None = None, threads: int = 1,
     known: dict[object, Calibration] | None = None, spans: bool = True,
@@ -103,7 +98,7 @@ def replay_of(
     that none is calibrated twice; those that are made are added. spans: see `calibrate`.
     """
     spread = space.complete(probes(space.low[space.free], space.high[space.free]))
-    wanted = accuracy or accuracy_for(record, model)
+    wanted = accuracy or accuracy_against(record.noises, model)
     pieces = tuple(p.until_window_end() for p in record.pieces)
     known = {} if known is None else known
     calibrations = []

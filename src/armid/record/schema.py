@@ -42,22 +42,24 @@ def number(value: object) -> float:
     raise KindError(value)
 
 
-def above_zero(value: object) -> float:
-    if number(value) <= 0:
-        raise KindError(value)
-    return number(value)
-
-
-def share(value: object) -> float:
-    if not 0.0 <= number(value) < 1.0:
-        raise KindError(value)
-    return number(value)
-
-
-def text(value: object) -> str:
-    if isinstance(value, str) and value:
+def any_text(value: object) -> str:
+    if isinstance(value, str):
         return value
     raise KindError(value)
+
+
+def tested(kind: Kind, test: Callable[[Any], bool]) -> Kind:
+    def both(value: object) -> Any:
+        if test(kind(value)):
+            return kind(value)
+        raise KindError(value)
+
+    return both
+
+
+above_zero = tested(number, lambda value: value > 0.0)
+share = tested(number, lambda value: 0.0 <= value < 1.0)
+text = tested(any_text, bool)
 
 
 def any_table(value: object) -> dict[str, Any]:
@@ -67,12 +69,7 @@ def any_table(value: object) -> dict[str, Any]:
 
 
 def one_of(*words: str) -> Kind:
-    def kind(value: object) -> str:
-        if text(value) not in words:
-            raise KindError(value)
-        return text(value)
-
-    return kind
+    return tested(text, lambda word: word in words)
 
 
 def table_of(inner: Kind) -> Kind:

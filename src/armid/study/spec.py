@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -15,12 +15,14 @@ from armid.record.schema import (
     KindError,
     above_zero,
     any_table,
+    any_text,
     key,
     list_of,
     number,
     one_of,
     part,
     table_of,
+    tested,
     text,
     unknown_name,
 )
@@ -38,21 +40,6 @@ MOST_HELD = 10**6
 
 
 # Kinds of values, see `armid.record.schema`: each returns a value as it is wanted, or raises KindError.
-
-
-def tested(kind: Kind, test: Callable[[Any], bool]) -> Kind:
-    def both(value: object) -> Any:
-        if test(kind(value)):
-            return kind(value)
-        raise KindError(value)
-
-    return both
-
-
-def any_text(value: object) -> str:
-    if isinstance(value, str):
-        return value
-    raise KindError(value)
 
 
 def whole_number(value: object, least: int = 0, most: int = LARGEST_COUNT) -> int:
