@@ -15,6 +15,7 @@ from armid.model import Effect, Model, Parameter
 from armid.model.plants.driven_axis import driven_axis
 from armid.problem.fitness import Fitness
 from armid.registry import Registry, load_plugin, load_registry, place_in_plugin
+from armid.study.spec import study_registry
 
 LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
 OWN = """\
@@ -99,6 +100,26 @@ def test_what_is_registered_is_ready_to_use_and_catalogues_stay_as_they_are(own)
     assert "drag.c" in (Model(loaded.plants["my_axis"]) + loaded.effects["drag"]).parameters
     assert load_plugin(f"{own}:effect")[2] is load_plugin(f"{own}:effect")[2]
     assert "drag" not in Registry().effects
+
+
+def test_what_a_plug_in_imports_beside_it_counts_as_its_content(tmp_path):
+    (tmp_path / "whole.py").write_text(OWN.replace("import beside_it", "import beside_that"))
+    digests = []
+    for text in ("there = 1\n", "there = 2\n"):
+        (tmp_path / "beside_that.py").write_text(text)
+        digests.append(study_registry([f"{tmp_path / 'whole.py'}:effect"]).digests["effects", "drag"])
+    assert digests[0] != digests[1]
+
+
+def test_a_file_that_has_changed_is_run_again(tmp_path):
+    """Equations are read from the file: those of the module must be the same."""
+    file = tmp_path / "edited.py"
+    file.write_text(OWN)
+    before = load_plugin(f"{file}:effect")[2]
+    file.write_text("# a line more\n\n" + OWN.replace("drag", "other_drag"))
+    after = load_plugin(f"{file}:effect")[2]
+    assert (before.name, after.name) == ("drag", "other_drag")
+    assert "other_drag.c" in (Model(driven_axis) + after).parameters
 
 
 @pytest.mark.parametrize(("attribute", "sentence"), [

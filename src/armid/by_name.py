@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Effect, Manoeuvre, Model, Plant
+from armid.model import Effect, Manoeuvre, Model, Plant, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.record import Campaign, read_campaign
@@ -81,7 +81,7 @@ def opened(
     if isinstance(plant, Plant):
         registry.plants[plant.name] = plant
     read = campaign if isinstance(campaign, Campaign) else campaign_of(campaign, plant, registry)
-    if window:
+    if window is not None:
         read = read.with_window(*window)
     effects_known = {**sensor_effects(read.plant), **registry.effects}
     if model is None:
@@ -101,7 +101,8 @@ def refuse_others(effects: Any, plugins: Any, window: Any, bounds: Any, fix: Any
         "effects": (effects, isinstance(effects, str | Effect | Iterable), "names or Effects are"),
         "plugins": (plugins, isinstance(plugins, Iterable) and not isinstance(plugins, str),
                     "a list of FILE.py:attribute is"),
-        "window": (window, not window or (isinstance(window, pair) and are_numbers(window, 2)), "(begin, end), s, is"),
+        "window": (window, window is None or (isinstance(window, pair) and are_numbers(window, 2)),
+                   "(begin, end), s, is"),
         "bounds": (bounds, bounds is None or (isinstance(bounds, Mapping) and all(
             isinstance(ends, pair) and are_numbers(ends, 2) for ends in bounds.values())), "name -> (low, high) is"),
         "fix": (fix, fix is None or (isinstance(fix, Mapping) and are_numbers(fix.values())), "name -> value is"),
@@ -232,7 +233,7 @@ def identify(
 
     if not isinstance(options or {}, Mapping):
         raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
-    window = {"window": PAPER_WINDOW} if paper and not given.get("window") else {}
+    window = {"window": PAPER_WINDOW} if paper and given.get("window") is None else {}
     there = opened(campaign, model=model, **expected(given, identify) | window)
     fitness = fitness or (PAPER_FITNESS if paper else FITNESS)
     distance = (fitness_of_name(fitness, there.registry.fitness) if isinstance(fitness, str) else
@@ -346,6 +347,11 @@ def close_loop(
     wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "--candidates")
     left_out = effects_of(without, known, "--without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
+    own = there.registry.own["effects"] if candidates is None else kept
+    for name in own.keys() & kept.keys():
+        refusals = [refusal_of(form, there.model.plant) for form in kept[name].every_form]
+        if all(refusals):
+            warnings.warn(f"effect '{name}' is not looked for: {refusals[0]}", stacklevel=2)
     values = {**(fixed or {}), **there.fixed}
     found: ClosedLoop = run(
         there.model, there.campaign, kept, rng, there.bounds, values, threads, told, curve, progress
@@ -390,6 +396,8 @@ def simulate(
     from armid.estimation.simulated import SimulatedCampaign, candidate_of, simulated_table
 
     if isinstance(model, Model):
+        if accuracy is not None or parameters is not None:
+            raise ArmidError("accuracy or parameters are given with a Model: a schedule and a population are expected")
         rest = ((manoeuvre,) if manoeuvre is not None else ()) + more
         return run(model, *rest, **given)
     if manoeuvre is not None:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import inspect
+import linecache
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -14,6 +15,8 @@ from armid.errors import ArmidError, nearest
 from armid.model import EFFECTS, PLANTS, Effect, Plant
 
 PLUGIN_PREFIX = "armid_plugin_"
+# What a plug-in's file held when it was run stands under this name in its module.
+CONTENT = "__armid_content__"
 
 
 def is_fitness(thing: Any) -> bool:
@@ -138,14 +141,20 @@ def load_plugin(plugin: str) -> tuple[str, str, Any]:
 
 
 def load_file(file: Path) -> Any:
-    """Run a Python file as a module of its own name; its folder is searched for what it imports."""
-    name = f"{PLUGIN_PREFIX}{file.stem}"
-    if name in sys.modules and Path(str(sys.modules[name].__file__)) == file.resolve():
-        return sys.modules[name]
+    """Run a Python file as a module of its own name; its folder is searched for what it imports.
+
+    It is run once, and again when it has changed: equations are read from the file, and must be those that were run.
+    """
+    name, content = f"{PLUGIN_PREFIX}{file.stem}", file.read_bytes()
+    known = sys.modules.get(name)
+    if known is not None and Path(str(known.__file__)) == file.resolve() and vars(known).get(CONTENT) == content:
+        return known
+    linecache.checkcache(str(file.resolve()))
     spec = importlib.util.spec_from_file_location(name, file.resolve())
     if spec is None or spec.loader is None:
         raise ArmidError(f"plug-in {file} is no Python file: FILE.py:attribute is expected")
     module = importlib.util.module_from_spec(spec)
+    setattr(module, CONTENT, content)
     sys.modules[name] = module
     folder = str(file.resolve().parent)
     if folder not in sys.path:

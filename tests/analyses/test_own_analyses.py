@@ -36,7 +36,15 @@ def test_what_breaks_the_contract_is_found():
     assert not passed(lambda runs: runs.pop("used").to_frame())["leaves its argument alone"]
     calls = iter(range(9))
     assert not passed(lambda runs: pd.DataFrame({"n": [next(calls)]}))["deterministic"]
-    for broken in (lambda runs: runs["nothing"], lambda runs: 3.0, lambda: None):
+    twice = pd.DataFrame([[1, 2]], columns=["n", "n"])
+    index = pd.DataFrame({"n": [1]}, index=pd.Index([1], name="n"))
+    for broken in (
+        lambda runs: runs["nothing"],
+        lambda runs: 3.0,
+        lambda: None,
+        lambda runs: twice,
+        lambda runs: index,
+    ):
         assert passed(broken) == {"tables and figures": False}
     with pytest.raises(ArmidError, match="is of type int: a function of runs is expected"):
         check_analysis("mine", 3)
@@ -50,6 +58,12 @@ def test_tables_and_figures_in_any_form():
     assert parts_of("mine", (frame, axes)) == {"mine 1": frame, "mine 2": figure}
     assert parts_of("mine", {"Cost": figure}) == {"Cost": figure}
     plt.close(figure)
+
+
+def test_what_is_missing_is_an_empty_cell():
+    frame = pd.DataFrame({"n": [1, None], "label": ["a", None]}).convert_dtypes()
+    (section,) = own_sections({"mine": lambda runs: frame}, pd.DataFrame())
+    assert [[c.text for c in row] for row in section.parts[0].cells()] == [["1", "a"], ["", ""]]
 
 
 def test_names_of_files_differ_and_an_index_of_names_is_a_column():

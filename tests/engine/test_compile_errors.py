@@ -71,6 +71,10 @@ def attribute(omega, level):
     return omega.real.level
 
 
+def or_of_numbers(omega, level):
+    return -level / (omega or 1e-9)
+
+
 def plain(omega, level):
     return -omega * level
 
@@ -86,6 +90,7 @@ typed: dict[str, Any] = {}
 exec("def typed_in(omega, level): return -omega * level", typed)
 
 TOLD = {
+    "or": (or_of_numbers, "'omega or 1e-09' joins numbers by `or`: conditions are expected"),
     "calls itself": (itself, "the equation itself calls itself: write it as a loop"),
     "call each other": (first, "the equation first calls itself: write it as a loop"),
     "object": (unknown_object, r"the equation unknown_object uses 'TABLE' \(dict\), which cannot be compiled: numpy"),

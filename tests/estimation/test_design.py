@@ -14,6 +14,7 @@ from armid.estimation.design import (
     expected_levels,
     gain,
     is_place,
+    key_levels,
     key_travel,
     manoeuvre_grid,
     offers,
@@ -59,6 +60,14 @@ def test_places_are_told_from_other_keys(arm):
     assert key_travel(plant) == {"theta": (-55.0 * DEGREE, 45.0 * DEGREE)}
     load = ManoeuvreKey("load_kg", "m_loaded", 1.0, 0.0, 500.0, required=True)
     assert not is_place(replace(plant, keys=(*plant.keys, load)), load)
+
+
+def test_places_of_a_short_travel_differ(arm):
+    plant = arm.plant
+    start = next(k for k in plant.keys if k.key == "start_angle_deg")
+    metres = replace(start, key="start_m", factor=1.0, low=0.0, high=0.8)
+    levels = key_levels(replace(plant, keys=(metres,)), metres, ())
+    assert levels == (0.04, 0.18, 0.33, 0.47, 0.62, 0.76)
 
 
 def test_words():

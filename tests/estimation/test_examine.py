@@ -108,6 +108,16 @@ def test_a_point_that_is_given(lowering, arm, arm_space, one_stroke):
         examine(lowering, arm, arm_space, np.array([3.05e6, 2.0, 0.55, 1.4]))
 
 
+@pytest.mark.parametrize(("told", "said"), [
+    ({"by": "volumes"}, "ranked by 'volumes': did you mean 'volume'"), ({"noise": 0.0}, "the noise is 0: a finite"),
+    ({"noise": np.nan}, "the noise is nan"),
+    ({"x": np.array([1.0, 2.0])}, r"the point has the shape \(2,\): one value for each of p0, k"),
+])  # fmt: skip
+def test_what_cannot_be_examined_is_one_sentence(lowering, arm, arm_space, told, said):
+    with pytest.raises(ArmidError, match=said):
+        examine(lowering, arm, arm_space, **told)
+
+
 def test_nothing_free_is_refused(lowering, arm, arm_space):
     space = arm_space
     for name, value in zip(arm_space.names, TRUTH, strict=True):

@@ -160,6 +160,20 @@ def test_at_the_minimum_the_step_is_small_and_away_from_it_is_large(lowering_rep
     best = least_squares(residual, TRUTH / span, bounds=bounds, x_scale="jac", diff_step=1e-5).x * span
     at_best = information_at(lowering_replays, arm_space, best)
     assert np.abs(at_best.step).max() < 0.2
+    # where a bound holds one parameter, those that go with it have come as far as they can
+    narrow = arm_space.with_bounds("eta3", 0.45, 0.545)
+    held = np.concatenate([[0.0, 0.0], [0.545], [0.0]])
+    free = np.array([True, True, False, True])
+
+    def held_at(z):
+        full = held / span
+        full[free] = z
+        return full
+
+    start, ends = (TRUTH / span)[free], (bounds[0][free], bounds[1][free])
+    found = least_squares(lambda z: residual(held_at(z)), start, bounds=ends, x_scale="jac", diff_step=1e-5).x
+    at_bound = information_at(lowering_replays, narrow, held_at(found) * span)
+    assert np.abs(at_bound.step).max() < 0.2
     away = best + 8.0 * np.array([0.0, 1.0, 0.0, 0.0]) * at_best.deviation
     assert information_at(lowering_replays, arm_space, away).step[1] == pytest.approx(-8.0, rel=0.2)
 

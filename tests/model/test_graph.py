@@ -9,7 +9,7 @@ import pytest
 
 from armid.contract.trials import PlainModel
 from armid.errors import ArmidError
-from armid.model import EFFECTS, PLANTS, Constant, Effect, Guard, Manoeuvre, Model, Parameter, State
+from armid.model import EFFECTS, PLANTS, Constant, Effect, Guard, Manoeuvre, Model, Output, Parameter, State
 from armid.model.plants.shell_transfer_arm import gravity_level, gravity_moment
 
 ARM, AXIS = PLANTS["shell_transfer_arm"], PLANTS["driven_axis"]
@@ -102,6 +102,14 @@ def with_state(rate: Callable[..., float], start: Callable[..., float]) -> Effec
     return Effect("e", LEVEL, {"torque": lambda x: x}, (State("x", "1", rate, start),))
 
 
+def test_a_comment_may_stand_at_the_margin() -> None:
+    def torque(omega, level):
+        # it is no part of the indentation
+        return -level * omega
+
+    assert "e__torque" in (Model(ARM) + Effect("e", LEVEL, {"torque": torque})).graph.nodes
+
+
 REFUSED = {
     "unknown name": (Effect("e", LEVEL, {"torque": lambda omga, level: 0}),
                      "effect 'e', port 'torque', asks for 'omga', which nobody offers here: did you mean 'omega'"),
@@ -152,6 +160,16 @@ DECLARED = {
     "constant twice": (lambda: replace(AXIS, constants=(*AXIS.constants, Constant("v", 1.0, "1"))),
                        "plant 'driven_axis' declares 'v' twice"),
     "output": (lambda: replace(AXIS, output="recorded_sped"), "plant 'driven_axis' records 'recorded_sped': did you"),
+    "signal is an alias": (lambda: replace(AXIS, outputs=(Output("s", "omega", "m/s"),), output="", output_unit=""),
+                           "plant 'driven_axis' records 'omega': "),
+    "port of a sensor is a state": (
+        lambda: replace(AXIS, outputs=(Output("s", "v", "m/s", port="q"),), output="", output_unit=""),
+        "records 's' through the port 'q': "),
+    "parameter is a port": (lambda: Effect("e", (Parameter("torque", "1", 0.0, 1.0, null=0.0),), {"torque": zero}),
+                            "effect 'e' calls something else 'torque', as a port to which it adds"),
+    "unit of scales with a space": (
+        lambda: (Model(AXIS) + Effect("e", (Parameter("c", "effort / speed", 0.0, 1.0),), {"torque": zero})).parameters,
+        "unit 'effort / speed' is no product of scales: words joined by"),
     "alias": (lambda: replace(AXIS, aliases={"omega": "w"}), "plant 'driven_axis' has the alias 'omega' for 'w': "),
     "alias twice": (lambda: replace(AXIS, aliases={"q": "v"}), "plant 'driven_axis' declares 'q' twice"),
     "name": (lambda: replace(AXIS, quantities={"a__b": zero}), "quantity, port or alias 'a__b' is no usable name"),

@@ -2,13 +2,15 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from loop_suite import STUDY, fake_campaigns
 
-from armid.errors import ArmidError
-from armid.model import EFFECTS
+from armid.errors import ArmidError, MachineError
+from armid.model import EFFECTS, PLANTS, Model
+from armid.study.spec import StudyRegistry
 from armid.study.tasks import read_study
 
 ROOT = Path(__file__).parents[2]
@@ -46,6 +48,33 @@ def test_other_records_and_other_candidates_are_other_runs(write, tmp_path):
     assert {p.case: p.run for p in read_study(write()).plan()}["c000"] != before["c000"]
     other = {p.case: p.run for p in read_study(write('without = ["tilt"]\n')).plan()}
     assert not set(other.values()) & set(changed.values())
+
+
+def test_another_plant_of_the_user_makes_other_runs_and_is_not_mistaken_for_the_first(write):
+    def registry(digest):
+        return StudyRegistry(digests={("plants", "boom"): digest, ("fitness", "mine"): digest})
+
+    study, runs = read_study(write()), []
+    for digest in "12":
+        planned = list(replace(study, registry=registry(digest)).plan())
+        assert [json.loads(p.settings)["own"] for p in planned] == [{"plants boom": digest}] * 2
+        runs.append({p.run for p in planned})
+    assert not runs[0] & runs[1]
+    registry("1").refuse_changed({"plants boom": "1"})
+    with pytest.raises(MachineError, match="the plug-in that holds boom has changed since the study was started"):
+        registry("2").refuse_changed({"plants boom": "1"})
+
+
+def test_effects_of_a_sensor_are_looked_for_where_all_are(write):
+    chosen = 'candidates = ["coulomb", "seal_friction", "supply_sag", "tilt", "viscous"]'
+    each = {more: next(iter(read_study(write(text=STUDY.replace(chosen, more))).plan())).settings for more in
+            ("", 'candidates = ["angle_bias"]', 'without = ["angle_bias", "coulomb"]')}  # fmt: skip
+    whole, told, less = (json.loads(s) for s in each.values())
+    assert not {"sensors", "without"} & whole.keys()
+    assert (told["candidates"], told["sensors"]) == (["angle_bias"], False)
+    assert (less["without"], "coulomb" in less["candidates"]) == (["angle_bias"], False)
+    arm = Model(PLANTS["rotary_arm"])
+    assert StudyRegistry().with_effects(arm, ["angle_bias"], "here").effects[0].name == "angle_bias"
 
 
 def test_all_effects_are_looked_for_unless_the_study_says_otherwise(write):

@@ -230,11 +230,12 @@ def test_proposals_follow_from_scores_and_seed_and_go_where_the_area_is():
 
 def test_a_tuned_identifier_has_the_budgets_and_seeds_of_the_one_as_it_is(written, tmp_path):
     own = 'name = "cmaes"\nbudget = 60\nbudget_per_parameter = 8\nseeds = [4]'
-    study = read_study(written(**{'name = "cmaes"': own}))
+    study = read_study(written(**{'name = "cmaes"': own, 'name = "own"': "name='own'  # mine"}))
     found = [Tuned("pso", {"c1": 1.5}, 0.1, 0.2), Tuned("cmaes", {"growth": 2.0}, 0.1, 0.2)]
     file = tmp_path / "tuned.toml"
     file.write_text(tuned_study(study, found))
     tuned = read_study(file)
+    assert tuned.name == "own_tuned"
     assert tuned.labels == ["pso", "cmaes", "pso, tuned", "cmaes, tuned"]
     for before, after in zip(tuned.entries[:2], tuned.entries[2:]):
         assert (after.name, after.budget, after.per_parameter, after.seeds) == (
@@ -263,6 +264,13 @@ def test_the_answer_of_a_tuning(written):
     cells = [[cell.text for cell in row] for row in document.main_tables[0].cells()]
     assert cells == [["pso", "0.410", "0.550", "c1 = 1.23, n_particles = 20"], ["de", "0.300", "0.300", ""]]
     assert tuned_document(study, found[1:]).said == ["of 1 identifiers none is better tuned"]
+
+
+def test_tuning_refuses_identifiers_that_none_can_join(written):
+    rest = '[[identifiers]]\nname = "pso"\n[[identifiers]]\nname = "cmaes"\n'
+    study = read_study(written('identifiers = [{ name = "pso" }, { name = "cmaes" }]', **{rest: ""}))
+    with pytest.raises(ArmidError, match=r"in one line: tables headed \[\[identifiers\]\] are expected"):
+        training(study, 1)
 
 
 def test_tuning_refuses_what_it_would_be_tested_on(written):

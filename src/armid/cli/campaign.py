@@ -154,10 +154,6 @@ def progress_bar() -> Iterator[Callable[[Any], None]]:
         )
 
 
-# The rounding of a speed is larger.
-LEAST_NOISE = 1e-15
-
-
 @command("identifiability", short_help="Say how well the records pin down the parameters.", epilog=examples(
     "armid identifiability studies/campaigns/paper_arm --window 0:0.7 --out results/identifiability",
     "armid identifiability CAMPAIGN --from results/paper_arm/result.json --rank worst",
@@ -190,10 +186,10 @@ def identifiability_command(
     not looked at.
     """
     from armid.by_name import examine
-    from armid.estimation.design import SHRINKAGE, VOLUME, WORST
+    from armid.estimation.examine import LEAST_NOISE, RANKINGS
 
-    if rank not in (VOLUME, WORST, SHRINKAGE):
-        raise ArmidError(f"--rank '{rank}': {nearest(rank, (VOLUME, WORST, SHRINKAGE))}")
+    if rank not in RANKINGS:
+        raise ArmidError(f"--rank '{rank}': {nearest(rank, RANKINGS)}")
     if noise is not None and not LEAST_NOISE <= noise <= 1.0 / LEAST_NOISE:
         expected = f"a finite number above 0 is expected, {LEAST_NOISE:g} to {1.0 / LEAST_NOISE:g}"
         raise ArmidError(f"--noise is {noise:g}, {expected}")

@@ -9,7 +9,7 @@ import click
 
 from armid.cli.options import command, examples, give, plugin_option, present, say
 from armid.errors import ArmidError
-from armid.registry import load_registry, place_in_plugin
+from armid.registry import load_plugin, load_registry, place_in_plugin
 from armid.report.result import (
     IDENTIFIABILITY,
     IDENTIFICATION,
@@ -89,6 +89,9 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
     named = [word for plugin in plugins for word in ("--plugin", plugin)]
     again = shlex.join(["armid", "report", f"results/{results.study['name']}", *named])
     analyses, place = load_registry(plugins).analyses, results.path.parent
+    for plugin in plugins:
+        if plugin not in results.study["plugins"] and load_plugin(plugin)[0] != "analyses":
+            raise ArmidError(f"plug-in '{plugin}' is no analysis: a function with the argument `runs` is expected")
     refuse_unwritable(place, PAGE)
     try:
         document = report_of(results, key, analyses, again)

@@ -73,6 +73,11 @@ def parts_of(name: str, found: Any) -> dict[str, Any]:
         if not isinstance(part, DataFrame | Figure):
             raise ArmidError(f"analysis '{name}' returns a {type(part).__name__} as '{title}': a pandas DataFrame, a "
                              "matplotlib figure, or a dict or tuple of these is expected")  # fmt: skip
+        if isinstance(part, DataFrame):
+            names = [str(n) for n in (*(n for n in part.index.names if n is not None), *part.columns)]
+            if twice := [n for n in names if names.count(n) > 1]:
+                raise ArmidError(f"analysis '{name}' returns a table '{title}' with '{twice[0]}' twice as a column or "
+                                 "index: each name once is expected")  # fmt: skip
     return parts
 
 

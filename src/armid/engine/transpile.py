@@ -89,6 +89,12 @@ def number(value: Any) -> ast.expr:
     return ast.UnaryOp(ast.USub(), ast.Constant(-plain)) if plain < 0 else ast.Constant(plain)
 
 
+def is_number(node: ast.expr) -> bool:
+    if isinstance(node, ast.UnaryOp):
+        return isinstance(node.op, ast.USub | ast.UAdd)
+    return isinstance(node, ast.Constant) and not isinstance(node.value, bool)
+
+
 def call(function: str, *arguments: ast.expr) -> ast.Call:
     return ast.Call(ast.Attribute(ast.Name(NUMPY, ast.Load()), function, ast.Load()), list(arguments), [])
 
@@ -101,8 +107,12 @@ class Vectorise(ast.NodeTransformer):
         return call("where", node.test, node.body, node.orelse)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
-        self.generic_visit(node)
         name = "logical_and" if isinstance(node.op, ast.And) else "logical_or"
+        numeric = next((v for v in node.values if isinstance(v, ast.BinOp) or is_number(v)), None)
+        if numeric is not None:
+            raise ArmidError(f"'{ast.unparse(node)}' joins numbers by `{name.removeprefix('logical_')}`: conditions "
+                             "are expected, and `a if condition else b` for a choice")  # fmt: skip
+        self.generic_visit(node)
         result = node.values[0]
         for value in node.values[1:]:
             result = call(name, result, value)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.estimation.least_squares import LeastSquaresProblem
-from armid.model import Plant
+from armid.model import Manoeuvre, Plant
 from armid.problem.problem import Replay
 from armid.record import Piece, Record
 
@@ -76,6 +76,17 @@ def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> R
 
 def moved_replay(replay: Replay, shares: Mapping[str, float]) -> Replay:
     return replace(replay, pieces=tuple(moved_piece(p, replay.model.plant, shares) for p in replay.pieces))
+
+
+def moved_replays(replays: Sequence[Replay], shares: Mapping[str, float]) -> tuple[Replay, ...]:
+    """Return replays with constants moved; outputs of one file go on sharing their manoeuvres, and so their starts."""
+    made: dict[int, Manoeuvre] = {}
+    found = []
+    for replay in replays:
+        pairs = [(piece, moved_piece(piece, replay.model.plant, shares)) for piece in replay.pieces]
+        shared = (replace(new, manoeuvre=made.setdefault(id(old.manoeuvre), new.manoeuvre)) for old, new in pairs)
+        found.append(replace(replay, pieces=tuple(shared)))
+    return tuple(found)
 
 
 def moved_piece(piece: Piece, plant: Plant, shares: Mapping[str, float]) -> Piece:

@@ -25,6 +25,8 @@ BOX = 12.0
 VOLUME, WORST, SHRINKAGE = "volume", "worst", "shrinkage"
 # How many places of the travel are tried, its ends left alone by so much of it; start and target are so far apart.
 N_PLACES, MARGIN, APART = 6, 0.05, 0.15
+# A place is rounded by at most this share of the range.
+ROUGHEST = 0.02
 # Part of its largest recorded value to which another key is turned down (a supply); up is not said to be safe.
 TURNED_DOWN, MOST_LEVELS = 0.85, 3
 # What is done to recorded inputs: size, and how many times as fast.
@@ -171,7 +173,9 @@ def key_levels(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> tu
     low, high = range_of(key)
     if is_place(plant, key):
         room = MARGIN * (high - low)
-        return tuple(float(v) for v in np.round(np.linspace(low + room, high - room, N_PLACES)))
+        # whole units where the range is one of many, as in degrees; else as fine as tells the places apart
+        decimals = max(0, int(np.ceil(-np.log10(ROUGHEST * (high - low)))))
+        return tuple(float(v) for v in np.round(np.linspace(low + room, high - room, N_PLACES), decimals))
     default = next(c.value for c in plant.constants if c.name == key.constant)
     recorded = {round(r.constants.get(key.constant, default) / key.factor, 9) for r in records}
     some = sorted(recorded, reverse=True)[:MOST_LEVELS]

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError
+from armid.errors import ArmidError, nearest
 from armid.estimation.constants import columns_of, common_factors, products
-from armid.estimation.design import VOLUME, Motions, Offer, expected_levels, manoeuvre_grid, offers
+from armid.estimation.design import SHRINKAGE, VOLUME, WORST, Motions, Offer, expected_levels, manoeuvre_grid, offers
 from armid.estimation.information import (
     SINGULAR,
     Information,
@@ -29,6 +29,9 @@ from armid.record import Campaign
 from armid.report.result import IDENTIFIABILITY, Kind, Result
 
 Array = NDArray[np.float64]
+RANKINGS = (VOLUME, WORST, SHRINKAGE)
+# Of a noise that is given: the rounding of a speed is larger.
+LEAST_NOISE = 1e-15
 Members = tuple[int, ...]
 # From here on a group is reported; Brun et al. call indices above 10 to 15 poorly identifiable.
 CRITICAL = 10.0
@@ -146,6 +149,14 @@ def examine(
     """
     if not space.free.any():
         raise ArmidError("no parameter is free: at least one is expected to be examined")
+    if by not in RANKINGS:
+        raise ArmidError(f"offers are to be ranked by '{by}': {nearest(by, RANKINGS)}")
+    if noise is not None and not LEAST_NOISE <= noise <= 1.0 / LEAST_NOISE:
+        raise ArmidError(f"the noise is {noise:g}: a finite number above 0 is expected, {LEAST_NOISE:g} to "
+                         f"{1.0 / LEAST_NOISE:g}")  # fmt: skip
+    if x is not None and np.shape(x) != (len(space.free_names),):
+        names = ", ".join(space.free_names)
+        raise ArmidError(f"the point has the shape {np.shape(x)}: one value for each of {names} is expected")
     train = replays(campaign.train, model, space, accuracy)
     if x is None:
         train = with_fitted_starts(train, space)

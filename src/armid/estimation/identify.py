@@ -42,6 +42,8 @@ Array = NDArray[np.float64]
 
 # Share of a range within which a parameter is on its bound.
 ROUNDING = 1e-12
+# A search that ends farther outside than this has left the box.
+OUTSIDE = 1e-9
 
 
 INTERRUPTED = "interrupted"
@@ -157,6 +159,11 @@ def identify(
             )
         # what rounding alone keeps off a bound is held by it
         low, high = space.low[space.free], space.high[space.free]
+        left = np.flatnonzero(np.maximum(low - meter.best_x, meter.best_x - high) > OUTSIDE * (high - low))
+        if left.size:
+            i, (name, value) = left[0], (space.free_names[left[0]], meter.best_x[left[0]])
+            raise ArmidError(f"identifier '{identifier.name}' leaves the box: its best candidate has {name} = "
+                             f"{value:.6g}, {low[i]:.6g} to {high[i]:.6g} is expected")  # fmt: skip
         x = np.where(meter.best_x - low < ROUNDING * (high - low), low, meter.best_x)
         x, value = np.where(high - x < ROUNDING * (high - low), high, x), meter.best_f
     else:
@@ -171,7 +178,7 @@ def identify(
     return Identification(
         campaign, model, space, fitness, identifier.name, candidate, value, information_at(seen, space, x),
         errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
-        budget, meter.used, meter.n_failed, seed, stopped,
+        meter.budget, meter.used, meter.n_failed, int(seed), stopped,
     )  # fmt: skip
 
 

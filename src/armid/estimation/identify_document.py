@@ -173,7 +173,8 @@ def identify_document(
         ("fitness", f"{result['fitness']}, at the end {'not finite' if value is None else format(value, '.6g')}"),
         ("simulations", f"{result['used']} of {result['budget']}"), ("diverged", str(result["failed"])),
         ("seed", str(result["seed"])), ("stopped", result["stopped"]),
-        ("engine's error [rad/s or m/s]", f"{result['engine_error']:.2g}"),
+        ("engine's error [rad/s or m/s]",
+         "not known" if result["engine_error"] is None else f"{result['engine_error']:.2g}"),
     ]  # fmt: skip
     figures = stored_figures(FIGURES, svgs).get("convergence", ())
     sections = (
@@ -303,7 +304,7 @@ def result_of(found: Identification) -> dict[str, Any]:
         "seed": found.seed,
         "noise": noises,
         "outputs": outputs_entry(replays),
-        "engine_error": max(r.engine_error for r in found.train_replays),
+        "engine_error": finite(max(r.engine_error for r in found.train_replays)),
         "model": str(found.model),
         "versions": versions_of(PACKAGES),
     }
@@ -450,4 +451,7 @@ def noise_remark(replay: Replay) -> str:
     if noise.source == "rest":
         mean = shown(noise.mean or 0.0, unit)[0]
         return f"{text} and mean {mean:+.3g} {name} (shown, not subtracted) from {noise.n_samples} samples at rest."
-    return f"{text} from high-frequency differences of the motion, as fewer than 50 samples were recorded at rest."
+    return (
+        f"{text} from high-frequency differences of the motion, as fewer than 50 samples, or equal ones, were recorded "
+        "at rest."
+    )

@@ -11,7 +11,7 @@ from scipy.special import fdtrc
 from armid.engine import simulate
 from armid.errors import ArmidError
 from armid.estimation.constants import with_constants
-from armid.estimation.least_squares import LeastSquaresProblem, WeightedRecords
+from armid.estimation.least_squares import LEAST, LeastSquaresProblem, WeightedRecords, step_in_box
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.problem.starts import by_file
@@ -122,7 +122,8 @@ def information_of(
         total = total - mixed.T @ np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, mixed)
     covariance = inverse(total)
     determined = np.where(np.isfinite(covariance), covariance, 0.0)
-    step = np.clip(z + determined @ (jacobian.T @ residual), 0.0, 1.0) - z
+    # what the box holds is held, and the others make up for that
+    step = step_in_box(total, jacobian.T @ residual, z, LEAST) - z
     started = np.array([jacobian.T @ (rows * change) for change in start_changes(records, z)])
     started = started.reshape(len(started), len(z))
     covariance = covariance + determined @ (started.T @ started) @ determined
@@ -214,7 +215,7 @@ def level_of(replay: Replay, space: Space, x: Array) -> Level:
     residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
     rms = float(np.sqrt(np.mean(residual**2)))
     known = Level(noise.rms, noise.effective_fraction)
-    if not np.isfinite(rms) or rms <= ENGINE_ERRORS * replay.engine_error:
+    if not np.isfinite(rms) or (np.isfinite(replay.engine_error) and rms <= ENGINE_ERRORS * replay.engine_error):
         return known
     if not is_noise(residual, noise):
         return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_factors, moved_replay
+from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_factors, moved_replays
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import LeastSquaresProblem, descend
 from armid.loop.candidates import ROUGHLY, Library
@@ -129,7 +129,7 @@ class FreedConstants(LeastSquaresProblem):
 
     def moved(self, off: Array) -> WhiteRecords:
         shares = self.shares_at(off)
-        return replace(self.records, replays=tuple(moved_replay(r, shares) for r in self.records.replays))
+        return replace(self.records, replays=moved_replays(self.records.replays, shares))
 
     def shares_at(self, off: Array) -> dict[str, float]:
         """Return by which share of its value the first member of each product is off."""
@@ -369,7 +369,7 @@ def without_trend(base: WhiteRecords, z: Array, moves: int | Product, value: flo
         index = next(i for i, r in enumerate(base.data.records) if r.file == file)
         share, there, at = value * (place / (len(files) - 1.0) - 0.5), base, z
         if isinstance(moves, Product):
-            there = replace(base, replays=tuple(moved_replay(r, {moves.names[0]: share}) for r in base.replays))
+            there = replace(base, replays=moved_replays(base.replays, {moves.names[0]: share}))
         else:
             at = np.where(np.arange(len(z)) == moves, z + share, z)
         pairs = zip(simulated_file(base, index, z), simulated_file(there, index, at), strict=True)

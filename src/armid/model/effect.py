@@ -86,6 +86,10 @@ class Effect:
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ArmidError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")
+        ports = [n for n in names if n in self.adds]
+        if ports:
+            raise ArmidError(f"effect '{self.name}' calls something else '{ports[0]}', as a port to which it adds: "
+                             "another name is expected")  # fmt: skip
         words = [e.form for e in self.every_form]
         if any(e.name != self.name for e in self.forms):
             raise ArmidError(f"effect '{self.name}' has a form of another name: forms are found under one name")

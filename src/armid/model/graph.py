@@ -3,6 +3,7 @@
 import ast
 import copy
 import inspect
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -301,7 +302,8 @@ def definition_of(function: Equation) -> ast.FunctionDef:
     if not isinstance(function, FunctionType):
         raise ArmidError(f"the equation {label} is no plain Python function: write it as a def")
     try:
-        source = textwrap.dedent(inspect.getsource(function))
+        # a comment may stand further out than what it stands in
+        source = textwrap.dedent(re.sub(r"(?m)^\s*#.*\n", "", inspect.getsource(function)))
     except (OSError, TypeError) as error:
         raise ArmidError(f"the source of the equation {label} cannot be read: define it in a file") from error
     if function.__name__ == "<lambda>":

@@ -90,8 +90,11 @@ class Scales:
 
 def powers_of(unit: str) -> dict[str, int] | None:
     """Return word -> exponent of a product of scales, or None when the unit is a physical one."""
-    if not re.fullmatch(r"\w+(\^\d)?([*/]\w+(\^\d)?)*", unit) or not re.search(r"effort|speed|inertia", unit):
+    if not re.search(r"effort|speed|inertia", unit):
         return None
+    if not re.fullmatch(r"\w+(\^\d)?([*/]\w+(\^\d)?)*", unit):
+        raise ArmidError(f"unit '{unit}' is no product of scales: words joined by * and /, such as effort/speed^2, are "
+                         "expected")  # fmt: skip
     powers: dict[str, int] = {}
     for sign, word, power in re.findall(r"(^|[*/])(\w+)(?:\^(\d))?", unit):
         if word not in WORDS:

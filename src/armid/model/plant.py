@@ -245,12 +245,13 @@ class Plant:
         twice = sorted({n for n in self.declared if self.declared.count(n) > 1})
         if twice:
             raise ArmidError(f"plant '{self.name}' declares '{twice[0]}' twice: each name once is expected")
-        uses = [("records", o.signal) for o in self.outputs]
-        uses += [(f"records '{o.name}' through the port", o.port) for o in self.outputs if o.port]
-        uses += [(f"has the alias '{a}' for", n) for a, n in self.aliases.items()]
-        for use, name in uses:
-            if name not in self.declared:
-                raise ArmidError(f"plant '{self.name}' {use} '{name}': {nearest(name, self.declared)}")
+        signals = [n for n in self.declared if n not in self.aliases]
+        uses = [("records", o.signal, signals) for o in self.outputs]
+        uses += [(f"records '{o.name}' through the port", o.port, [*self.ports]) for o in self.outputs if o.port]
+        uses += [(f"has the alias '{a}' for", n, self.declared) for a, n in self.aliases.items()]
+        for use, name, known in uses:
+            if name not in known:
+                raise ArmidError(f"plant '{self.name}' {use} '{name}': {nearest(name, known)}")
 
     def _fill_outputs(self) -> None:
         """Bring `outputs`, `output` and `output_unit` together, whichever of them was given."""

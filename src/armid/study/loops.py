@@ -13,6 +13,7 @@ from numpy.random import default_rng
 
 from armid.errors import ArmidError, nearest, quoted
 from armid.loop import close_loop, report_of
+from armid.model.effects.sensor import sensor_effects
 from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import unknown_name, validated
 from armid.study.cases import digest_of, unchanged_campaign
@@ -51,8 +52,9 @@ class LoopStudy:
         spec = validated(LoopSpec, table, where)
         if spec.report not in LOOP_REPORTS:
             raise unknown_name("report", spec.report, LOOP_REPORTS[1:], where)
+        sensors = {name: e for plant in registry.plants.values() for name, e in sensor_effects(plant).items()}
         for name in (*spec.candidates, *spec.without, *(n for names in spec.rivals.values() for n in names)):
-            lookup(registry.effects, name, "effect", where)
+            lookup({**sensors, **registry.effects}, name, "effect", where)
         candidates = tuple(n for n in spec.candidates or registry.effects if n not in spec.without)
         return cls(spec, text, folder, _campaigns(spec, folder, where), candidates, registry)
 
@@ -90,9 +92,14 @@ class LoopStudy:
             wanted = self.candidates_for(case)
             settings = {
                 "kind": self.kind, "campaigns": spec.campaigns, "bounds": spec.bounds, "fixed": spec.fixed,
-                "seed": spec.seed, "candidates": list(wanted), "own": self.registry.digests_of("effects", *wanted),
+                "seed": spec.seed, "candidates": list(wanted), "own": self.registry.digests_of_models(),
                 "case": case, "digest": digest,
             }  # fmt: skip
+            # Those of sensors are known with the plant of a campaign alone, and looked for where all effects are.
+            if spec.candidates or wanted != self.candidates:
+                settings["sensors"] = False
+            elif unseen := [n for n in spec.without if n not in self.registry.effects]:
+                settings["without"] = unseen
             yield planned(settings, case, CLOSES_LOOP, "", None, WHOLE, spec.seed, 0)
 
     @staticmethod
@@ -101,7 +108,10 @@ class LoopStudy:
         registry, folder = cache.registry, cache.folder / settings["campaigns"] / settings["case"]
         campaign = unchanged_campaign(folder, _files(folder), settings["digest"], settings["case"], registry)
         model = campaign.model(registry.effects)
-        candidates = {name: lookup(registry.effects, name, "effect", "settings") for name in settings["candidates"]}
+        sensors = sensor_effects(campaign.plant)
+        own = sensors if settings.get("sensors", True) else ()
+        wanted = [*settings["candidates"], *(n for n in own if n not in settings.get("without", ()))]
+        candidates = {n: lookup({**sensors, **registry.effects}, n, "effect", "settings") for n in wanted}
         bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
         rng, fixed = default_rng(settings["seed"]), settings["fixed"]
         closed = close_loop(model, campaign, candidates, rng, bounds, fixed, threads=1)

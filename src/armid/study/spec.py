@@ -2,14 +2,17 @@
 
 import hashlib
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from armid.engine.calibrate import ALLOWED
-from armid.errors import ArmidError
+from armid.errors import ArmidError, MachineError
 from armid.model import Model
+from armid.model.effects.sensor import sensor_effects
 from armid.record.schema import (
     Kind,
     KindError,
@@ -26,12 +29,14 @@ from armid.record.schema import (
     text,
     unknown_name,
 )
-from armid.registry import Registry, load_plugin, load_registry
+from armid.registry import PLUGIN_PREFIX, Registry, load_plugin, load_registry
 
 IDENTIFIES, CLOSES_LOOP = KIND_NAMES = ("identify", "close_loop")
 REPORTS = ("", "table1", "table2", "benchmark", "fitness")
 LOOP_REPORTS = ("", "blind", "advice")
 WHOLE = "whole"
+# Kinds of what a model is made of.
+MODELS = ("plants", "effects")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 # Neither key nor number of a study may be larger: what it asks for has to fit into memory and a lifetime.
 LARGEST_COUNT = 10**9
@@ -252,14 +257,27 @@ class StudyRegistry(Registry):
             raise ArmidError(f"{where}: {error}") from error
 
     def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
+        known = {**sensor_effects(model.plant), **self.effects}
         for name in names:
-            model = model + lookup(self.effects, name, "effect", where)
+            model = model + lookup(known, name, "effect", where)
         return model
 
     def digests_of(self, kind: str, *names: str) -> dict[str, str]:
         """Return `kind name` -> hash for those of the names that are the user's own; chains are looked into."""
         parts = [part for name in names for part in re.split(r"[+:]", name)]
         return {f"{kind} {part}": self.digests[kind, part] for part in parts if (kind, part) in self.digests}
+
+    def digests_of_models(self) -> dict[str, str]:
+        """Return `kind name` -> hash of the user's own plants and effects."""
+        return {f"{kind} {name}": digest for (kind, name), digest in self.digests.items() if kind in MODELS}
+
+    def refuse_changed(self, own: Mapping[str, str]) -> None:
+        """Refuse a run whose plug-ins are others here than where the study was read; own: `kind name` -> hash."""
+        for both, digest in own.items():
+            kind, _, name = both.partition(" ")
+            if self.digests.get((kind, name)) != digest:
+                raise MachineError(f"the plug-in that holds {name} has changed since the study was started: start it "
+                                   "again")  # fmt: skip
 
 
 def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
@@ -269,9 +287,15 @@ def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
     digests = {}
     for plugin in named:
         kind, name, _ = load_plugin(plugin)
-        with open(plugin.rpartition(":")[0], "rb") as file:
-            digests[kind, name] = hashlib.sha256(file.read()).hexdigest()
+        own = Path(plugin.rpartition(":")[0]).resolve()
+        digests[kind, name] = hashlib.sha256(b"".join(f.read_bytes() for f in (own, *imported_beside(own)))).hexdigest()
     return StudyRegistry(registry.plants, registry.effects, registry.own, named, digests)
+
+
+def imported_beside(plugin: Path) -> list[Path]:
+    """Return the files in the folder of a plug-in that were imported, other plug-ins left out."""
+    loaded = [(name, Path(file)) for name, module in sys.modules.items() if (file := getattr(module, "__file__", None))]
+    return sorted(f for name, f in loaded if f.parent == plugin.parent and not name.startswith(PLUGIN_PREFIX))
 
 
 def lookup(there: Mapping[str, Any], name: str, what: str, where: str) -> Any:

@@ -112,6 +112,8 @@ def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
     began, started_at = time.perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
     try:
         settings = json.loads(run.settings)
+        if own := settings.get("own"):
+            cache.registry.refuse_changed(own)
         made = task_type(settings["kind"]).perform(settings, cache)
     except (Exception, SystemExit) as error:
         if isinstance(error, MachineError):

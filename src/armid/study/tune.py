@@ -5,6 +5,7 @@ Bayesian sampler proposes it. All are identifiers of one training study, which i
 proposed follows from the runs that it holds, so that a tuning that was interrupted goes on as if it had not been.
 """
 
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -101,6 +102,9 @@ def training(study: Study, seed: int) -> Study:
     """
     if study.spec.suite is None:
         raise ArmidError(f"study '{study.name}' has no table [suite], armid tune expects one with train instances")
+    if not re.search(r"(?m)^\s*\[\[\s*identifiers\s*\]\]", study.text):
+        raise ArmidError(f"study '{study.name}' has its identifiers in one line: tables headed [[identifiers]] are "
+                         "expected, as those that are tuned join them")  # fmt: skip
     cases = suite_cases(study.spec, f"study '{study.name}', suite", train=True)
     both = {case.name for case in cases} & set(study.case_names)
     if both:
@@ -152,12 +156,17 @@ def scores(study: Study, results: StudyResults) -> dict[str, float]:
 def tuned_study(study: Study, found: list[Tuned]) -> str:
     """Return the text of the study with the tuned identifiers behind the others, on the same budgets and seeds."""
     entries, spec = {entry.label: entry for entry in reversed(study.entries)}, study.spec
-    text = re.sub(r'(?m)^name = ".*"$', f'name = "{study.name}_tuned"', study.text.rstrip(), count=1)
+    text = study.text.rstrip()
+    head = re.match(r"(?s).*?(?=^\s*\[|\Z)", text, re.MULTILINE)
+    assert head is not None
+    own = re.sub(r"(?m)^\s*name\s*=.*$", f'name = "{study.name}_tuned"', head[0], count=1)
+    text = own + text[head.end() :]
     for each in found:
         if each.options:
             entry = entries[each.label]
             options = ", ".join(f"{name} = {value!r}" for name, value in each.options.items())
-            text += f'\n\n[[identifiers]]\nname = "{entry.name}"\nlabel = "{each.label}, tuned"\n'
+            text += f'\n\n[[identifiers]]\nname = "{entry.name}"\n'
+            text += f"label = {json.dumps(f'{each.label}, tuned', ensure_ascii=False)}\n"
             text += f"budget = {entry.budget}\n" if entry.budget != spec.budget else ""
             if entry.per_parameter != spec.budget_per_parameter:
                 text += f"budget_per_parameter = {list(entry.per_parameter)}\n"

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from pandas import DataFrame, RangeIndex
-from pandas.api.types import is_bool_dtype, is_integer_dtype, is_numeric_dtype
+from pandas.api.types import is_bool_dtype, is_extension_array_dtype, is_integer_dtype, is_numeric_dtype
 
 from armid.contract.check import parts_of
 from armid.report.document import Column, Figure, Part, Section, Table, slug, unlike
@@ -50,7 +50,11 @@ def part(file: str, title: str, found: Any) -> Part:
         return Figure(file, title, "", lambda: found)
     frame = found if isinstance(found.index, RangeIndex) else found.reset_index()
     frame = frame.set_axis([" ".join(map(str, c)).strip() if isinstance(c, tuple) else str(c) for c in frame], axis=1)
-    return Table(file, title, "", frame, tuple(Column(str(c), str(c), digits(frame[c].dtype)) for c in frame))
+    columns = tuple(Column(str(c), str(c), digits(frame[c].dtype)) for c in frame)
+    # what is missing in a column of a pandas type of its own is no number
+    for c in (c for c in frame if is_extension_array_dtype(frame[c].dtype)):
+        frame = frame.assign(**{str(c): frame[c].astype(object).where(frame[c].notna(), None)})
+    return Table(file, title, "", frame, columns)
 
 
 def digits(kind: Any) -> str:
