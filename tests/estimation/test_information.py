@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from linear_records import linear_records
 from scipy.optimize import least_squares
 
 from armid.engine import calibrate, probes
-from armid.estimation.information import collinear, information_at, sensitivities
+from armid.estimation.information import collinear, information_at, information_of, sensitivities
 from armid.model import EFFECTS, Effect, Manoeuvre, Model, Parameter
 from armid.model.plants.driven_axis import linear_axis
 from armid.problem.problem import Replay, replays
@@ -243,3 +244,20 @@ def test_agree_with_the_closed_form_of_an_axis(axis):
         expected = closed_form(replay, mass, slope) * (space.high - space.low)[space.free]
         found = sensitivities(replay, space, np.array([mass, slope]))
         np.testing.assert_allclose(found, expected, atol=within * np.max(np.abs(expected)))
+
+
+def test_an_estimate_with_other_weights_than_those_of_the_noise_scatters_more():
+    """Two records that tell as much of one parameter, the second four times as loud, in a sum of squares of both alike.
+
+    The mean of both has the variance (s1^2 + s2^2)/4n, not that of the weighted mean.
+    """
+    n, loud = 50, 4.0
+    design = np.concatenate([np.ones(n), np.full(n, 1.0 / loud)])[:, np.newaxis]
+    records = linear_records(design, 0.4 * design[:, 0])
+    weighed = np.concatenate([np.ones(n), np.full(n, loud**2)])
+    span = 10.0
+    best = information_of(records, np.array([0.4])).deviation / span
+    alike = information_of(records, np.array([0.4]), weighed=weighed).deviation / span
+    assert best == pytest.approx([(n + n / loud**2) ** -0.5])
+    assert alike == pytest.approx([np.sqrt(1.0 + loud**2) / np.sqrt(4.0 * n)])
+    assert information_of(records, np.array([0.5]), weighed=weighed).step == pytest.approx(-0.1 * span / (alike * span))

@@ -29,6 +29,7 @@ from armid.problem.problem import (
     judged_by,
     output_sizes,
     replays,
+    residual_weights,
     signals_of,
     weights_of,
 )
@@ -174,9 +175,11 @@ def identify(
     holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     errors = campaign_errors(train, candidate)
     assert errors is not None
+    weights = None if fitness.weigh is None else residual_weights(fitness, seen)
+    information = information_at(seen, space, x, weights=weights)
     trace = meter.trace()
     return Identification(
-        campaign, model, space, fitness, identifier.name, candidate, value, information_at(seen, space, x),
+        campaign, model, space, fitness, identifier.name, candidate, value, information,
         errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
         meter.budget, meter.used, meter.n_failed, int(seed), stopped,
     )  # fmt: skip

@@ -71,8 +71,9 @@ class Information:
 
 
 def information_at(
-    replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...] | None = None
-) -> Information:
+    replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...] | None = None,
+    weights: Sequence[float] | None = None,
+) -> Information:  # fmt: skip
     """Return intervals and correlations at a candidate, from the sensitivities and the measured noise.
 
     Fisher information F = sum over records of f J^T J / level^2 with f the share of samples that are independent;
@@ -88,6 +89,9 @@ def information_at(
         Free parameters.
     levels : tuple of Level
         One for each record; None: as measured, see `level_of`.
+    weights : sequence of float
+        What the residual of each record weighs in the sum of squares that was minimised, where that is not its level:
+        with W their squares and G = J^T W J the covariance is then G^-1 J^T W S W J G^-1, S that of the noise.
 
     Returns
     -------
@@ -96,7 +100,10 @@ def information_at(
     levels = tuple(level_of(r, space, x) for r in replays) if levels is None else levels
     noise_free = any(level.rms == 0.0 for level in levels)
     records = WeightedRecords(replays, space, (1.0,) * len(replays) if noise_free else level_weights(levels))
-    found = replace(information_of(records, records.shares(x)), levels=levels)
+    ratios = np.ones(len(replays)) if weights is None or noise_free else np.divide(weights, level_weights(levels))
+    others = np.ptp(ratios) > 1e-9 * ratios.max()
+    squares = np.repeat((ratios / ratios.max()) ** 2, [r.record.n_samples for r in replays]) if others else None
+    found = replace(information_of(records, records.shares(x), weighed=squares), levels=levels)
     if not noise_free:
         return found
     shown = np.where(np.isfinite(found.deviation), 0.0, found.deviation)
@@ -104,13 +111,15 @@ def information_at(
 
 
 def information_of(
-    records: LeastSquaresProblem, z: Array, trust: Array | None = None, doubts: Array | None = None
-) -> Information:
+    records: LeastSquaresProblem, z: Array, trust: Array | None = None, doubts: Array | None = None,
+    weighed: Array | None = None,
+) -> Information:  # fmt: skip
     """Return intervals and correlations at a candidate, in shares of the range, from the weights of a problem.
 
     trust: 1 for each sample whose residual is noise, below it where the residual is larger, (n_samples,). doubts: what
     one standard deviation of each further unknown does to the weighted signal, (n_samples, n_doubts); the estimate is
-    then one of all together.
+    then one of all together. weighed: what each square weighs in the estimate beside its weight here, (n_samples,);
+    None: all alike.
     """
     residual, jacobian = records.residual_and_slopes(z)
     rows = np.ones(len(residual)) if trust is None else np.sqrt(trust)
@@ -120,11 +129,17 @@ def information_of(
         others = rows[:, np.newaxis] * doubts
         mixed = others.T @ jacobian
         total = total - mixed.T @ np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, mixed)
-    covariance = inverse(total)
-    determined = np.where(np.isfinite(covariance), covariance, 0.0)
+    # towards the estimate; of weights that are not those of the noise, doubts are not asked
+    towards = jacobian if weighed is None else weighed[:, np.newaxis] * jacobian
+    own = total if weighed is None else towards.T @ jacobian
+    covariance = inverse(own)
+    known = np.isfinite(covariance)
+    determined = np.where(known, covariance, 0.0)
+    if weighed is not None:
+        covariance = np.where(known, determined @ (towards.T @ towards) @ determined, covariance)
     # what the box holds is held, and the others make up for that
-    step = step_in_box(total, jacobian.T @ residual, z, LEAST) - z
-    started = np.array([jacobian.T @ (rows * change) for change in start_changes(records, z)])
+    step = step_in_box(own, towards.T @ residual, z, LEAST) - z
+    started = np.array([towards.T @ (rows * change) for change in start_changes(records, z)])
     started = started.reshape(len(started), len(z))
     covariance = covariance + determined @ (started.T @ started) @ determined
     deviation = np.sqrt(np.diag(covariance))
