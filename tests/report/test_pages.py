@@ -17,7 +17,7 @@ from armid.cli.main import main
 from armid.cli.report import LOOP, document_of, kind_in, refuse_damaged
 from armid.errors import ArmidError
 from armid.loop.document import loop_document
-from armid.report.document import Document, Line, Listing, Section, Sentences, table, varying
+from armid.report.document import Document, Line, Listing, Section, Sentences, rmse_text, table, varying
 from armid.report.files import csv, latex
 from armid.report.html import html, inline
 from armid.report.markdown import markdown
@@ -103,6 +103,12 @@ def test_figures_that_the_last_run_did_not_draw_are_not_shown(tmp_path):
     assert page_of(folder).tags.count("svg") == before
     (folder / MANIFEST).write_text(json.dumps({LOOP.file: digests[LOOP.file]}), encoding="utf-8")
     assert page_of(folder).tags.count("svg") == before - sum(name.endswith(".svg") for name in digests) > 0
+
+
+def test_an_output_that_is_not_there_has_not_diverged():
+    entry = {"rmse": None, "outputs": {"deflection": {"rmse": 0.1}}}
+    assert [rmse_text({"rmse": None}, "rad"), rmse_text(entry, "rad")] == ["not finite", "not recorded"]
+    assert rmse_text({"rmse": None, "outputs": {"hub": {"rmse": None}}}, "rad") == "not finite"
 
 
 def test_names_of_files_cannot_break_any_renderer(tmp_path, capsys):

@@ -350,7 +350,11 @@ def others_text(*errors: Mapping[str, Any] | None) -> str:
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:
-    return "not finite" if error["rmse"] is None else f"{shown(error['rmse'], unit)[0]:.4g}"
+    if error["rmse"] is not None:
+        return f"{shown(error['rmse'], unit)[0]:.4g}"
+    others = error.get("outputs") or {}
+    # what diverges stands among the outputs, too
+    return "not recorded" if others and all(e["rmse"] is not None for e in others.values()) else "not finite"
 
 
 def records_note(shown_records: int, there_are: int) -> str:
