@@ -82,7 +82,8 @@ def test_what_is_not_known_is_null(lowering_found, shown):
     assert "│ not determined" in text
     assert "holdout: none" in text
     assert "k is not determined by these records." in remarks(worse)
-    lost = replace(worse, train=replace(worse.train, rmse=np.nan))
+    outputs = {name: replace(e, rmse=np.nan) for name, e in worse.train.outputs.items()}
+    lost = replace(worse, train=replace(worse.train, rmse=np.nan, outputs=outputs))
     assert "Error (RMSE): not finite deg/s on the records fitted" in shown(lost)
 
 

@@ -161,7 +161,7 @@ DECLARED = {
                        "plant 'driven_axis' declares 'v' twice"),
     "output": (lambda: replace(AXIS, output="recorded_sped"), "plant 'driven_axis' records 'recorded_sped': did you"),
     "signal is an alias": (lambda: replace(AXIS, outputs=(Output("s", "omega", "m/s"),), output="", output_unit=""),
-                           "plant 'driven_axis' records 'omega': "),
+                           "plant 'driven_axis' records 'omega', another name for 'v': 'v' is expected"),
     "port of a sensor is a state": (
         lambda: replace(AXIS, outputs=(Output("s", "v", "m/s", port="q"),), output="", output_unit=""),
         "records 's' through the port 'q': "),

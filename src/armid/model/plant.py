@@ -245,8 +245,10 @@ class Plant:
         twice = sorted({n for n in self.declared if self.declared.count(n) > 1})
         if twice:
             raise ArmidError(f"plant '{self.name}' declares '{twice[0]}' twice: each name once is expected")
-        signals = [n for n in self.declared if n not in self.aliases]
-        uses = [("records", o.signal, signals) for o in self.outputs]
+        for signal in (o.signal for o in self.outputs if o.signal in self.aliases):
+            name = self.aliases[signal]
+            raise ArmidError(f"plant '{self.name}' records '{signal}', another name for '{name}': '{name}' is expected")
+        uses = [("records", o.signal, self.declared) for o in self.outputs]
         uses += [(f"records '{o.name}' through the port", o.port, [*self.ports]) for o in self.outputs if o.port]
         uses += [(f"has the alias '{a}' for", n, self.declared) for a, n in self.aliases.items()]
         for use, name, known in uses:
