@@ -56,7 +56,7 @@ class Opened(NamedTuple):
     @property
     def effects(self) -> dict[str, Effect]:
         """The effects that are registered, and those of the sensors of the plant."""
-        return {**sensor_effects(self.campaign.plant), **self.registry.effects}
+        return self.registry.effects_for(self.campaign.plant)
 
     def space(self) -> "Space":
         from armid.problem.space import space_of
@@ -83,7 +83,7 @@ def opened(
     read = campaign if isinstance(campaign, Campaign) else campaign_of(campaign, plant, registry)
     if window is not None:
         read = read.with_window(*window)
-    effects_known = {**sensor_effects(read.plant), **registry.effects}
+    effects_known = registry.effects_for(read.plant)
     if model is None:
         for name in read.effects:
             chosen(name, {**sensor_effects(read.declared), **effects_known}, "effect")

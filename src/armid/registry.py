@@ -13,6 +13,7 @@ from typing import Any
 
 from armid.errors import ArmidError, nearest
 from armid.model import EFFECTS, PLANTS, Effect, Plant
+from armid.model.effects.sensor import sensor_effects
 
 PLUGIN_PREFIX = "armid_plugin_"
 # What a plug-in's file held when it was run stands under this name in its module.
@@ -70,6 +71,10 @@ class Registry:
     def analyses(self) -> dict[str, Any]:
         """Name -> function of the runs of a study, of users alone: ours stand in armid.study.analyses."""
         return self.own["analyses"]
+
+    def effects_for(self, plant: Plant) -> dict[str, Effect]:
+        """Return name -> Effect: those that are registered, and those of the sensors of a plant."""
+        return {**sensor_effects(plant), **self.effects}
 
     def identifier_of(self, name: str) -> Any:
         """Return the Identifier of a name, a chain such as `pso+bobyqa` or `multistart:bobyqa`; errors in words."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armid.estimation.least_squares import LeastSquaresProblem
 from armid.model import Manoeuvre, Plant
-from armid.problem.problem import Replay
+from armid.problem.problem import Replay, signals_of
 from armid.record import Piece, Record
 
 Array = NDArray[np.float64]
@@ -74,10 +74,6 @@ def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> R
     return of_pieces(moved_piece, plant=plant, shares=shares)(record) if shares else record
 
 
-def moved_replay(replay: Replay, shares: Mapping[str, float]) -> Replay:
-    return replace(replay, pieces=tuple(moved_piece(p, replay.model.plant, shares) for p in replay.pieces))
-
-
 def moved_replays(replays: Sequence[Replay], shares: Mapping[str, float]) -> tuple[Replay, ...]:
     """Return replays with constants moved; outputs of one file go on sharing their manoeuvres, and so their starts."""
     made: dict[int, Manoeuvre] = {}
@@ -102,8 +98,8 @@ def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[
     candidate = records.whole(z[np.newaxis])
     found = []
     for name in names:
-        sides = [records.weighted([moved_replay(r, {name: s}).signal(candidate)[0] for r in records.replays])
-                 for s in (STEP, -STEP)]  # fmt: skip
+        moved = (moved_replays(records.replays, {name: s}) for s in (STEP, -STEP))
+        sides = [records.weighted([signal[0] for signal in signals_of(there, candidate)]) for there in moved]
         slope = (sides[0] - sides[1]) / (2.0 * STEP)
         found.append(slope if np.isfinite(slope).all() else np.zeros_like(slope))
     return np.array(found).reshape(len(names), len(records.measured))

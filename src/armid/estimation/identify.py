@@ -175,7 +175,7 @@ def identify(
     holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     errors = campaign_errors(train, candidate)
     assert errors is not None
-    weights = None if fitness.weigh is None else residual_weights(fitness, seen)
+    weights = None if fitness.weigh is None else residual_weights(fitness, seen, output_sizes(seen))
     information = information_at(seen, space, x, weights=weights)
     trace = meter.trace()
     return Identification(

@@ -290,10 +290,7 @@ def unless_belied(fault: Mended, decided: "Decision") -> "Decision":
 
 
 def unclaimed(decided: "Decision") -> "Decision":
-    """Return what is decided without a record that was left out, of which nothing is claimed.
-
-    It may be sound and deny the model: it is not said in numbers what is wrong with it.
-    """
+    """Return what is decided, of which nothing is claimed: a record that is accused may be sound and deny it."""
     return replace(decided, claimed=frozenset())
 
 

@@ -224,7 +224,7 @@ class IdentificationProblem(Metered):
             parts = [self._fitness(X[first : first + size])[0] for first in range(0, max(len(X), 1), size)]
             return parts[0] if len(parts) == 1 else np.concatenate(parts), None
         values, signals = self._fitness(X)
-        return values, weighted(signals, self.measured, residual_weights(self.fitness, self.replays))
+        return values, weighted(signals, self.measured, residual_weights(self.fitness, self.replays, self.sizes))
 
     def _fitness(self, X: Array) -> tuple[Array, list[Array]]:
         """Return the fitness of candidates, (n_candidates,), and their signals in each record."""
@@ -287,12 +287,12 @@ def output_sizes(replays: Sequence[Replay]) -> Array:
     return np.array([noise[name] for name in outputs])
 
 
-def residual_weights(fitness: Fitness, replays: Sequence[Replay]) -> list[float]:
+def residual_weights(fitness: Fitness, replays: Sequence[Replay], sizes: Array) -> list[float]:
     """Return what the residual of each record weighs in the sum of squares that a fitness is, [1/unit].
 
-    Raises ArmidError when the fitness is no sum of squares.
+    sizes: see `output_sizes`. Raises ArmidError when the fitness is no sum of squares.
     """
-    pairs = [(r.record.noise.rms, size) for r, size in zip(replays, output_sizes(tuple(replays)), strict=True)]
+    pairs = [(r.record.noise.rms, size) for r, size in zip(replays, sizes, strict=True)]
     return [fitness.weight_of(noise / size) / size for noise, size in pairs]
 
 

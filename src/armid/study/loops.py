@@ -13,7 +13,6 @@ from numpy.random import default_rng
 
 from armid.errors import ArmidError, nearest, quoted
 from armid.loop import close_loop, report_of
-from armid.model.effects.sensor import sensor_effects
 from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import unknown_name, validated
 from armid.study.cases import digest_of, unchanged_campaign
@@ -52,9 +51,9 @@ class LoopStudy:
         spec = validated(LoopSpec, table, where)
         if spec.report not in LOOP_REPORTS:
             raise unknown_name("report", spec.report, LOOP_REPORTS[1:], where)
-        sensors = {name: e for plant in registry.plants.values() for name, e in sensor_effects(plant).items()}
+        known = {name: e for plant in registry.plants.values() for name, e in registry.effects_for(plant).items()}
         for name in (*spec.candidates, *spec.without, *(n for names in spec.rivals.values() for n in names)):
-            lookup({**sensors, **registry.effects}, name, "effect", where)
+            lookup(known, name, "effect", where)
         candidates = tuple(n for n in spec.candidates or registry.effects if n not in spec.without)
         return cls(spec, text, folder, _campaigns(spec, folder, where), candidates, registry)
 
@@ -108,10 +107,10 @@ class LoopStudy:
         registry, folder = cache.registry, cache.folder / settings["campaigns"] / settings["case"]
         campaign = unchanged_campaign(folder, _files(folder), settings["digest"], settings["case"], registry)
         model = campaign.model(registry.effects)
-        sensors = sensor_effects(campaign.plant)
-        own = sensors if settings.get("sensors", True) else ()
-        wanted = [*settings["candidates"], *(n for n in own if n not in settings.get("without", ()))]
-        candidates = {n: lookup({**sensors, **registry.effects}, n, "effect", "settings") for n in wanted}
+        known = registry.effects_for(campaign.plant)
+        sensors = known.keys() - registry.effects.keys() if settings.get("sensors", True) else set()
+        wanted = [*settings["candidates"], *(n for n in known if n in sensors - {*settings.get("without", ())})]
+        candidates = {n: lookup(known, n, "effect", "settings") for n in wanted}
         bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
         rng, fixed = default_rng(settings["seed"]), settings["fixed"]
         closed = close_loop(model, campaign, candidates, rng, bounds, fixed, threads=1)

@@ -12,7 +12,6 @@ from typing import Any
 from armid.engine.calibrate import ALLOWED
 from armid.errors import ArmidError, MachineError
 from armid.model import Model
-from armid.model.effects.sensor import sensor_effects
 from armid.record.schema import (
     Kind,
     KindError,
@@ -257,7 +256,7 @@ class StudyRegistry(Registry):
             raise ArmidError(f"{where}: {error}") from error
 
     def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
-        known = {**sensor_effects(model.plant), **self.effects}
+        known = self.effects_for(model.plant)
         for name in names:
             model = model + lookup(known, name, "effect", where)
         return model

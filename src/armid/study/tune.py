@@ -156,11 +156,8 @@ def scores(study: Study, results: StudyResults) -> dict[str, float]:
 def tuned_study(study: Study, found: list[Tuned]) -> str:
     """Return the text of the study with the tuned identifiers behind the others, on the same budgets and seeds."""
     entries, spec = {entry.label: entry for entry in reversed(study.entries)}, study.spec
-    text = study.text.rstrip()
-    head = re.match(r"(?s).*?(?=^\s*\[|\Z)", text, re.MULTILINE)
-    assert head is not None
-    own = re.sub(r"(?m)^\s*name\s*=.*$", f'name = "{study.name}_tuned"', head[0], count=1)
-    text = own + text[head.end() :]
+    # the study's own name comes before those in any table
+    text = re.sub(r"(?m)^[ \t]*name[ \t]*=.*$", f'name = "{study.name}_tuned"', study.text.rstrip(), count=1)
     for each in found:
         if each.options:
             entry = entries[each.label]

@@ -52,8 +52,9 @@ def part(file: str, title: str, found: Any) -> Part:
     frame = frame.set_axis([" ".join(map(str, c)).strip() if isinstance(c, tuple) else str(c) for c in frame], axis=1)
     columns = tuple(Column(str(c), str(c), digits(frame[c].dtype)) for c in frame)
     # what is missing in a column of a pandas type of its own is no number
-    for c in (c for c in frame if is_extension_array_dtype(frame[c].dtype)):
-        frame = frame.assign(**{str(c): frame[c].astype(object).where(frame[c].notna(), None)})
+    for c in frame:
+        if is_extension_array_dtype(frame[c].dtype):
+            frame = frame.assign(**{str(c): frame[c].astype(object).where(frame[c].notna(), None)})
     return Table(file, title, "", frame, columns)
 
 
