@@ -229,6 +229,8 @@ def settled(library_for: LibraryFor, train: tuple[Record, ...], implausible: boo
 
     def is_faulty(level: SearchLevel) -> bool:
         """Tell whether a fault of one record explains what is left, and no effect more does clearly better."""
+        if level.best.crept:
+            return False
         # It may be the fault that makes another model than the true one the best.
         asked = (mended_records(f, search.library) for f in level.fits[:MOST_FAULTY] if is_significant(level.best))
         found: list[Mended] = next(filter(None, asked), [])
@@ -248,9 +250,10 @@ def suspected_again(library_for: LibraryFor, found: "Decision", train: tuple[Rec
     """Suspect the records where what was found leaves more than noise, as `settled` does.
 
     Not where one effect more leaves noise, though it does not earn its place: that speaks for it, not against a record.
+    Nor where one of the two crept: what it leaves is no record's.
     """
     more = found.search.of_size(len(found.largest.active) + 1)[:1]
-    if found.constants is None and all(is_significant(f) for f in (found.largest, *more)):
+    if found.constants is None and all(is_significant(f) and not f.crept for f in (found.largest, *more)):
         apart = disagreeing_record([found.declared, found.largest])
         if apart is not None:
             train = tuple(r for r in train if r.file != apart.record)
@@ -392,9 +395,10 @@ def decide(search: Search) -> Decision:
 
 
 def with_curve(found: Decision) -> Decision:
-    """Look for an empirical curve beside the effects, where these leave more than noise."""
+    """Look for an empirical curve beside the effects, where these leave more than noise, and not for want of a step."""
     # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
-    if found.constants is not None or (found.refused is not None and not is_significant(found.largest)):
+    is_answered = found.refused is not None and not is_significant(found.largest)
+    if found.constants is not None or is_answered or found.largest.crept:
         return found
     missing, term = empirical_term(found.chosen, found.search)
     if term is None:

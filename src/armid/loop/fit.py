@@ -15,7 +15,7 @@ from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.design import BOX
 from armid.estimation.information import start_changes
-from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound
+from armid.estimation.least_squares import LEAST, MOST_ROUNDS, SETTLED, descend, held_by_bound, step_in_box
 from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer
 from armid.loop.whitening import WhiteRecords
 from armid.model import Model
@@ -103,6 +103,18 @@ class Fit:
         """Whether the size of the residual is that of the noise: chi2 per sample not above 1 by chance of 1 %."""
         level, n = self.records.data.levels[0], len(self.residual) - self.n_free
         return level.known and bool(fdtrc(n, level.n_slow, self.chi2 / n) > ONLY_NOISE)
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether a further step promises next to nothing of chi2; where that bends sharply, steps only creep."""
+        slope = self.jacobian.T @ self.residual
+        step = step_in_box(self.jacobian.T @ self.jacobian, slope, self.z, LEAST) - self.z
+        return float(slope @ step) <= ROUGHLY * self.chi2
+
+    @property
+    def crept(self) -> bool:
+        """Whether it holds several effects and has not arrived: a single one may creep for want of another."""
+        return len(self.active) > 1 and not self.has_arrived
 
     @cached_property
     def jacobian(self) -> Array:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import partial, reduce
 from itertools import compress
 from typing import Any, TypeVar
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import REACH, held_by_bound, spread_starts
-from armid.loop.candidates import Active, EffectKey, Library, declared_keys
+from armid.estimation.least_squares import REACH, descend, held_by_bound, spread_starts
+from armid.loop.candidates import Active, EffectKey, Library, declared_keys, points_within
 from armid.loop.diagnose import SIGNIFICANCE, is_significant, train_residuals
 from armid.loop.equivalence import WITHIN, substitutes
 from armid.loop.fit import Comparison, Fit, behind, compare, criterion, fit_from, with_own_starts
@@ -172,6 +172,10 @@ class Search:
         """
         size = len(last.best.active) + 1
         quiet = QUIET if size <= THOROUGH else SIGNIFICANCE
+        if last.best.crept:
+            what = " + ".join(last.best.names)
+            self.note_round(size, f"the fit of {what} creeps and does not arrive: no further effect can be judged")
+            return None
         if last.best.active and (p := train_residuals(last.best).diagnosis.p) > quiet and not self.is_clear(last.best):
             self.note_round(size, f"what is left is noise (chance {p:.2g}; below {quiet:g} the search goes on)")
             return None
@@ -190,7 +194,8 @@ class Search:
             return None
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
             return None
-        if size <= THOROUGH or self.judged(self.of_size(size), smaller).earned:
+        is_thorough = size <= THOROUGH or self.judged(self.of_size(size), smaller).earned
+        if is_thorough and not self.of_size(size)[0].crept:
             self.exchange(size, last.best)
         # An exchange may have found a better model of the size before.
         smaller = self.of_size(size - 1)[0] if size - len(smaller.active) == 1 else smaller
@@ -456,7 +461,14 @@ def fit_near(active: Active, values: Mapping[str, float], library: Library) -> F
 
 
 def finished(fit: Fit, library: Library) -> Fit:
-    return accurate(fit_from(fit.records, fit.active, [fit.z]), library)
+    """Return the fit at its estimate; where it crept there and has shapes set free, the better one by continuation."""
+    done = accurate(fit_from(fit.records, fit.active, [fit.z]), library)
+    shapes = {name for key in fit.active if key.free_shape for name in library.fixed_shapes(key)}
+    if not shapes or done.has_arrived:
+        return done
+    starts = continued(done, shapes)
+    again = unless_diverged(lambda: accurate(fit_from(done.records, fit.active, starts), library)) if starts else None
+    return done if again is None or done.chi2 < again.chi2 else again
 
 
 def finished_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
@@ -476,6 +488,35 @@ def accurate(fit: Fit, library: Library) -> Fit:
 # Shares of their range from which all shapes begin; then each alone from the best of so many places along its range:
 # the best period of a sampled control is a narrow one; of what is no time an eighth of them will do.
 STARTS, N_PLACES = (0.03, 0.5), 384
+# Values at which a shape is held in turn where a fit only crept, and the fall of chi2 in a step that leads on from one.
+N_HELD, LEADING = 8, 1e-2
+
+
+def continued(fit: Fit, shapes: Set[str]) -> list[Array]:
+    """Return for each shape that is no time the best estimate with it held in turn from its largest value to its least.
+
+    Each begins where the last one ended, the other shapes held as they are: over a wide sign chi2 is smooth, and leads
+    to where steps over a narrow one would only creep (continuation).
+    """
+    records, space = fit.records, fit.records.space
+    names = np.array(space.free_names)
+    is_shape = np.isin(names, list(shapes))
+    starts = []
+    for place in np.flatnonzero(is_shape):
+        if records.model.parameters[names[place]].unit == "s":
+            continue
+        z, found = fit.z.copy(), []
+        low, high = space.low[space.free][place], space.high[space.free][place]
+        for value in points_within(low, high, N_HELD)[::-1]:
+            z[place] = (value - low) / (high - low)
+            values = zip(names[is_shape], records.values(z)[is_shape], strict=True)
+            held = reduce(lambda there, shape: there.with_fixed(*shape), values, space)
+            posed = replace(records, space=held)
+            if np.isfinite(posed.chi2(z[~is_shape])[0]):
+                z[~is_shape] = descend(posed, [z[~is_shape]], LEADING)
+            found.append((float(posed.chi2(z[~is_shape])[0]), z.copy()))
+        starts.append(min(found, key=lambda one: one[0])[1])
+    return starts
 
 
 def freed(active: Active, key: EffectKey) -> Active:
