@@ -181,22 +181,24 @@ def close_loop(
     if implausible:
         verdicts = (IMPLAUSIBLE, UNEXPLAINED)
     advice = advice_for(found.contest, found.largest, campaign.gyro_range, threads, told)
+    suspects += broken_suspects(campaign.records)
+    if withdrawn is not None:  # what is told from here on is of the declared model
+        found = replace(found, chosen=found.declared, rivals=(), missing=None, term=None, equal=())
+        steps, after = (), before
     every = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
     }  # fmt: skip
-    suspects += broken_suspects(campaign.records)
     # Not of a curve: its kinks spoil the slopes, and what scales it is no physics.
     named = next(f for f in reversed(found.path) if not any(k.is_empirical for k in f.active))
     together = known_together(named, library)
-    steps, after, term = (steps, after, found.term) if withdrawn is None else ((), before, None)
     # A record held out that is one of those to train on is none.
     screened = (*screened, *given_twice(campaign.records))
     told_first = dict.fromkeys(s.sentence for s in screened if s.kind in (*GROSS, "start", "noise", "rest", "twice"))
     said = (*told_first, *next_steps_of(found, suspects))
     return ClosedLoop(there, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
-                      () if withdrawn else found.rivals, advice, said, together, tuple(suspects), every, library,
-                      search, found.missing, term)  # fmt: skip
+                      found.rivals, advice, said, together, tuple(suspects), every, library, search, found.missing,
+                      found.term)  # fmt: skip
 
 
 def settled(library_for: LibraryFor, train: tuple[Record, ...], implausible: bool) -> Settled:
@@ -398,7 +400,7 @@ def with_curve(found: Decision) -> Decision:
     """Look for an empirical curve beside the effects, where these leave more than noise, and not for want of a step."""
     # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
     is_answered = found.refused is not None and not is_significant(found.largest)
-    if found.constants is not None or is_answered or found.largest.crept:
+    if found.constants is not None or is_answered or found.chosen.crept:
         return found
     missing, term = empirical_term(found.chosen, found.search)
     if term is None:
@@ -481,7 +483,8 @@ def is_denied(before: Judgement, after: Judgement) -> bool:
     old, new = before.holdout, after.holdout
     if old is None or new is None:
         return False
-    return new.errors.rmse > DENIED * old.errors.rmse and new.errors.rmse > OVER_NOISE * new.noise_rms
+    is_more = any(e.rmse > OVER_NOISE * new.noise_of[name] for name, e in new.errors.outputs.items())
+    return is_more and new.errors.joint_nrmse > DENIED * old.errors.joint_nrmse
 
 
 def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, members: Sequence[Fit]) -> Judgement:

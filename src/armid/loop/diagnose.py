@@ -79,10 +79,18 @@ class Residuals:
     @property
     def noise_rms(self) -> float:
         """Noise of all samples of the first output together, [its unit]."""
-        place = min(r.place for r in self.replays)
-        of = [(level.rms, len(r.measured)) for level, r in zip(self.data.levels, self.replays, strict=True)
-              if r.place == place]  # fmt: skip
-        return float(np.sqrt(sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)))
+        return next(iter(self.noise_of.values()))
+
+    @property
+    def noise_of(self) -> dict[str, float]:
+        """Noise of all samples of each output that is recorded, by its name, [its unit]."""
+        found: dict[str, float] = {}
+        for place in sorted({r.place for r in self.replays}):
+            of = [(level.rms, len(r.measured)) for level, r in zip(self.data.levels, self.replays, strict=True)
+                  if r.place == place]  # fmt: skip
+            square = sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)
+            found[self.model.plant.outputs[place].name] = float(np.sqrt(square))
+        return found
 
     @cached_property
     def memory(self) -> dict[int, float]:
@@ -315,6 +323,8 @@ def repeat_tests(seen: Residuals) -> Iterator[Finding]:
         table = np.array(parts)
         mean = table.mean(axis=0)
         lack, pure = len(parts) * float(mean @ mean), float(np.sum((table - mean) ** 2))
+        if pure == 0.0:  # a record and its copy
+            continue
         free, scatter = len(mean), (len(parts) - 1) * len(mean)
         ratio = (lack / free) / (pure / scatter)
         yield Finding("repeats", name, ratio, float(fdtrc(free, scatter, ratio)))

@@ -15,6 +15,7 @@ from armid.loop.diagnose import SIGNIFICANCE, Finding, Residuals, time_in_words
 from armid.loop.figures import candidate_figure, figures_of, record_figure
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
+    CARRIED,
     CARRIES_NOT,
     DISAGREES,
     EXPLAINED,
@@ -29,6 +30,7 @@ from armid.loop.result import (
     record_entries,
     report_of,
 )
+from armid.loop.search import CREEPS
 from armid.loop.suspects import suspect_sentence
 from armid.report.document import (
     ERROR_NOTE,
@@ -342,14 +344,37 @@ def conclusion(found: ClosedLoop) -> str:
     if found.after.fit.constants:
         return constants_sentence(found)
     names = " + ".join(found.effects)
-    unnamed = "" if all(s.claimed for s in found.steps) else " No name is claimed: others may predict as well."
     return {
-        NO_DISCREPANCY: "What the declared model leaves is noise: nothing is missing that these records could show.",
+        NO_DISCREPANCY: nothing_missing(found),
         EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(found)}.",
-        PARTLY: f"With {names} the declared model does better, but a significant discrepancy remains.{unnamed}",
+        PARTLY: f"With {names} the declared model does better, but a significant discrepancy remains."
+        f"{unclaimed(found)}{creeping(found)}",
         UNEXPLAINED: f"The declared model lacks something, but no effect of the library earns its parameters: "
-        f"{tried(found)}.",
+        f"{tried(found)}.{creeping(found)}",
     }[found.verdict]
+
+
+def nothing_missing(found: ClosedLoop) -> str:
+    if not found.after.significant:
+        return "What the declared model leaves is noise: nothing is missing that these records could show."
+    return ("What the declared model leaves on the train records is noise: nothing is missing that they could show. "
+            f"Those held out are missed by more than noise, but by less than {CARRIED:g} times, as a prediction may "
+            "be.")  # fmt: skip
+
+
+def unclaimed(found: ClosedLoop) -> str:
+    names = [s.effect for s in found.steps if not s.claimed]
+    if not names:
+        return ""
+    verb = "is" if len(names) == 1 else "are"
+    which = "No name is" if len(names) == len(found.steps) else f"{' and '.join(names)} {verb} not"
+    return f" {which} claimed: others may predict as well."
+
+
+def creeping(found: ClosedLoop) -> str:
+    """Say beside which effects the search ended as their fit creeps, "" where it did not."""
+    said = [r["refused"] for r in found.search.rounds if r["refused"].endswith(CREEPS)]
+    return f" {said[-1][0].upper()}{said[-1][1:]}." if said else ""
 
 
 def tried(found: ClosedLoop) -> str:
@@ -381,8 +406,9 @@ def constants_sentence(found: ClosedLoop) -> str:
     known = found.campaign.tolerances
     beyond = any(abs(shares[first_member(n)]) > sum(known[each] for each in members(n)) for n in moved)
     within = ", some beyond" if beyond else " within"
-    return (f"No effect is needed: with constants off{within} their tolerances ({told}) {remains(found)} on "
-            f"{judged_on(found)}{others}.")  # fmt: skip
+    lead = "Constants do what an effect would" if found.after.significant else "No effect is needed"
+    return (f"{lead}: with constants off{within} their tolerances ({told}) {remains(found)} on {judged_on(found)}"
+            f"{others}.")  # fmt: skip
 
 
 def first_member(name: str) -> str:
@@ -408,7 +434,7 @@ def carried_sentence(found: ClosedLoop) -> str:
         return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip
     assert found.before.holdout is not None
-    worse = unseen.errors.rmse / found.before.holdout.errors.rmse - 1.0
+    worse = unseen.errors.joint_nrmse / found.before.holdout.errors.joint_nrmse - 1.0
     names = " + ".join(s.effect for s in found.withdrawn.steps)
     return (f"The train records ask for {names}, but the records held out are simulated {worse:.0%} worse with it "
             f"({missed}): it is withdrawn, and the declared model stands.")  # fmt: skip
@@ -418,9 +444,10 @@ def doubtful(found: ClosedLoop) -> str:
     if found.after.fit.constants:
         return constants_sentence(found)
     if found.refused is not None:
-        rivals = found.refused.rivals
-        return (f"The declared model lacks something, but on these records {len(rivals) + 1} effects would do nearly "
-                f"as well ({found.refused.name}, {', '.join(rivals[:6])}): none is named.")  # fmt: skip
+        rivals, names = found.refused.rivals, " + ".join(found.effects)
+        lacking = f"With {names} the declared model does better, but still" if names else "The declared model"
+        return (f"{lacking} lacks something, and on these records {len(rivals) + 1} effects would do nearly as well "
+                f"({found.refused.name}, {', '.join(rivals[:6])}): none of these is named.")  # fmt: skip
     said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
     said += [f"{s.effect} cannot be told from {' or '.join(s.constants)} within tolerance"
              for s in found.steps if s.constants]  # fmt: skip
@@ -434,7 +461,7 @@ def doubtful(found: ClosedLoop) -> str:
 def partly_empirical(found: ClosedLoop) -> str:
     assert found.term is not None
     named = " + ".join(found.effects[:-1])
-    lacking = f"The declared model lacks {named}, and beside it" if named else "The declared model lacks"
+    lacking = f"With {named} the declared model does better, but lacks" if named else "The declared model lacks"
     dependence = found.term.dependence
     return (f"{lacking} something that no effect of the library explains ({tried(found)}): {found.effects[-1]} is an "
             f"empirical curve over {dependence.variable}{TIMES[dependence.factor]} at port {dependence.port}, which "
@@ -444,7 +471,7 @@ def partly_empirical(found: ClosedLoop) -> str:
 def missing_sentences(missing: Missing) -> list[str]:
     ports = ", ".join(f"{s.port} {max(s.share, 0.0):.0%}" for s in missing.signals[:MOST_PORTS])
     said = [f"A signal without a form would remove this share of the residual at port: {ports}."]
-    best = {d.variable: d for d in reversed(missing.dependences)}
+    best = {d.variable: d for d in sorted(missing.dependences, key=lambda d: d.share)}
     ranked = sorted(best.values(), key=lambda d: -d.share)[:MOST_PORTS]
     curves = ", ".join(f"{d.variable}{TIMES[d.factor]} at {d.port} {max(d.share, 0.0):.0%}" for d in ranked)
     return [*said, f"On what it depends, by the share that a curve predicts on parts left out of its fit: {curves}."]

@@ -53,9 +53,9 @@ class Term:
 def empirical_term(named: Fit, search: Search) -> tuple[Missing | None, Term | None]:
     """Recover what a model with named effects lacks, and add a term without a name where that earns its parameters.
 
-    The term stands beside the names and takes none away. It is judged as an effect is: by what is left out of the fit,
-    and where the misfit dwarfs the noise by more than a standard error of that. Returns (None, None) where nothing
-    significant is left.
+    The term stands beside the names, of which none is claimed then. It is judged as an effect is: by what is left out
+    of the fit, and where the misfit dwarfs the noise by more than a standard error of that. Returns (None, None) where
+    nothing significant is left.
     """
     if not is_significant(named):
         return None, None

@@ -99,9 +99,11 @@ def substitutes(fit: Fit, library: Library) -> list[Substitute]:
 def likest(change: Array, moved: Array, basis: Array) -> tuple[int, float, float] | None:
     """Return the activation that moves the signal most like a change, their correlation, and the amplitude that does.
 
-    None where none is near.
+    None where none is near, or there is none.
     change: (n_samples,), moved: per full strength, (n_activations, n_samples), both projected off a basis.
     """
+    if not len(moved):
+        return None
     wanted = beyond(basis, change)
     slope, square = moved @ wanted, square_beyond(basis, moved)
     with np.errstate(invalid="ignore", divide="ignore"):

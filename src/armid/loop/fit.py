@@ -113,8 +113,8 @@ class Fit:
 
     @property
     def crept(self) -> bool:
-        """Whether it holds several effects and has not arrived: a single one may creep for want of another."""
-        return len(self.active) > 1 and not self.has_arrived
+        """Whether it holds several named effects and has not arrived: a single one may creep for want of another."""
+        return sum(not key.is_empirical for key in self.active) > 1 and not self.has_arrived
 
     @cached_property
     def jacobian(self) -> Array:

@@ -99,8 +99,8 @@ class Missing:
     """Hold what is known of the signal that a model lacks.
 
     lacking: the model. signals: what would have to be added at each port, the port that removes most of the residual
-    first. segments: those to which they belong. dependences: curves over one variable, the one that predicts left-out
-    records best first.
+    first. segments: those to which they belong. dependences: curves over one variable, the one that removes most
+    first.
     """
 
     lacking: Fit

@@ -41,6 +41,7 @@ BIASED = 0.01
 RESTS_ON = 2.0
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
+CREPT = "the fit creeps and has not arrived"
 # Doubt of every value where an effect delays what the motor induces with what drives it.
 LATE = "is told of all the drive, of which a part follows the motion: were the voltage alone late, it would be another"
 # Candidates whose predicted change of the residual is drawn.
@@ -113,7 +114,9 @@ class Judgement:
         if unseen is None or self.diagnosis.significant or not unseen.diagnosis.significant:
             return False
         # what differences tell of the noise is the least that it can be
-        return unseen.errors.rmse > CARRIED * max(unseen.noise_rms, self.train_error.rmse)
+        seen = self.train_error.outputs
+        least = {n: max(rms, seen[n].rmse if n in seen else 0.0) for n, rms in unseen.noise_of.items()}
+        return any(e.rmse > CARRIED * least[n] for n, e in unseen.errors.outputs.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,6 +258,7 @@ def estimates(
             given = 0.5 * (views[0][0][name][1] - views[0][0][name][0])
             doubts_of = [REMAINS] if discrepancy else []
             doubts_of += [HELD] if held[i] else []
+            doubts_of += [CREPT] if fit.crept else []
             doubts_of += in_doubt
             doubts_of += [f"{' and '.join(late)} {LATE}"] if late else []
             if not max(value - low, high - value) <= WIDEST * abs(value):
@@ -379,7 +383,7 @@ def entries(judged: Judgement) -> dict[str, dict[str, Any]]:
             "low": finite(e.low),
             "high": finite(e.high),
             "trusted": e.trusted,
-            "interval_holds": e.low is not None and not {REMAINS, HELD} & set(e.doubts),
+            "interval_holds": e.low is not None and not {REMAINS, HELD, CREPT} & set(e.doubts),
             "given_low": finite(e.given_low),
             "given_high": finite(e.given_high),
             "trusted_given_constants": e.trusted_given_constants,

@@ -40,6 +40,8 @@ N_FREED, FREED_WITHIN = 4, 4.0
 FEWEST, MOST, FACTOR = 6, 12, 4.0
 # So many of them are refitted even where the score says that they cannot do as well as a model that is known.
 SURE = 4
+# Said of several effects beside which nothing can be told.
+CREEPS = "creeps and does not arrive: no further effect can be judged"
 # A drop of chi2 that one candidate in thousands reaches on noise: below it nothing is refitted.
 WORTH = 8.0
 # An addition whose statistic stays below this is not looked at further; one in ten thousand asks for 15.
@@ -172,12 +174,11 @@ class Search:
         """
         size = len(last.best.active) + 1
         quiet = QUIET if size <= THOROUGH else SIGNIFICANCE
-        if last.best.crept:
-            what = " + ".join(last.best.names)
-            self.note_round(size, f"the fit of {what} creeps and does not arrive: no further effect can be judged")
-            return None
         if last.best.active and (p := train_residuals(last.best).diagnosis.p) > quiet and not self.is_clear(last.best):
             self.note_round(size, f"what is left is noise (chance {p:.2g}; below {quiet:g} the search goes on)")
+            return None
+        if last.best.crept:
+            self.note_round(size, f"the fit of {' + '.join(last.best.names)} {CREEPS}")
             return None
         self.extend(last.best)
         while self.reach_further(size):
@@ -195,6 +196,8 @@ class Search:
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
             return None
         is_thorough = size <= THOROUGH or self.judged(self.of_size(size), smaller).earned
+        if self.of_size(size)[0].crept:
+            self.free_shapes(self.of_size(size)[:1])
         if is_thorough and not self.of_size(size)[0].crept:
             self.exchange(size, last.best)
         # An exchange may have found a better model of the size before.
