@@ -114,6 +114,8 @@ def main(arguments: list[str] | None = None) -> None:
         stop(f"{error.format_message()} (see --help)", BAD_INPUT)
     except OSError as error:
         stop(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}", BAD_INPUT)
+    except UnicodeEncodeError as error:
+        stop(f"{error.object[:100]!a} is no name in UTF-8, such a one is expected", BAD_INPUT)
     except MemoryError as error:
         stop(f"not enough memory: {error}; a smaller population, fewer records or shorter ones are expected", BAD_INPUT)
     except (Exception, SystemExit) as error:

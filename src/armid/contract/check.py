@@ -5,7 +5,6 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.contract.equations import check_effect, check_plant
 from armid.contract.identifier import check_identifier
@@ -15,7 +14,7 @@ from armid.errors import ArmidError
 from armid.estimation.mends import Suspicion
 from armid.estimation.screen import screen
 from armid.identifiers import as_identifier
-from armid.model import PLANTS, Effect, Model, Plant
+from armid.model import PLANTS, Array, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
 from armid.problem.problem import Replay
 from armid.problem.space import space_of
@@ -145,7 +144,6 @@ def synthetic_runs() -> "DataFrame":
     return DataFrame(rows)
 
 
-Array = NDArray[np.float64]
 INTERVAL, NOISE = 1e-3, 0.01
 
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.contract.trials import (
     ContractPoint,
@@ -23,10 +22,9 @@ from armid.contract.trials import (
 from armid.engine import FINE, along, calibrate, simulate
 from armid.engine.calibrate import difference
 from armid.errors import ArmidError
-from armid.model import PLANTS, Effect, Manoeuvre, Model, Plant, is_late_as_a_whole, refusal_of
+from armid.model import PLANTS, Array, Effect, Manoeuvre, Model, Plant, is_late_as_a_whole, refusal_of
 from armid.model.effect import Equation
 
-Array = NDArray[np.float64]
 # Shares of the size of an output: at null, and against scipy.
 NULL_TOLERANCE, REFERENCE_TOLERANCE = 1e-12, 1e-5
 N_CANDIDATES, AWAY = 16, 0.3

@@ -7,14 +7,12 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pymoo.optimize import minimize
 
 from armid.contract.trials import ContractPoint
 from armid.identifiers import Identifier
+from armid.model import Array
 from armid.problem.meter import BudgetIgnoredError, Log, Meter, Metered, MeterTermination
-
-Array = NDArray[np.float64]
 
 
 class Trial(Metered):

@@ -6,15 +6,13 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from armid.engine import probes
 from armid.errors import ArmidError
-from armid.model import Effect, Input, Manoeuvre, Model, Parameter, Plant
+from armid.model import Array, Effect, Input, Manoeuvre, Model, Parameter, Plant
 from armid.model.graph import Node
 
-Array = NDArray[np.float64]
 N_SAMPLES, INTERVAL = 401, 2e-3
 # The moment of gravity that a hanging axis gets, as a share of the effort scale.
 GRAVITY = 0.4

@@ -10,7 +10,6 @@ from functools import cached_property, partial
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky
 from scipy.special import ndtr, ndtri
 
@@ -18,8 +17,8 @@ from armid.engine import probes, simulate
 from armid.errors import ArmidError
 from armid.estimation.design import BOX, Feasible, Key, Motions, fine_schedule, manoeuvre_grid
 from armid.estimation.least_squares import LeastSquaresProblem, descend, side_by_side
+from armid.model import Array
 
-Array = NDArray[np.float64]
 Whitening = Callable[[Array], Array]
 Pair = tuple[int, int]
 Powers = Mapping[Pair, tuple[float, float]]

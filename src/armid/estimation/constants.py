@@ -11,14 +11,12 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.estimation.least_squares import LeastSquaresProblem
-from armid.model import Manoeuvre, Plant
+from armid.model import Array, Manoeuvre, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Piece, Record
 
-Array = NDArray[np.float64]
 # Relative step of the differences.
 STEP = 1e-4
 # Columns whose cosine is within this of 1 are one; a column below this share of the longest moves nothing.

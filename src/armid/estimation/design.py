@@ -6,19 +6,17 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.engine import Schedule, simulate
 from armid.engine.simulate import Simulation
 from armid.estimation.constants import with_constants
 from armid.estimation.information import Level, inverse
 from armid.estimation.least_squares import slopes_of, stencil
-from armid.model import Manoeuvre, ManoeuvreKey, Model, Plant
+from armid.model import Array, Manoeuvre, ManoeuvreKey, Model, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Record
 
-Array = NDArray[np.float64]
 Key = float | bool | str
 # Before any record the box is all that is known: variance range^2/12, so 12 of information in shares of the range.
 BOX = 12.0

@@ -21,14 +21,13 @@ from armid.estimation.information import (
 )
 from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine, with_fitted_starts
 from armid.estimation.profile import Profile, profiles
-from armid.model import Model
+from armid.model import Array, Model
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space
 from armid.problem.starts import with_starts
 from armid.record import Campaign
 from armid.report.result import IDENTIFIABILITY, Kind, Result
 
-Array = NDArray[np.float64]
 RANKINGS = (VOLUME, WORST, SHRINKAGE)
 # Of a noise that is given: the rounding of a speed is larger.
 LEAST_NOISE = 1e-15

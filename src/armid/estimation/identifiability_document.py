@@ -5,13 +5,13 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index
 from armid.estimation.identify import versions_of
 from armid.estimation.information import Level, level_weights, normalised, sensitivities
 from armid.estimation.profile import THRESHOLD, Profile
+from armid.model import Array
 from armid.report.document import (
     Column,
     Document,
@@ -29,7 +29,6 @@ from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, look, pyplot
 from armid.units import SHOWN, shown
 
-Array = NDArray[np.float64]
 PACKAGES = ("armid", "numpy", "scipy", "numba")
 MOST_OFFERS, MOST_COLUMNS, MOST_NAMED = 8, 5, 6
 # The point that was given is away from the minimum when a step there is more standard deviations than this.

@@ -19,7 +19,7 @@ from armid.estimation.information import MISFIT, Information, information_at
 from armid.estimation.least_squares import held_by_bound, with_fitted_starts
 from armid.estimation.mends import Suspicion
 from armid.identifiers import Identifier, can_run_directly, run_directly
-from armid.model import Model
+from armid.model import Array, Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
 from armid.problem.meter import LARGEST_BUDGET, BudgetIgnoredError, Meter, MeterTermination
 from armid.problem.problem import (
@@ -38,8 +38,6 @@ from armid.problem.space import Space
 from armid.record import Campaign
 from armid.report.document import finite
 from armid.report.result import IDENTIFICATION, Kind, Result
-
-Array = NDArray[np.float64]
 
 # Share of a range within which a parameter is on its bound.
 ROUNDING = 1e-12

@@ -6,10 +6,10 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.estimation.identify import Identification, errors_by_file, errors_entry, outputs_entry, versions_of
 from armid.estimation.information import collinear
+from armid.model import Array
 from armid.problem.fitness import SIMILARITIES
 from armid.problem.problem import Replay, judged_by
 from armid.report.document import (
@@ -44,7 +44,6 @@ from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, pyplot
 from armid.units import SHOWN, shown
 
-Array = NDArray[np.float64]
 MOST_FITS_DRAWN = 8
 # Letters of a title that fit above one column.
 LINE = 60

@@ -12,13 +12,13 @@ from armid.engine import simulate
 from armid.errors import ArmidError
 from armid.estimation.constants import with_constants
 from armid.estimation.least_squares import LEAST, LeastSquaresProblem, WeightedRecords, step_in_box
+from armid.model import Array
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.problem.starts import by_file
 from armid.record.noise import correlation_sum, new_share
 from armid.record.record import NOISE_FREE, Noise
 
-Array = NDArray[np.float64]
 NORMAL_95 = 1.959963984540054
 # Directions whose information is below this share of the strongest cannot be told from nothing.
 SINGULAR = 1e-13

@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 
 from armid.engine import probes
 from armid.errors import ArmidError
-from armid.model import Model
+from armid.model import Array, Model
 from armid.problem.problem import Replay, output_sizes, signals_of
 from armid.problem.space import Space
 from armid.problem.starts import fits_starts, likely_candidate, with_starts
 
-Array = NDArray[np.float64]
 S = TypeVar("S")
 T = TypeVar("T")
 # Step of the differences, as a share of the range: above rounding, below curvature.

@@ -6,15 +6,13 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.estimation.constants import of_pieces, with_constants
 from armid.estimation.design import range_of
-from armid.model import Manoeuvre, ManoeuvreKey, Plant
+from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record
 from armid.record.start import Track, state_shown
 
-Array = NDArray[np.float64]
 DEGREES, ANGULAR = 180.0 / np.pi, "angular"
 FACTORS = {
     -1.0: ("sign", "its sign looks inverted: with the other one"),

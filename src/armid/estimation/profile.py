@@ -4,13 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.estimation.information import NORMAL_95, inverse
 from armid.estimation.least_squares import LeastSquaresProblem, fit
+from armid.model import Array
 
-Array = NDArray[np.float64]
 # chi2 of one degree of freedom at 95 %.
 THRESHOLD = NORMAL_95**2
 # The ends of an interval by curvature and by profile disagree when they differ by more than this share of its half.

@@ -17,7 +17,7 @@ from armid.engine import Calibration, Schedule, probes
 from armid.estimation.constants import of_pieces, with_constants
 from armid.estimation.least_squares import WeightedRecords, descend
 from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, rms
-from armid.model import Manoeuvre, Model, Plant
+from armid.model import Array, Manoeuvre, Model, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
@@ -26,7 +26,6 @@ from armid.record.noise import correlation_sum
 from armid.record.table import POSITIONS
 from armid.units import shown
 
-Array = NDArray[np.float64]
 # An error (rms over the rms of the signal) up to this is the business of missing effects, not of this screen.
 TOLERABLE = 0.1
 # What undoing a mistake must leave of the error, and of what it may be told to be one of several.

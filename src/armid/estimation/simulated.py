@@ -7,19 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.engine import accuracy_against, calibrate, simulate
-from armid.errors import ArmidError, nearest
-from armid.model import Model, Output
+from armid.errors import ArmidError, nearest, quoted
+from armid.model import Array, Model, Output
 from armid.record import Campaign, Override, Piece, Record, write_table
 from armid.report.document import Document, Figure, Section, listed, record_axes, table
 from armid.report.result import NewFiles, Shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,7 +78,13 @@ class SimulatedCampaign(Shown):
         return figure
 
     def save(self, folder: str | Path) -> list[str]:
-        """Write a CSV file a record, all or none, and return their names."""
+        """Write a CSV file a record, all or none, and return their names.
+
+        Raises ArmidError for the folder of the campaign, whose records would be lost.
+        """
+        if Path(folder).resolve() == self.campaign.folder.resolve():
+            raise ArmidError(f"{quoted(str(folder))} is the folder of the campaign, whose records would be lost: "
+                             "another one is expected")  # fmt: skip
         with NewFiles(Path(folder)) as files:
             for file, each in self.tables.items():
                 write_table(files.path(file), each)

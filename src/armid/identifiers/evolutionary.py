@@ -54,6 +54,9 @@ class PymooAlgorithm:
         refuse_unknown(options, self.options, f"'{self.name}'")
         given = {"pop_size": self.pop_size} | options
         checked_values = {option: self.options[option](option, value) for option, value in given.items()}
+        if self.name == "de" and checked_values.get("n_offsprings", 0) > checked_values["pop_size"]:
+            most, found = checked_values["pop_size"], checked_values["n_offsprings"]
+            raise ArmidError(f"option n_offsprings of 'de' is {found}, at most its pop_size of {most} is expected")
         return self.algorithm()(evaluator=SwarmEvaluator(finite=True), **checked_values)
 
     def algorithm(self) -> Any:

@@ -13,20 +13,18 @@ from itertools import chain, product
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.errors import ArmidError
 from armid.estimation.least_squares import side_by_side
 from armid.loop.whitening import WhitenedData, WhiteRecords
-from armid.model import Effect, Manoeuvre, Model, Parameter
+from armid.model import Array, Effect, Manoeuvre, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
 from armid.problem.starts import fits_starts
 from armid.record import Override, Record
 
-Array = NDArray[np.float64]
 S = TypeVar("S")
 T = TypeVar("T")
 # What the names of empirical terms begin with (no effect of a library may), and how reports show them.

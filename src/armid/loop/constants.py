@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_factors, moved_replays
@@ -25,9 +24,9 @@ from armid.loop.score_test import candidate_at
 from armid.loop.search import Search, unless_diverged
 from armid.loop.suspects import FREED, Suspect, is_earned, simulated_file, with_measured
 from armid.loop.whitening import WhiteRecords
+from armid.model import Array
 from armid.record import Record
 
-Array = NDArray[np.float64]
 # So many single products are refitted, of those that take away this share of what is no noise.
 MOST, HALF = 6, 0.5
 # In tolerances: how far a fit may go, so that no bound bars its way (seen: it crept along one to the last step allowed,

@@ -16,12 +16,11 @@ from armid.estimation.information import start_changes
 from armid.loop.candidates import Library, calibrated_replays
 from armid.loop.fit import Fit, beyond, decomposed
 from armid.loop.whitening import WhitenedData, WhiteRecords, whitened, with_samples
-from armid.model import Model
+from armid.model import Array, Model
 from armid.problem.problem import Replay
 from armid.record import Record
 from armid.record.noise import memory_of
 
-Array = NDArray[np.float64]
 # Chance of a false alarm, all tests together.
 SIGNIFICANCE = 0.01
 # Below this no number of tests makes up for it.

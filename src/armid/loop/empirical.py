@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.loop.candidates import UNNAMED, EffectKey, Library, joined
@@ -25,7 +24,6 @@ from armid.loop.score_test import free_values
 from armid.loop.search import Search, unless_diverged
 from armid.model import Effect, Model, Parameter
 
-Array = NDArray[np.float64]
 # Variables that a compiled term can choose from; factor of a curve -> the parameter that chooses it.
 SLOTS = 8
 FACTORS = {"1": "one", "direction": "direction", "drive_effort": "driven"}

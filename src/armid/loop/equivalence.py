@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.loop.candidates import CONSTANT, EffectKey, Library, activation_grid, declared_keys
 from armid.loop.fit import Fit, behind, beyond, decomposed
 from armid.loop.score_test import at_null, responses, square_beyond
+from armid.model import Array
 
-Array = NDArray[np.float64]
 # Rivals whose refits differ by less than this in the criterion are one group; so many of them are too many to name.
 WITHIN, MOST = 6.0, 4
 # A candidate whose response correlates below this is no substitute; so many are worth a fit.

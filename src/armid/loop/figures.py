@@ -6,16 +6,15 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
+from armid.model import Array
 from armid.report.document import points, record_axes, small_axes
 from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, pyplot
 from armid.units import shown
 
-Array = NDArray[np.float64]
 LOOKS = (("before", OKABE_ITO["vermilion"], -0.12), ("after", OKABE_ITO["blue"], 0.12))
 AFTER = OKABE_ITO["blue"]
 KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}

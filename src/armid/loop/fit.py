@@ -18,10 +18,9 @@ from armid.estimation.information import start_changes
 from armid.estimation.least_squares import LEAST, MOST_ROUNDS, SETTLED, descend, held_by_bound, step_in_box
 from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer
 from armid.loop.whitening import WhiteRecords
-from armid.model import Model
+from armid.model import Array, Model
 from armid.problem.starts import fits_starts, with_starts
 
-Array = NDArray[np.float64]
 Part = NDArray[np.int64]
 # Relative change of the sum of squares at which a fit stops: far below the 1 that means anything in 10,000 samples.
 TOLERANCE, ROUGHLY = 1e-7, 1e-3

@@ -6,7 +6,6 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from armid.engine import Schedule, Simulation, along, simulate
@@ -15,12 +14,11 @@ from armid.loop.candidates import EffectKey, Library
 from armid.loop.diagnose import variable_names
 from armid.loop.fit import Fit, beyond
 from armid.loop.score_test import candidate_at, free_values
-from armid.model import Effect, Model, Parameter
+from armid.model import Array, Effect, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Piece
 
-Array = NDArray[np.float64]
 # A signal without a form is sought at so many knots in all: its cost grows with their square.
 MOST_KNOTS = 600
 KNOT_S, MOST_KNOTS_OF_A_PIECE = 0.02, 240

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.estimation.advice import Advice
 from armid.estimation.constants import columns_of
@@ -21,13 +20,12 @@ from armid.loop.missing_signal import Missing
 from armid.loop.score_test import Score, rest_of, score
 from armid.loop.search import Search
 from armid.loop.suspects import Suspect
-from armid.model import Model, is_late_as_a_whole
+from armid.model import Array, Model, is_late_as_a_whole
 from armid.problem.problem import Replay
 from armid.record import Campaign
 from armid.report.document import curve_entry, finite
 from armid.report.result import LOOP, Kind, Result
 
-Array = NDArray[np.float64]
 IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
     "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
     "partly_explained", "unexplained", "cannot_tell_apart",

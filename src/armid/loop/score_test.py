@@ -4,14 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from armid.loop.candidates import Activation, EffectKey, Library, activation_grid, idle
 from armid.loop.fit import UNTOLD, Fit, beyond
 from armid.loop.whitening import WhiteRecords
+from armid.model import Array
 
-Array = NDArray[np.float64]
 # A refit may start from so many points of the grid of each candidate.
 N_TRIED = 8
 # Of so many leading candidates it is asked whether they are the same to the records.

@@ -7,7 +7,6 @@ from itertools import compress
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.estimation.least_squares import REACH, descend, held_by_bound, spread_starts
@@ -17,8 +16,8 @@ from armid.loop.equivalence import WITHIN, substitutes
 from armid.loop.fit import Comparison, Fit, behind, compare, criterion, fit_from, with_own_starts
 from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
 from armid.loop.whitening import WhiteRecords
+from armid.model import Array
 
-Array = NDArray[np.float64]
 Trial = Callable[[], Fit]
 T = TypeVar("T")
 MOST_EFFECTS = 6

@@ -10,7 +10,6 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from armid.errors import ArmidError
@@ -20,13 +19,12 @@ from armid.loop.diagnose import holdout_residuals, is_significant, train_residua
 from armid.loop.fit import FAMILYWISE, Fit, beyond, decomposed, fit_from, with_own_starts
 from armid.loop.search import start_of, unless_diverged
 from armid.loop.whitening import WhiteRecords, with_samples
-from armid.model import Model, Plant
+from armid.model import Array, Model, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Piece, Record
 from armid.record.broken import broken_samples
 from armid.units import shown
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 FREED, LEFT_OUT, REPORTED = "freed", "left_out", "reported"
 # Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),

@@ -17,13 +17,12 @@ from scipy.signal import lfilter
 
 from armid.estimation.information import MISFIT
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
-from armid.model import Plant
+from armid.model import Array, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Record
 from armid.record.broken import sound_samples
 from armid.record.noise import correlation_sum, new_share
 
-Array = NDArray[np.float64]
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 LEAST_NOISE = 5e-5
 MOST_TERMS, FEWEST_FOR_COLOUR, LAGS = 8, 50, 500

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armid.errors import ArmidError, nearest
+from armid.model import Array
 
-Array = NDArray[np.float64]
 SERIES = ("measured", "simulated")
 OF_RECORD = ("interval", "noise")
 JOINS = ("duration", "samples", "sum")

@@ -5,16 +5,15 @@ import hashlib
 import os.path
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.engine import FINE, Schedule, calibrate, simulate
 from armid.errors import ArmidError, quoted
-from armid.model import Manoeuvre, Model, Plant
+from armid.model import Array, Manoeuvre, Model, Plant
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, SuiteProblem
 from armid.record import Campaign, Noise, Override, Piece, Record, read_campaign
@@ -30,9 +29,8 @@ from armid.study.spec import (
     StudySpec,
     SuiteSpec,
 )
+from armid.units import DEGREE
 
-Array = NDArray[np.float64]
-DEGREE = np.pi / 180.0
 MOST_SAMPLES = 10**7
 KNOWN = "known"
 # Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
@@ -95,6 +93,12 @@ def suite_cases(spec: StudySpec, where: str, train: bool = False) -> list[Case]:
     wanted = validated(SuiteSpec, spec.suite, where)
     if spec.plant != "shell_transfer_arm" or spec.effects:
         raise ArmidError(f"{where}: the suite brings its effects, plant 'shell_transfer_arm' without any is expected")
+    ignored = ("noise_deg_s", "windows_s", "interval_s", "accuracy", "constants", "bounds", "fixed")
+    plain = {f.name: f.default if f.default is not MISSING else {} for f in fields(StudySpec) if f.name in ignored}
+    given = [name for name in ignored if getattr(spec, name) != plain[name]]
+    if given and not spec.cases and spec.random_cases is None:
+        raise ArmidError(f"{where}: '{given[0]}' is given, but a problem of the suite brings its own, no such key is "
+                         "expected")  # fmt: skip
     for pattern in wanted.problems:
         if not fnmatch.filter(DEFINITIONS, pattern):
             raise unknown_name("problem", pattern, DEFINITIONS, where)

@@ -141,8 +141,10 @@ def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
     is_paper = overview.frame["variant"] == PAPER
     ours, paper = overview.frame[~is_paper], overview.frame[is_paper]
     said = []
+    known = ours.dropna(subset="largest_median")  # not where no truth is known, or each run failed
+    settings = [s for s in settings if s in set(known["setting"])]
     for setting in settings[:MOST_SETTINGS]:
-        own = ours[ours["setting"] == setting]
+        own = known[known["setting"] == setting]
         best = own.loc[own["largest_median"].idxmin()]
         said.append(f"{setting}: {best['variant']}, median largest error of a run {percent(best['largest_median'])}, "
                     f"95 % of its {best['n']} runs within {percent(best['largest_p95'])}")  # fmt: skip

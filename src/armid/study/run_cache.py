@@ -15,8 +15,9 @@ from armid.problem.space import Space, space_of
 from armid.problem.suite import VERSION, suite
 from armid.record import Campaign, Record
 from armid.record.reader import NAME
-from armid.study.cases import DEGREE, campaign_folder, clean_records, in_window, noisy_records, unchanged_campaign
+from armid.study.cases import campaign_folder, clean_records, in_window, noisy_records, unchanged_campaign
 from armid.study.spec import StudyRegistry, lookup
+from armid.units import DEGREE
 
 # How many cases, each at one level of noise and in one window, are kept ready in a process.
 MOST_KEPT = 512

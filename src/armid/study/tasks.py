@@ -12,7 +12,8 @@ have name, kind, folder of their file, registry, case_names (what they are tried
 import errno
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -210,6 +211,7 @@ class Study:
     def check(self, performed: Performer) -> None:
         """Simulate each case's truth once: the model is compiled and the machine moves; build identifiers of the user.
 
+        Refuse a run that is asked for twice, as the plan would hold it once.
         performed: performs a run in a process of its own, which what a user's function does cannot harm.
         """
         for entry in self.entries:
@@ -219,6 +221,12 @@ class Study:
                 outcome = performed(ClaimedRun(entry.label, json.dumps(settings)))
                 if outcome.status == FAILED:
                     raise ArmidError(f"identifier '{entry.label}': it cannot be built: {outcome.error}")
+        asked: set[str] = set()
+        for run in self.plan({entry.seeds[0] for entry in self.entries}):
+            if run.run in asked:
+                raise ArmidError(f"case '{run.case}', identifier '{run.identifier}': the same run is asked for twice "
+                                 f"(fitness {run.fitness}, window {run.window}), each once is expected")  # fmt: skip
+            asked.add(run.run)
         for case in self.cases:
             if case.source is None and case.suite is None:
                 try:
@@ -228,11 +236,15 @@ class Study:
 
     def cost(self) -> str:
         """Return in words what all runs need: simulations, and on a suite the time of the engine, measured here."""
-        runs, problem_of = list(self.plan()), {case.name: case.suite for case in self.cases}
-        total = f"{len(runs):,} runs, {sum(run.budget for run in runs):,} simulations at most in all"
+        problem_of, budgets = {case.name: case.suite for case in self.cases}, Counter[str]()
+        n_runs = 0
+        for run in self.plan():
+            n_runs += 1
+            budgets[run.case] += run.budget
+        total = f"{n_runs:,} runs, {budgets.total():,} simulations at most in all"
         if not all(problem_of.values()):
             return total
-        seconds = sum(run.budget * first_of(p.problem_name).cost_s for run in runs if (p := problem_of[run.case]))
+        seconds = sum(n * first_of(p.problem_name).cost_s for case, n in budgets.items() if (p := problem_of[case]))
         return (f"{total}; they take the engine about {seconds / 60.0:.3g} min of one processor, to which comes what "
                 "the identifiers themselves need")  # fmt: skip
 
@@ -260,13 +272,18 @@ class Study:
             "published": {case.name: dict(case.published) for case in self.cases if case.published},
         }
 
-    def plan(self) -> Iterator[Planned]:
-        """Yield the runs, seed by seed, so that a study that is broken off has tried everything about equally often."""
+    def plan(self, only: Set[int] | None = None) -> Iterator[Planned]:
+        """Yield the runs, seed by seed, so that a study that is broken off has tried everything about equally often.
+
+        only: some of the seeds, None: all.
+        """
         shared = {case.name: self._case_settings(case) for case in self.cases}
-        for seed in sorted({seed for entry in self.entries for seed in entry.seeds}):
+        seeds = [(entry, frozenset(entry.seeds)) for entry in self.entries]
+        every = frozenset[int]().union(*(own for _, own in seeds))
+        for seed in sorted(every if only is None else every & only):
             for case in self.cases:
-                for entry in self.entries:
-                    if seed in entry.seeds:
+                for entry, own in seeds:
+                    if seed in own:
                         yield from self._runs(case, shared[case.name], entry, seed)
 
     def _runs(self, case: Case, shared: dict[str, Any], entry: Entry, seed: int) -> Iterator[Planned]:

@@ -163,7 +163,10 @@ def tuned_study(study: Study, found: list[Tuned]) -> str:
             entry = entries[each.label]
             options = ", ".join(f"{name} = {value!r}" for name, value in each.options.items())
             text += f'\n\n[[identifiers]]\nname = "{entry.name}"\n'
-            text += f"label = {json.dumps(f'{each.label}, tuned', ensure_ascii=False)}\n"
+            label = f"{each.label}, tuned"
+            while label in entries:  # of a study that was tuned before
+                label += " again"
+            text += f"label = {json.dumps(label, ensure_ascii=False)}\n"
             text += f"budget = {entry.budget}\n" if entry.budget != spec.budget else ""
             if entry.per_parameter != spec.budget_per_parameter:
                 text += f"budget_per_parameter = {list(entry.per_parameter)}\n"

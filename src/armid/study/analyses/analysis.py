@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pandas import DataFrame, Series
 
+from armid.model import Array
 from armid.report.document import Column, Part
 from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
 
-Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 # 51 targets, as COCO takes, five a decade: largest relative errors of the parameters from 100 % to 1e-8 %, and shares
 # of the way from a first candidate to the best fitness that anyone found.

@@ -9,14 +9,14 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pandas import DataFrame, Series
 
+from armid.model import Array
 from armid.report.document import Column, Figure, Part, Table, Text, slug
 from armid.report.style import INK, look, pyplot
 from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
 
-Array = NDArray[np.float64]
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
 FLOOR = 1e-8
 # A critical-difference diagram of fewer cases would say little.
@@ -345,6 +345,8 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
             )
         said.append(f"{line}.")
     easy = "fewer than three: the suite is too easy" if len(winners) < 3 else "so the suite is not too easy"
+    if len(evidence.variants) < 3 or set(classes) < set(CLASSES):
+        return tuple(said)
     return (*said, f"{len(winners)} identifiers are best in some class at some budget ({', '.join(sorted(winners))}), "
             f"{easy}.")  # fmt: skip
 
