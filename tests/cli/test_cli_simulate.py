@@ -145,10 +145,19 @@ def test_steps_that_are_too_long_are_told(run, paper_arm_folder, tmp_path):
 def test_what_it_writes_is_a_campaign_s_record(run, paper_arm_folder, tmp_path):
     folder = tmp_path / "campaign"
     shutil.copytree(paper_arm_folder, folder)
-    run("simulate", folder, "--out", folder)
+    run("simulate", folder, "--out", tmp_path / "simulated")
+    shutil.copytree(tmp_path / "simulated", folder, dirs_exist_ok=True)
     record = read_campaign(folder).records[0]
     assert record.is_noise_free
     assert list(record.columns) == ["angle_rad", "current_A"]
+
+
+def test_measured_records_are_not_overwritten(refused, paper_arm_folder, tmp_path):
+    folder = tmp_path / "campaign"
+    shutil.copytree(paper_arm_folder, folder)
+    before = (folder / "lower.csv").read_bytes()
+    assert "is the folder of the campaign" in refused("simulate", folder, "--out", f"{folder}/../campaign")
+    assert (folder / "lower.csv").read_bytes() == before
 
 
 def test_a_folder_in_the_place_of_a_file_is_told(refused, paper_arm_folder, tmp_path):

@@ -117,6 +117,11 @@ def test_asked_and_told_by_hand(name: str) -> None:
     np.testing.assert_array_equal(np.concatenate(problem.batches), np.concatenate(again.batches))
 
 
+def test_offspring_of_differential_evolution_are_no_more_than_its_population() -> None:
+    with pytest.raises(ArmidError, match="n_offsprings of 'de' is 60, at most its pop_size of 40 is expected"):
+        IDENTIFIERS["de"].with_options({"n_offsprings": 60}).build(200)
+
+
 def test_what_minimize_would_swallow_is_refused() -> None:
     with pytest.raises(ArmidError, match="no option 'sede', did you mean 'seed'"):
         minimize(Bowl(), identifier("bobyqa").build(10), sede=3)

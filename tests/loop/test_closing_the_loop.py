@@ -1,6 +1,8 @@
 """The loop on records of the independent test stand: it names what was put in, and nothing where nothing was."""
 
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,11 +10,14 @@ from few_candidates import CANDIDATES, COMMON, TRUTH, garbage
 
 from armid.errors import ArmidError
 from armid.estimation.constants import moved_record
-from armid.loop import close_loop, report_of
+from armid.loop import Judgement, close_loop, report_of
 from armid.loop.document import conclusion
+from armid.loop.search import CREEPS
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 from armid.record.campaign import tolerances_of
+
+is_denied = sys.modules[close_loop.__module__].is_denied
 
 pytestmark = pytest.mark.slow
 
@@ -196,3 +201,45 @@ def test_what_says_the_same_in_other_words_is_one_group(stand):
     assert found.verdict == "cannot_tell_apart"
     assert "drive_gain" in (found.steps[0].effect, *found.steps[0].alternatives)
     assert len(found.steps[0].alternatives) > 0
+
+
+def concluded(verdict, effects=(), claimed=(), refused=None, rounds=()):
+    """Return what is said first of a loop that ended with a verdict and left more than noise."""
+    steps = [SimpleNamespace(effect=e, claimed=e in claimed, alternatives=(), constants=()) for e in effects]
+    after = SimpleNamespace(fit=SimpleNamespace(constants={}), significant=True)
+    search = SimpleNamespace(fits={}, rounds=[{"refused": each} for each in rounds])
+    return conclusion(SimpleNamespace(
+        verdict=verdict, term=None, effects=effects, steps=steps, after=after, search=search, refused=refused,
+        campaign=SimpleNamespace(holdout=()), rivals=(),
+    ))  # fmt: skip
+
+
+def test_what_is_said_first_is_what_the_tests_say():
+    missed = concluded("no_discrepancy")
+    assert "on the train records is noise" in missed
+    assert "held out are missed by more than noise, but by less than 1.1 times" in missed
+    assert concluded("partly_explained", ("a", "b")).endswith("No name is claimed: others may predict as well.")
+    assert concluded("partly_explained", ("a", "b"), "a").endswith("b is not claimed: others may predict as well.")
+    crept = concluded("unexplained", rounds=("", f"the fit of a + b {CREEPS}"))
+    assert crept.endswith("The fit of a + b creeps and does not arrive: no further effect can be judged.")
+    group = SimpleNamespace(name="c", rivals=("d", "e"))
+    beside = concluded("cannot_tell_apart", ("a", "b"), refused=group)
+    assert beside.startswith("With a + b the declared model does better, but still lacks something")
+    assert beside.endswith("3 effects would do nearly as well (c, d, e): none of these is named.")
+
+
+@pytest.mark.parametrize(("speed", "is_denied_then"), [(1.0, False), (3.0, True)])
+def test_any_output_that_is_held_out_may_deny(speed, is_denied_then):
+    """rmse of the angle, whose noise is 1, and of the speed."""
+
+    def seen(angle, speed):
+        outputs = {name: SimpleNamespace(rmse=rmse) for name, rmse in (("angle", angle), ("speed", speed))}
+        errors = SimpleNamespace(outputs=outputs, joint_nrmse=float(np.hypot(angle, speed)))
+        quiet = SimpleNamespace(significant=False)
+        return SimpleNamespace(errors=errors, noise_of={"angle": 1.0, "speed": 1.0}, diagnosis=quiet)
+
+    before, after = seen(1.0, 1.0), seen(1.0, speed)
+    after.diagnosis.significant = True
+    judged = Judgement(None, None, (), before, after)
+    assert judged.fails_to_carry_over is is_denied_then
+    assert is_denied(Judgement(None, None, (), before, before), judged) is is_denied_then

@@ -14,7 +14,7 @@ from armid.loop import search as search_of
 from armid.loop.candidates import EffectKey, Library, library_of
 from armid.loop.close_loop import Decision, unless_belied
 from armid.loop.constants import ConstantModel, is_outdone
-from armid.loop.equivalence import substitutes
+from armid.loop.equivalence import likest, substitutes
 from armid.loop.fit import Comparison
 from armid.loop.search import Search, SearchLevel, best_along, finished, with_free_shapes
 from armid.loop.suspects import is_earned, is_next_to_nothing
@@ -302,6 +302,10 @@ def test_next_to_nothing_is_left_only_of_what_was_clearly_more_than_noise():
     assert not is_next_to_nothing(5020.0, 6000.0, 5000)
     assert not is_next_to_nothing(4844.0, 4910.0, 5000)
     assert not is_next_to_nothing(4990.0, 5200.0, 5000)
+
+
+def test_what_has_no_strength_is_no_substitute():
+    assert likest(np.ones(3), np.empty((0, 3)), np.empty((3, 0))) is None
 
 
 def test_keys_and_what_they_own():

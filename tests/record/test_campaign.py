@@ -8,6 +8,7 @@ import pytest
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Effect, Parameter
 from armid.record import Override, read_campaign, write_campaign
+from armid.record.campaign import first_of
 from armid.record.table import read_table
 
 DEGREE = np.pi / 180
@@ -64,6 +65,10 @@ def test_folder_and_file_read_alike(write_two):
     assert [r.file for r in by_folder.train] == ["lower.csv"]
     assert [r.file for r in by_folder.holdout] == ["empty.csv"]
     assert by_folder.holdout[0].repeat_of == "lower.csv"
+
+
+def test_a_repeat_of_a_repeat_is_one_of_the_first():
+    assert first_of("c.csv", {"c.csv": "b.csv", "b.csv": "a.csv"}, "") == "a.csv"
 
 
 def test_samples_before_zero_are_rest(write_two, arm_columns):

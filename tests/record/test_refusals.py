@@ -158,6 +158,10 @@ TOML = {
     "parameter without table": (GOOD + "[parameters]\np0 = 3.0", ["'parameters.p0' is 3.0", "table"]),
     "repeat of nothing": (GOOD + 'repeat_of = "lowr.csv"', ["repeat_of 'lowr.csv'", "another record"]),
     "repeat of itself": (GOOD + 'repeat_of = "lower.csv"', ["repeat_of 'lower.csv'", "there is none"]),
+    "repeats in a circle": (
+        GOOD + 'repeat_of = "b.csv"' + ENTRY.replace("lower.csv", "b.csv") + 'repeat_of = "lower.csv"',
+        ["circle", "'lower.csv', 'b.csv', 'lower.csv'"],
+    ),
     "same file twice": (GOOD + ENTRY, ["'lower.csv'", "two records"]),
     "same file by another name": (GOOD + ENTRY.replace("lower.csv", "./lower.csv"), ["'./lower.csv'", "two records"]),
     "missing file": (GOOD.replace("lower.csv", "lowre.csv"), ["'lowre.csv' does not exist", "mean 'lower.csv'"]),

@@ -48,6 +48,7 @@ REFUSED = [
     ("[[0.0, 0.3]]", "[[0.3, 0.0]]", "window [0.3, 0] holds"),
     ("start_angle_deg = -48.0", "start_angle_deg = -60.0", "case 'row 1', manoeuvre 1: start_angle_deg is -60"),
     ('"row 5"', '"row 1"', "case 'row 1' is there twice"),
+    ('fitness = "rmse"', 'fitness = ["rmse", "rmse"]', "the same run is asked for twice (fitness rmse, window"),
     ('"row 5"', '"row/5"', "the name of case 'row/5' holds '/'"),
     ('name = "pso+least_squares"', 'name = "random"',
      "identifier 'random' is there twice with the same fitness, noise and seeds"),

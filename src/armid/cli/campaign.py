@@ -36,7 +36,7 @@ from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_un
 
 
 @command("simulate", epilog=examples(
-    "armid simulate studies/campaigns/paper_arm --set p0=3.1e6 --out results/simulated",
+    "armid simulate studies/campaigns/paper_arm --set p0=3.1e6 --out out/simulated",
     "armid simulate CAMPAIGN --effects coulomb --set coulomb.level=40 --out DIR",
 ))  # fmt: skip
 @campaign_argument
@@ -76,7 +76,7 @@ DEFAULT = (
 
 
 @command("identify", epilog=examples(
-    "armid identify studies/campaigns/paper_arm --out results/paper_arm",
+    "armid identify studies/campaigns/paper_arm --out out/paper_arm",
     "armid identify studies/campaigns/paper_arm --paper",
     "armid identify CAMPAIGN --identifier least_squares --fitness likelihood",
     "armid identify CAMPAIGN --effects coulomb --bounds coulomb.level=0:80 --fix n=1.4",
@@ -155,8 +155,8 @@ def progress_bar() -> Iterator[Callable[[Any], None]]:
 
 
 @command("identifiability", short_help="Say how well the records pin down the parameters.", epilog=examples(
-    "armid identifiability studies/campaigns/paper_arm --window 0:0.7 --out results/identifiability",
-    "armid identifiability CAMPAIGN --from results/paper_arm/result.json --rank worst",
+    "armid identifiability studies/campaigns/paper_arm --window 0:0.7 --out out/identifiability",
+    "armid identifiability CAMPAIGN --from out/paper_arm/result.json --rank worst",
 ))  # fmt: skip
 @problem_options
 @click.option(
@@ -218,7 +218,7 @@ PROGRESS = "progress.jsonl"
 
 
 @command("close-loop", short_help="Find the effects that the declared model lacks.", epilog=examples(
-    "armid close-loop studies/campaigns/four_strokes --out results/four_strokes",
+    "armid close-loop studies/campaigns/four_strokes --out out/four_strokes",
     "armid close-loop CAMPAIGN --out DIR --candidates coulomb,viscous,stribeck",
     "armid close-loop CAMPAIGN --out DIR --plugin mine.py:my_drag",
 ))  # fmt: skip

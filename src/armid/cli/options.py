@@ -127,8 +127,8 @@ def tell(text: str) -> None:
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
 plugin_option = click.option(
     "--plugin", "plugins", multiple=True, metavar="FILE.py:attribute",
-    help="Register your own plant, effect, fitness or identifier. This runs the Python code of the file, so name only "
-    "files that you trust; campaigns and studies never run code. Repeatable.",
+    help="Register your own plant, effect, fitness, identifier or analysis. This runs the Python code of the file, so "
+    "name only files that you trust; campaigns and studies never run code. Repeatable.",
 )  # fmt: skip
 effects_option = click.option(
     "--effects", default="", metavar="NAME,NAME[:FORM]", help="Effects to add to those that the campaign declares."

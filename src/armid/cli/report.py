@@ -46,7 +46,7 @@ STUDY, PAGE = "study.sqlite", "report.html"
 
 
 @command("report", short_help="Write the page of stored results.", epilog=examples(
-    "armid report results/table1_short", "armid report results/four_strokes",
+    "armid report out/table1_short", "armid report out/four_strokes",
 ))  # fmt: skip
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--key", type=click.Path(path_type=Path), metavar="FILE",
@@ -87,7 +87,7 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
 
     results = load_study(folder)
     named = [word for plugin in plugins for word in ("--plugin", plugin)]
-    again = shlex.join(["armid", "report", f"results/{results.study['name']}", *named])
+    again = shlex.join(["armid", "report", f"out/{results.study['name']}", *named])
     analyses, place = load_registry(plugins).analyses, results.path.parent
     for plugin in plugins:
         if plugin not in results.study["plugins"] and load_plugin(plugin)[0] != "analyses":

@@ -23,9 +23,9 @@ dask_option = click.option(
 
 
 @command("study", short_help="Run what is missing of a study.", epilog=examples(
-    "armid study studies/table1_short.toml",
-    "armid study studies/table1.toml --jobs 2 --only 'row 1/pso*'",
-    "armid study mine.toml --plugin mine.py:my_search --out results/mine",
+    "armid study studies/table1_short.toml --out out/table1_short",
+    "armid study studies/table1.toml --jobs 2 --only 'row 1/pso*' --out out/table1",
+    "armid study mine.toml --plugin mine.py:my_search --out out/mine",
 ))  # fmt: skip
 @click.argument("study", type=click.Path(path_type=Path))
 @jobs_option

@@ -63,7 +63,7 @@ def export_group() -> None:
     """Write stored results in the formats of other programs."""
 
 
-@export_group.command("ioh", epilog=examples("armid export ioh results/table1 results/ioh"))
+@export_group.command("ioh", epilog=examples("armid export ioh out/table1 out/ioh"))
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.argument("out", metavar="OUT", type=click.Path(path_type=Path))
 def ioh_command(folder: Path, out: Path) -> None:
