@@ -128,9 +128,11 @@ def test_beside_a_fit_that_creeps_nothing_is_exchanged_and_nothing_more_is_looke
     monkeypatch.setattr(Search, "extend", lambda *_: None)
     monkeypatch.setattr(Search, "reach_further", lambda *_: False)
     monkeypatch.setattr(Search, "judged", lambda _, fits, smaller: SearchLevel(tuple(fits), EARNED))
+    set_free = []
+    monkeypatch.setattr(Search, "free_shapes", lambda _, fits: set_free.extend(fits))
     search = Search(None, known(one, two))
     level = search.next_level(SearchLevel((one,)), one)
-    assert (level.best, search.next_level(level, one)) == (two, None)
+    assert (level.best, search.next_level(level, one), set_free) == (two, None, [two])
     assert [each["refused"].partition(":")[0] for each in search.rounds] == [
         "", "the fit of a + b creeps and does not arrive",
     ]  # fmt: skip

@@ -243,7 +243,7 @@ def test_a_tuned_identifier_has_the_budgets_and_seeds_of_the_one_as_it_is(writte
             before.name, before.budget, before.per_parameter, before.seeds
         )  # fmt: skip
     assert [dict(entry.options) for entry in tuned.entries[2:]] == [{"c1": 1.5}, {"growth": 2.0}]
-    file.write_text(tuned_study(tuned, found[:1]))
+    file.write_text(tuned_study(tuned, [Tuned("pso", {"c1": 1.7}, 0.2, 0.3)]))
     assert read_study(file).labels[-1] == "pso, tuned again"
 
 
