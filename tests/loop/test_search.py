@@ -14,8 +14,8 @@ from armid.loop import search as search_of
 from armid.loop.candidates import EffectKey, Library, library_of
 from armid.loop.close_loop import Decision, unless_belied
 from armid.loop.constants import ConstantModel, is_outdone
-from armid.loop.equivalence import likest, substitutes
-from armid.loop.fit import Comparison
+from armid.loop.equivalence import WITHIN, group_of, likest, substitutes
+from armid.loop.fit import Comparison, behind
 from armid.loop.search import Search, SearchLevel, best_along, finished, with_free_shapes
 from armid.loop.suspects import is_earned, is_next_to_nothing
 from armid.loop.whitening import whitened
@@ -304,6 +304,27 @@ def test_next_to_nothing_is_left_only_of_what_was_clearly_more_than_noise():
     assert not is_next_to_nothing(5020.0, 6000.0, 5000)
     assert not is_next_to_nothing(4844.0, 4910.0, 5000)
     assert not is_next_to_nothing(4990.0, 5200.0, 5000)
+
+
+def test_a_simpler_effect_that_fits_as_well_does_not_deny_one_with_a_shape_more():
+    """A lag of first order, and one of second order whose damping is searched at eight places."""
+
+    def lagging(name, chi2, *nulls):
+        values = {f"{name}.p{i}": 1.0 for i in range(len(nulls))}
+        parameters = {n: SimpleNamespace(null=null) for n, null in zip(values, nulls, strict=True)}
+        return SimpleNamespace(
+            active=(EffectKey(name),), chi2=chi2, n_free=len(nulls), independent=5000.0, values=values,
+            model=SimpleNamespace(parameters=parameters),
+        )  # fmt: skip
+
+    first, second = lagging("output_lag", 3000.0, 0.0), lagging("gyro_lag", 3000.5, 0.0, None)
+    assert behind(second, first) > WITHIN
+    assert group_of(first, first.active[0], [first, second]).rivals == ("gyro_lag",)
+    worse = lagging("gyro_lag", 3002.0, 0.0, None)
+    assert group_of(first, first.active[0], [first, worse]).rivals == ()
+    # one with another strength is what it was
+    strength = lagging("gyro_lag", 3000.5, 0.0, 0.0)
+    assert group_of(first, first.active[0], [first, strength]).rivals == ()
 
 
 def test_what_has_no_strength_is_no_substitute():

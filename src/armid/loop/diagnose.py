@@ -22,7 +22,7 @@ from armid.record import Record
 from armid.record.noise import memory_of
 
 # Chance of a false alarm, all tests together.
-SIGNIFICANCE = 0.01
+SIGNIFICANCE = 0.005
 # Below this no number of tests makes up for it.
 CERTAIN = 1e-7
 LAGS, N_BINS = 40, 12

@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from armid.loop.candidates import CONSTANT, EffectKey, Library, activation_grid, declared_keys
+from armid.loop.candidates import CONSTANT, SHAPES, EffectKey, Library, activation_grid, declared_keys
 from armid.loop.fit import Fit, behind, beyond, decomposed
 from armid.loop.score_test import at_null, responses, square_beyond
 from armid.model import Array
@@ -31,17 +31,29 @@ class EffectGroup:
 
 
 def group_of(fit: Fit, key: EffectKey, others: Sequence[Fit]) -> EffectGroup:
-    """Return the rivals of one effect of a model: models that differ in that effect alone, within the criterion."""
+    """Return the rivals of one effect of a model: models that differ in that effect alone, within the criterion.
+
+    A shape that a rival has more counts as the places of it that were searched, 2 ln(places), not as a free parameter:
+    that a simpler effect fits as well does not deny the other one (a lag of first and one of second order).
+    """
     kept = declared_keys(k for k in fit.active if k != key)
     gaps: dict[str, float] = {}
     for other in others:
         new = [k for k in other.active if k.declared not in kept]
         if other is fit or len(new) != 1 or len(other.active) != len(fit.active) or new[0].public == key.public:
             continue
-        name, gap = new[0].public, behind(other, fit)
+        spared = max(spared_by_shapes(other, new[0]) - spared_by_shapes(fit, key), 0.0)
+        name, gap = new[0].public, behind(other, fit) - spared
         if gap < min(WITHIN, gaps.get(name, np.inf)):
             gaps[name] = gap
     return EffectGroup(key.public, tuple(sorted(gaps, key=lambda name: gaps[name])))
+
+
+def spared_by_shapes(fit: Fit, key: EffectKey) -> float:
+    """Return by how much less than free parameters the shapes of an effect count as places that were searched."""
+    shapes = [n for n in fit.values if key.owns(n) and fit.model.parameters[n].null is None]
+    n_points = np.prod(SHAPES.get(len(shapes), (2,) * len(shapes)))
+    return float(len(shapes) * np.log(fit.independent) - 2.0 * np.log(n_points))
 
 
 def rival_models(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, ...]:
