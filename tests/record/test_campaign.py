@@ -8,7 +8,7 @@ import pytest
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Effect, Parameter
 from armid.record import Override, read_campaign, write_campaign
-from armid.record.campaign import first_of
+from armid.record.campaign import original_of
 from armid.record.table import read_table
 
 DEGREE = np.pi / 180
@@ -68,7 +68,7 @@ def test_folder_and_file_read_alike(write_two):
 
 
 def test_a_repeat_of_a_repeat_is_one_of_the_first():
-    assert first_of("c.csv", {"c.csv": "b.csv", "b.csv": "a.csv"}, "") == "a.csv"
+    assert original_of("c.csv", {"c.csv": "b.csv", "b.csv": "a.csv"}, "") == "a.csv"
 
 
 def test_samples_before_zero_are_rest(write_two, arm_columns):

@@ -21,10 +21,10 @@ BAD_INPUT = 2
 MOST_MORE = 3
 EPILOG = """\b
 Examples:
-  armid new campaign my_axis                   a folder to put your own records into
-  armid identify my_axis --out out/axis    its parameters, with intervals
-  armid close-loop my_axis --out out/loop  what its declared equations lack
-  armid study table1_short.toml --out out/t1   the paper's Table I, small (in studies/)
+  armid new campaign my_axis                          a folder to put your own records into
+  armid identify my_axis --out out/axis               its parameters, with intervals
+  armid close-loop my_axis --out out/loop             what its declared equations lack
+  armid study studies/table1_short.toml --out out/t1  the paper's Table I, small
 
 \b
 Completion by the shell, for good with this line in ~/.bashrc (zsh: ~/.zshrc, and zsh_source):

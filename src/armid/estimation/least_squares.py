@@ -298,7 +298,7 @@ def advance(
     slopes = [records.residual_and_slopes(p.z)[1] for p in paths] if central else forward_slopes(records, paths)
     left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
     for path, square, slope in left if not central else ():
-        falls = float(slope @ (step_in_box(square, slope, path.z, LEAST) - path.z))
+        falls = promised_fall(square, slope, path.z)
         path.done = falls <= tolerance * path.chi2 or path.chi2 - REACH * falls > limit
     left = [one for one in left if not one[0].done]
     while left:
@@ -324,6 +324,14 @@ def taken(path: Descent, tried: Sequence[Array], residuals: Array, dampings: Seq
     path.damping *= RAISED
     path.done = path.damping > LARGEST or moved < tolerance
     return path.done
+
+
+def promised_fall(square: Array, slope: Array, z: Array) -> float:
+    """Return by how much a step without damping would lower chi2, to first order.
+
+    square: J^T J, slope: J^T residual.
+    """
+    return float(slope @ (step_in_box(square, slope, z, LEAST) - z))
 
 
 def step_in_box(square: Array, slope: Array, z: Array, damping: float) -> Array:

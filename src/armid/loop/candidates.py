@@ -474,8 +474,7 @@ def activation_grid(records: WhiteRecords, key: EffectKey) -> tuple[list[Activat
     null = {n: float(v) for n in mine if (v := declared[n].null) is not None}
     bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine}
     shapes = [n for n in mine if n not in null]
-    counts = SHAPES.get(len(shapes), (2,) * len(shapes))
-    along = [points_within(*bound[n], count) for n, count in zip(shapes, counts, strict=True)]
+    along = [points_within(*bound[n], count) for n, count in zip(shapes, shape_counts(len(shapes)), strict=True)]
     points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*along)]
     chosen = [(n,) for n in null] + ([tuple(null)] if len(null) > 1 else [])
     found = []
@@ -485,6 +484,11 @@ def activation_grid(records: WhiteRecords, key: EffectKey) -> tuple[list[Activat
             shares = STRENGTHS_OF_SHAPES if shapes else STRENGTHS
             found += [Activation(shape | full, null, share) for share in shares]
     return found, len(points)
+
+
+def shape_counts(n_shapes: int) -> tuple[int, ...]:
+    """Return at how many places of its range each of the shapes of an effect is tried."""
+    return SHAPES.get(n_shapes, (2,) * n_shapes)
 
 
 def points_within(low: float, high: float, count: int) -> Array:

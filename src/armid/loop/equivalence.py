@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from armid.loop.candidates import CONSTANT, SHAPES, EffectKey, Library, activation_grid, declared_keys
+from armid.loop.candidates import CONSTANT, EffectKey, Library, activation_grid, declared_keys, shape_counts
 from armid.loop.fit import Fit, behind, beyond, decomposed
 from armid.loop.score_test import at_null, responses, square_beyond
 from armid.model import Array
@@ -51,9 +51,8 @@ def group_of(fit: Fit, key: EffectKey, others: Sequence[Fit]) -> EffectGroup:
 
 def spared_by_shapes(fit: Fit, key: EffectKey) -> float:
     """Return by how much less than free parameters the shapes of an effect count as places that were searched."""
-    shapes = [n for n in fit.values if key.owns(n) and fit.model.parameters[n].null is None]
-    n_points = np.prod(SHAPES.get(len(shapes), (2,) * len(shapes)))
-    return float(len(shapes) * np.log(fit.independent) - 2.0 * np.log(n_points))
+    n_shapes = sum(key.owns(n) and fit.model.parameters[n].null is None for n in fit.values)
+    return float(n_shapes * np.log(fit.independent) - 2.0 * np.log(np.prod(shape_counts(n_shapes))))
 
 
 def rival_models(fit: Fit, others: Sequence[Fit]) -> tuple[Fit, ...]:

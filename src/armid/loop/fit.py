@@ -15,7 +15,7 @@ from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.design import BOX
 from armid.estimation.information import start_changes
-from armid.estimation.least_squares import LEAST, MOST_ROUNDS, SETTLED, descend, held_by_bound, step_in_box
+from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
 from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer
 from armid.loop.whitening import WhiteRecords
 from armid.model import Array, Model
@@ -103,12 +103,11 @@ class Fit:
         level, n = self.records.data.levels[0], len(self.residual) - self.n_free
         return level.known and bool(fdtrc(n, level.n_slow, self.chi2 / n) > ONLY_NOISE)
 
-    @property
+    @cached_property
     def has_arrived(self) -> bool:
         """Whether a further step promises next to nothing of chi2; where that bends sharply, steps only creep."""
-        slope = self.jacobian.T @ self.residual
-        step = step_in_box(self.jacobian.T @ self.jacobian, slope, self.z, LEAST) - self.z
-        return float(slope @ step) <= ROUGHLY * self.chi2
+        falls = promised_fall(self.jacobian.T @ self.jacobian, self.jacobian.T @ self.residual, self.z)
+        return falls <= ROUGHLY * self.chi2
 
     @property
     def crept(self) -> bool:

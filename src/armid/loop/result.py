@@ -38,8 +38,9 @@ BIASED = 0.01
 # An interval that the tolerances of constants widen by more than this factor, and beyond BIASED, rests on them.
 RESTS_ON = 2.0
 # Doubts for which an interval does not hold.
-REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
-CREPT = "the fit creeps and has not arrived"
+REMAINS, HELD, CREPT = (
+    "a significant discrepancy remains", "its bound holds it", "the fit creeps and has not arrived",
+)  # fmt: skip
 # Doubt of every value where an effect delays what the motor induces with what drives it.
 LATE = "is told of all the drive, of which a part follows the motion: were the voltage alone late, it would be another"
 # Candidates whose predicted change of the residual is drawn.

@@ -194,10 +194,10 @@ class Search:
             return None
         if self.of_size(size)[0].chi2 - self.limit > LEFT * (last.best.chi2 - self.limit):
             return None
-        is_thorough = size <= THOROUGH or self.judged(self.of_size(size), smaller).earned
-        if self.of_size(size)[0].crept:
-            self.free_shapes(self.of_size(size)[:1])
-        if is_thorough and not self.of_size(size)[0].crept:
+        if (best := self.of_size(size)[0]).crept:
+            self.free_shapes([best])
+            best = self.of_size(size)[0]
+        if not best.crept and (size <= THOROUGH or self.judged(self.of_size(size), smaller).earned):
             self.exchange(size, last.best)
         # An exchange may have found a better model of the size before.
         smaller = self.of_size(size - 1)[0] if size - len(smaller.active) == 1 else smaller

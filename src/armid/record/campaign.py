@@ -252,13 +252,13 @@ def record_entries(tables: Sequence[Mapping[str, Any]], keys: Sequence[str], whe
             raise ArmidError(f"{where}, record {quoted(entry.file)}: repeat_of {quoted(entry.repeat_of)} is no file of "
                              f"another record, {nearest(entry.repeat_of, others)}")  # fmt: skip
     repeats = {entry.file: entry.repeat_of for entry in entries if entry.repeat_of is not None}
-    entries = [replace(e, repeat_of=first_of(e.file, repeats, where)) if e.file in repeats else e for e in entries]
+    entries = [replace(e, repeat_of=original_of(e.file, repeats, where)) if e.file in repeats else e for e in entries]
     if not any(entry.role == "train" for entry in entries):
         raise ArmidError(f"{where}: no record has the role 'train', at least one is expected")
     return entries
 
 
-def first_of(file: str, repeats: Mapping[str, str], where: str) -> str:
+def original_of(file: str, repeats: Mapping[str, str], where: str) -> str:
     """Return the record that one repeats in the end. Raises ArmidError where repeats go in a circle."""
     seen = [file]
     while seen[-1] in repeats:

@@ -5,7 +5,7 @@ import hashlib
 import os.path
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
@@ -33,6 +33,8 @@ from armid.units import DEGREE
 
 MOST_SAMPLES = 10**7
 KNOWN = "known"
+# What a problem of the suite brings, so that no key of a study may tell it.
+BROUGHT = ("noise_deg_s", "windows_s", "interval_s", "accuracy", "constants", "bounds", "fixed")
 # Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
 # fourth power: of the arm it is then about 1e-11 rad/s.
 FINER = 8
@@ -93,9 +95,7 @@ def suite_cases(spec: StudySpec, where: str, train: bool = False) -> list[Case]:
     wanted = validated(SuiteSpec, spec.suite, where)
     if spec.plant != "shell_transfer_arm" or spec.effects:
         raise ArmidError(f"{where}: the suite brings its effects, plant 'shell_transfer_arm' without any is expected")
-    ignored = ("noise_deg_s", "windows_s", "interval_s", "accuracy", "constants", "bounds", "fixed")
-    plain = {f.name: f.default if f.default is not MISSING else {} for f in fields(StudySpec) if f.name in ignored}
-    given = [name for name in ignored if getattr(spec, name) != plain[name]]
+    given = [f.name for f in fields(spec) if f.name in BROUGHT and getattr(spec, f.name) not in (f.default, {})]
     if given and not spec.cases and spec.random_cases is None:
         raise ArmidError(f"{where}: '{given[0]}' is given, but a problem of the suite brings its own, no such key is "
                          "expected")  # fmt: skip

@@ -142,7 +142,7 @@ def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
     ours, paper = overview.frame[~is_paper], overview.frame[is_paper]
     said = []
     known = ours.dropna(subset="largest_median")  # not where no truth is known, or each run failed
-    settings = [s for s in settings if s in set(known["setting"])]
+    settings = [s for s in settings if (known["setting"] == s).any()]
     for setting in settings[:MOST_SETTINGS]:
         own = known[known["setting"] == setting]
         best = own.loc[own["largest_median"].idxmin()]

@@ -36,7 +36,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     figures = [Figure("error_map", "Errors by identifier and case", MAP_CAPTION, lambda: error_map_figure(maps))]
     ends = end_points(evidence.estimates)
     if ends.shape[1] > 3 and len(ends) > 1:
-        for s in filter(set(ends["setting"]).__contains__, evidence.settings):
+        for s in (s for s in evidence.settings if (ends["setting"] == s).any()):
             draw = partial(valley_figure, ends[ends["setting"] == s], evidence.interesting[:MOST_COLOURED])
             name = slug("valley", s if len(evidence.settings) > 1 else "")
             figures.append(Figure(name, f"Where runs end, {s}", VALLEY_CAPTION, draw))
