@@ -1,6 +1,8 @@
 """A study that cannot be run is refused with one sentence before anything is written."""
 
+import os
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -104,3 +106,14 @@ def test_a_link_out_of_the_folder(write_study, tmp_path, paper_arm_folder):
     file = write_study(change=("manoeuvres = [{ start", 'campaign = "c" #'))
     with pytest.raises(ArmidError, match="campaign 'c' links out of the folder of the study"):
         read_study(file)
+
+
+def test_a_path_that_is_no_utf_8_is_refused(refused, write_study, tmp_path, monkeypatch):
+    """A store keeps the path as the command named it; of a whole one it keeps the name alone."""
+    monkeypatch.chdir(tmp_path)
+    folder = Path(os.fsdecode(b"m\xe9s"))
+    folder.mkdir()
+    shutil.move(write_study(more=BOX), folder)
+    sentence = refused("study", folder / "small.toml", "--out", "out", "--quiet")
+    assert sentence.startswith(r"armid: 'm\udce9s/small.toml' is no name in UTF-8")
+    assert not Path("out").exists()

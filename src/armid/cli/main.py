@@ -115,7 +115,9 @@ def main(arguments: list[str] | None = None) -> None:
     except OSError as error:
         stop(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}", BAD_INPUT)
     except UnicodeEncodeError as error:
-        stop(f"{error.object[:100]!a} is no name in UTF-8, such a one is expected", BAD_INPUT)
+        # alone, or between the quotes of what was to be written
+        name = error.object[: error.end].rpartition('"')[2] + error.object[error.end :].partition('"')[0]
+        stop(f"{name!a} is no name in UTF-8, such a one is expected", BAD_INPUT)
     except MemoryError as error:
         stop(f"not enough memory: {error}; a smaller population, fewer records or shorter ones are expected", BAD_INPUT)
     except (Exception, SystemExit) as error:

@@ -1,5 +1,6 @@
 """Run what is missing of a study."""
 
+import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -124,13 +125,15 @@ def run(
     setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
     study.check(partial(performed_apart, setup))
     folder, named = RESULTS / study.name if out is None else Path(out), Path(file)
+    # a whole path says something on this machine alone
+    told = named.name if named.is_absolute() else named.as_posix()
+    description = study.description(folder) | {"file": told}
+    json.dumps(description, ensure_ascii=False).encode()  # what no store can hold is refused before there is one
     is_new = not (folder / FILE_NAME).exists()
     if is_new:
         refuse_unwritable(folder, FILE_NAME)
     with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
-        # a whole path says something on this machine alone
-        told = named.name if named.is_absolute() else named.as_posix()
-        store.plan(study.description(folder) | {"file": told}, study.plan())
+        store.plan(description, study.plan())
         if retry:
             store.forget_failed()
         counts = store.counts()
