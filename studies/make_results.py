@@ -73,14 +73,14 @@ RECIPES = {
     )),
     "benchmark": study("benchmark", "ecdf", "critical_difference_0_3_deg_s"),
     "best_chain": study("best_chain"),
-    "blind": scored("blind", "confusion", "held_out", before=((BLIND, f"{STAND} blind {BLIND} --seed 167"),)),
+    "blind": scored("blind", "confusion", "held_out", before=((BLIND, f"{STAND} blind {BLIND} --seed 179"),)),
     "cramer_rao": study("cramer_rao", "cramer_rao"), "fitness": study("fitness", "fitness"),
     "dfki_pendulum": loop("dfki_pendulum", "residuals", campaign="out/campaigns/dfki"),
     "emps": loop("emps", "residuals", campaign="out/campaigns/emps", more=(
         "python studies/measured/emps/inverse_model.py out/campaigns/emps out/emps/inverse_model.md",
     )),
     "emps_identified": Recipe((f"{EMPS} --fitness rmse --out out/emps_identified",)),
-    "families": scored("families", before=((FAMILIES, f"python studies/stand/families.py {FAMILIES} --seed 163 "
+    "families": scored("families", before=((FAMILIES, f"python studies/stand/families.py {FAMILIES} --seed 173 "
                                             "fault=200 constant=100 constants=100 two=100 three=100 control=200"),)),
     "four_strokes": loop("four_strokes", "parameters"), "one_stroke": loop("one_stroke", "parameters"),
     "landscape": Recipe(("python studies/suite/landscape.py --out out/landscape",), ("landscape",)),
