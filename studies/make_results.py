@@ -80,7 +80,7 @@ RECIPES = {
         "python studies/measured/emps/inverse_model.py out/campaigns/emps out/emps/inverse_model.md",
     )),
     "emps_identified": Recipe((f"{EMPS} --fitness rmse --out out/emps_identified",)),
-    "families": scored("families", before=((FAMILIES, f"python studies/stand/families.py {FAMILIES} --seed 173 "
+    "families": scored("families", before=((FAMILIES, f"python studies/stand/families.py {FAMILIES} --seed 181 "
                                             "fault=200 constant=100 constants=100 two=100 three=100 control=200"),)),
     "four_strokes": loop("four_strokes", "parameters"), "one_stroke": loop("one_stroke", "parameters"),
     "landscape": Recipe(("python studies/suite/landscape.py --out out/landscape",), ("landscape",)),

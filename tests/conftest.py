@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -271,22 +270,11 @@ def stand(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
     def campaign(*options: str) -> Path:
         if options not in made:
-            folder = tmp_path_factory.mktemp("stand") / "made"
-            with importable(ROOT / "studies"):
-                from stand.command import main
+            from stand.command import main
 
-                assert main([str(folder), *options]) == 0
+            folder = tmp_path_factory.mktemp("stand") / "made"
+            assert main([str(folder), *options]) == 0
             made[options] = folder
         return made[options]
 
     return campaign
-
-
-@contextmanager
-def importable(folder: Path) -> Iterator[None]:
-    """Search a folder for modules for a while."""
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))

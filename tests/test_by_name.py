@@ -12,6 +12,7 @@ from pymoo.core.algorithm import Algorithm
 
 import armid
 from armid.cli.new import INERTIA
+from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS
 from armid.report.result import MANIFEST, Result, Shown
@@ -81,19 +82,11 @@ def test_a_search_of_the_user_has_options_and_follows_in_a_chain(axis, tmp_path)
         armid.as_identifier("mine", lambda value, lows: None)
 
 
-def test_an_identifier_that_ignores_its_budget_is_stopped(axis, run_check):
+def test_an_identifier_that_ignores_its_budget_is_stopped(axis):
     ended = armid.identify(axis, identifier=lambda budget: Greedy(), **QUICK)
     assert ended.stopped == "<lambda> went on after its budget and was stopped"
     assert ended.used == 60
-    assert run_check(Greedy) == {"exact budget"}
-
-
-@pytest.fixture
-def run_check():
-    """Return a function that gives the points of the contract that an identifier breaks."""
-    from armid.contract.check import check_thing
-
-    return lambda thing: {p.name for p in check_thing("identifiers", "mine", thing) if not p.passed}
+    assert {p.name for p in check_thing("identifiers", "mine", Greedy) if not p.passed} == {"exact budget"}
 
 
 def test_tables_are_a_campaign(found, axis):

@@ -53,11 +53,6 @@ class Opened(NamedTuple):
     bounds: Bounds
     fixed: Mapping[str, float]
 
-    @property
-    def effects(self) -> dict[str, Effect]:
-        """The effects that are registered, and those of the sensors of the plant."""
-        return self.registry.effects_for(self.campaign.plant)
-
     def space(self) -> "Space":
         from armid.problem.space import space_of
 
@@ -343,7 +338,7 @@ def close_loop(
 
     declared = {"model": model} if campaign is not None else {}
     there = opened(model if campaign is None else campaign, bounds=bounds, **declared, **expected(given, close_loop))
-    known = there.effects
+    known = there.registry.effects_for(there.campaign.plant)
     wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "--candidates")
     left_out = effects_of(without, known, "--without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}

@@ -27,17 +27,13 @@ def is_fitness(thing: Any) -> bool:
     return inspect.isfunction(thing) and {"measured", "simulated"} <= set(inspect.signature(thing).parameters)
 
 
-def is_identifier(thing: Any) -> bool:
-    return hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing)
-
-
 # Kind -> what belongs to it; an object is of the first kind that takes it.
 ACCEPTS: dict[str, Callable[[Any], bool]] = {
     "plants": lambda thing: isinstance(thing, Plant),
     "effects": lambda thing: isinstance(thing, Effect),
     "fitness": is_fitness,
     "analyses": lambda thing: inspect.isfunction(thing) and "runs" in inspect.signature(thing).parameters,
-    "identifiers": is_identifier,
+    "identifiers": lambda thing: hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing),
 }
 KINDS = tuple(ACCEPTS)
 

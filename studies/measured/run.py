@@ -66,16 +66,9 @@ def closed(case: Case, data: Path, out: Path) -> tuple[Report, float]:
     cost = result / "cpu_s.txt"
     if not cost.is_file():
         if not campaign.is_dir():
-            files = str(data / case.machine)
-            call(
-                *(
-                    ("-m", "armid", "import", *case.imported, files)
-                    if case.imported
-                    else (str(HERE / case.machine / "make_campaign.py"), "--data", files)
-                ),
-                "--out",
-                str(campaign),
-            )
+            own = (str(HERE / case.machine / "make_campaign.py"), "--data")
+            made_by = ("-m", "armid", "import", *case.imported) if case.imported else own
+            call(*made_by, str(data / case.machine), "--out", str(campaign))
         plugin = ("--plugin", f"{HERE / case.machine / 'plant.py'}:{case.plant}") if case.plant else ()
         seconds = call("-m", "armid", "close-loop", str(campaign), "--out", str(result), *plugin)
         cost.write_text(f"{seconds:.0f}\n", encoding="utf-8")

@@ -97,9 +97,9 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
         fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, there, there)}
     entry = {
         "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
-        "effects": [planted_entry(p) | {"alone": None} for p in planted],
+        "effects": [planted_entry(p) for p in planted],
         "noise": {"kind": "coloured" if index % 2 else "white"}, "floor": noise_floor(records),
-        "records": [record_entry(each, 0.0) for each in records], "declared_fit": None, "fault": fault,
+        "records": [record_entry(each) for each in records], "declared_fit": None, "fault": fault,
         "constants": off, "dirt": dirt,
     }  # fmt: skip
     return files, entry

@@ -63,9 +63,8 @@ def test_a_user_s_things_are_listed(run, mine, what, name, line):
     assert line in run("list", what, "--plugin", f"{mine}:{name}").out
 
 
-def test_bench_prints_one_table(run, root, monkeypatch):
+def test_bench_prints_one_table(run, monkeypatch):
     """Of one part, really measured; tests/bench measures each."""
-    monkeypatch.syspath_prepend(root / "studies")
     from bench import __main__ as bench
     from bench.engine import fitness_rows
 

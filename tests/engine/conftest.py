@@ -7,17 +7,12 @@ import pytest
 
 from arm_cases import box_of, index_rows, manoeuvre_of
 from armid.engine import Schedule, calibrate, probes
-from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
+from armid.model import EFFECTS, Manoeuvre, Model
 
 
 @pytest.fixture(scope="session")
 def manoeuvres() -> dict[str, Manoeuvre]:
     return {row["manoeuvre"]: manoeuvre_of(row) for row in index_rows()}
-
-
-@pytest.fixture(scope="session")
-def arm() -> Model:
-    return Model(PLANTS["shell_transfer_arm"])
 
 
 @pytest.fixture(scope="session")

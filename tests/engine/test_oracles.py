@@ -1,9 +1,7 @@
 """The arm against what shares no code with the engine: reference trajectories, and scipy on the stand's equations."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,16 +9,11 @@ import pytest
 from arm_cases import REFERENCE, Array, box_of, candidate_of, drawn, index_rows
 from armid.engine import Schedule, Simulation, calibrate, probes, simulate
 from armid.model import EFFECTS, Manoeuvre, Model, applicable
-
-STUDIES = str(Path(__file__).parents[2] / "studies")
-if STUDIES not in sys.path:
-    sys.path.insert(0, STUDIES)
-
-from stand import RefusalError  # noqa: E402 - found on the path above
-from stand.arm import KNOWN, Arm  # noqa: E402
-from stand.effects import Effects  # noqa: E402
-from stand.motion import Motion  # noqa: E402
-from stand.motion import simulate as simulate_on_stand  # noqa: E402
+from stand import RefusalError
+from stand.arm import KNOWN, Arm
+from stand.effects import Effects
+from stand.motion import Motion
+from stand.motion import simulate as simulate_on_stand
 
 ScheduleFor = Callable[[str, str], Schedule]
 ERROR = {"standard": 1e-5, "fine": 2e-7}

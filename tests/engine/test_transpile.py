@@ -73,26 +73,11 @@ def test_computes_the_same_as_python(function: Callable[..., Any], found: Simula
     np.testing.assert_allclose(rows_of(found, function), expected, rtol=1e-14, atol=1e-15)
 
 
-def test_statements_give_the_same_as_selections(found: Simulation) -> None:
-    assert np.array_equal(rows_of(found, user.branches), rows_of(found, user.branches_as_choice))
-
-
 def test_runs_lane_by_lane_only_where_it_must() -> None:
     for function in ALL:
         sources = SourceText()
         sources.add("f__x", function)
         assert ("f__x" in sources.by_lane) == (function in user.BY_LANE), name_of(function)
-
-
-ON_ARRAYS = [user.plain, user.with_helper, user.constants, user.several_lines, user.where_and_clip, user.defaults,
-             user.powers, user.closed_over, user.short, user.branches_as_choice]  # fmt: skip
-
-
-def test_the_same_source_runs_on_arrays() -> None:
-    speeds = np.linspace(-0.5, 1.0, 33)
-    for function in ON_ARRAYS:
-        expected = [float(function(float(w), 0.25)) for w in speeds]
-        np.testing.assert_allclose(function(speeds, 0.25), expected, rtol=1e-14, atol=1e-15)
 
 
 NAMES = ("h", "np", "math", "i", "lane", "k1_x", "result")

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from searches import Bowl, identifier, ran
 
 from armid.identifiers.least_squares import CENTRAL, FORWARD, slopes, stencil
-from armid.identifiers.nlopt import ALGORITHMS, Calls, optimised
+from armid.identifiers.nlopt import ALGORITHMS, optimised
+from armid.identifiers.search import Calls
 
 Array = NDArray[np.float64]
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")

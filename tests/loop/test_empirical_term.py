@@ -32,7 +32,7 @@ def test_the_signal_is_taken_up_by_a_curve_over_the_angle(found):
     assert found.effects[-1] == "unnamed:torque"
     assert found.missing is not None
     assert (found.term.dependence.port, found.term.dependence.variable) == ("torque", "theta")
-    assert found.missing.signal_at("torque").share > 0.8
+    assert {s.port: s.share for s in found.missing.signals}["torque"] > 0.8
     assert found.after.holdout_error.rmse < 0.4 * found.before.holdout_error.rmse
 
 

@@ -2,7 +2,6 @@
 
 import sys
 import threading
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -139,12 +138,11 @@ def test_beside_a_fit_that_creeps_nothing_is_exchanged_and_nothing_more_is_looke
 
 
 @pytest.mark.slow
-def test_a_pair_is_found_where_steps_over_a_narrow_sign_creep(tmp_path, monkeypatch):
+def test_a_pair_is_found_where_steps_over_a_narrow_sign_creep(tmp_path):
     """Campaign c381 of the families of seed 149: the arm nearly stops, and the drive that brakes loses most of itself.
 
     By continuation chi2 falls from 1.5 a sample to 0.6.
     """
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "studies"))
     from stand import families
 
     files, _ = families.make(families.read_suite(families.SUITE), 149, ("two", 47))

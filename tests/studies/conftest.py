@@ -1,14 +1,10 @@
 """Let the tests import the test stand, which lives beside the package and not in it."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "studies"))
 
 
 @pytest.fixture

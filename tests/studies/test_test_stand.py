@@ -16,7 +16,7 @@ from stand.effects import read_effects
 
 ROOT = Path(__file__).parents[2]
 STAND = ROOT / "studies"
-PAPER_ARM = STAND / "campaigns" / "paper_arm"
+CAMPAIGNS = STAND / "campaigns"
 QUICK = ["--manoeuvres", "short,empty", "--repeats", "2", "--duration", "0.2"]
 
 
@@ -32,16 +32,6 @@ def speeds(file: Path) -> Any:
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stand") / "quick"
     assert main([str(folder), *QUICK, "--seed", "3", "--window-s", "0", "0.15", "--effect", "coulomb=30"]) == 0
-    return folder
-
-
-@pytest.fixture(scope="module")
-def remade(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Run the command of the committed README as a user would, into another folder."""
-    folder = tmp_path_factory.mktemp("stand") / "again"
-    line = next(line for line in (PAPER_ARM / "README.md").read_text().splitlines() if line.startswith("python "))
-    words = [str(folder) if word == "studies/campaigns/paper_arm" else word for word in shlex.split(line)]
-    subprocess.run([sys.executable, "-W", "error", *words[1:]], cwd=ROOT, check=True, capture_output=True)
     return folder
 
 
@@ -104,15 +94,6 @@ def test_a_manoeuvre_can_be_written_out(tmp_path: Path) -> None:
 def test_a_record_at_the_end_of_the_gyros_range_is_named(tmp_path: Path) -> None:
     assert main([str(tmp_path / "c"), *QUICK, "--gyro-range-deg-s", "30"]) == 0
     assert "are cut there: short.csv, short_2.csv" in (tmp_path / "c" / "README.md").read_text()
-
-
-def test_the_committed_campaign_can_be_made_again(remade: Path) -> None:
-    assert told(remade) == told(PAPER_ARM)
-    assert {each.name for each in remade.iterdir()} == {each.name for each in PAPER_ARM.iterdir()}
-    for record in told(PAPER_ARM)["records"]:
-        difference = speeds(remade / record["file"]) - speeds(PAPER_ARM / record["file"])
-        assert np.abs(difference).max() < 0.1 + 1e-9
-    assert (remade / "repeats.png").read_bytes().startswith(b"\x89PNG")
 
 
 REFUSED: list[tuple[list[str], str]] = [
@@ -203,32 +184,32 @@ def test_the_exit_code_of_the_program_is_2_when_it_refuses(tmp_path: Path) -> No
     assert (done.returncode, done.stderr) == (2, "test_stand: k must be a positive number, not 0.0\n")
 
 
-CAMPAIGNS = STAND / "campaigns"
-STORIES = ("one_stroke", "four_strokes", "rocking_shell")
+# By how much a value may differ: one step of the gyro, or the solver's last digits.
+STORIES = {"paper_arm": 0.1 + 1e-9, "one_stroke": 2e-4, "four_strokes": 2e-4, "rocking_shell": 2e-4}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story_can_be_made_again(name: str, tmp_path: Path, monkeypatch: Any) -> None:
+@pytest.mark.parametrize("name", [n if n == "paper_arm" else pytest.param(n, marks=pytest.mark.slow) for n in STORIES])
+def test_a_committed_campaign_can_be_made_again(name: str, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.chdir(tmp_path)
-    there = CAMPAIGNS / name
+    there, again = CAMPAIGNS / name, tmp_path / "studies" / "campaigns" / name
     line = next(line for line in (there / "README.md").read_text().splitlines() if line.startswith("python "))
     assert main(shlex.split(line)[2:-1]) == 0
-    again = tmp_path / "studies" / "campaigns" / name
+    assert {file.name for file in again.iterdir()} == {file.name for file in there.iterdir()}
     for file in there.iterdir():
         if file.suffix == ".csv":
-            found, told = (np.loadtxt(each, delimiter=",", skiprows=1) for each in (again / file.name, file))
-            assert np.abs(found - told).max() < 2e-4
+            assert np.abs(speeds(again / file.name) - speeds(file)).max() < STORIES[name]
+        elif file.suffix == ".png":
+            assert (again / file.name).read_bytes().startswith(b"\x89PNG")
         else:
             assert (again / file.name).read_text() == file.read_text()
 
 
 def test_committed_campaigns_are_small_and_say_their_truth() -> None:
-    for name in ("paper_arm", *STORIES):
+    for name in STORIES:
         assert sum(file.stat().st_size for file in (CAMPAIGNS / name).iterdir()) < 500_000
         said = (CAMPAIGNS / name / "README.md").read_text()
         assert "SYNTHETIC" in said
         truth = {"paper_arm": "p0 = 3050000 Pa", "rocking_shell": "rocking_hz"}.get(name, "coulomb = 25")
         assert truth in said, name
-    one, four = ((CAMPAIGNS / name / "lower.csv").read_bytes() for name in STORIES[:2])
+    one, four = ((CAMPAIGNS / name / "lower.csv").read_bytes() for name in ("one_stroke", "four_strokes"))
     assert one == four

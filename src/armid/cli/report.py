@@ -65,10 +65,10 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     from armid.report.markdown import markdown
 
     kind = kind_in(folder)
-    refuse_unwritable(folder if kind else None, kind.page if kind else PAGE)
     if kind is None:
         report_study(folder, key, plugins)
         return
+    refuse_unwritable(folder, kind.page)
     if key is not None:
         raise ArmidError(f"{folder} holds no study, and a key is the truth of a study's campaigns: none is expected")
     document = document_of(folder, kind, str(folder))

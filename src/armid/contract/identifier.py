@@ -48,9 +48,6 @@ class Trial(Metered):
             failed = self.holes & ((X[:, 0] - self.xl[0]) / (self.xu[0] - self.xl[0]) > 0.8)
             out["F"][failed] = np.nan
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Trial":
-        return self
-
 
 BUDGET = 403
 # Where the trial's simulations begin to raise, and where a run is cut off to be resumed: both inside a generation.

@@ -1,6 +1,6 @@
 """Mistakes that records may contain, each with what undoes it: sign, unit, clock, zero, manoeuvre."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -47,23 +47,23 @@ class Suspicion:
 
     kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "angle" (of a key), "input",
     "bounds", "position", "noise", "rest", "twice", "start", "unlike" or "unjudged" (no mistake was found, and the
-    model misses most of a record). record: file, "" for every train record; other: the second of two files.
-    factor: what the signal or the times are to be multiplied by, for "late" the seconds, for "zero" what is to be added
-    [rad], else NaN. before, after: rms error over rms of the signal, as declared and with the mistake undone.
+    model misses most of a record). record: file, "" for every train record. after: rms error over rms of the signal
+    with the mistake undone.
     """
 
     kind: str
     record: str
     sentence: str
-    other: str = ""
-    factor: float = np.nan
-    before: float = np.nan
     after: float = np.nan
 
 
 @dataclass(frozen=True)
 class Mend:
-    """Undo one mistake: `undo` returns a piece as it should have been, `words` begin a sentence about it."""
+    """Undo one mistake: `undo` returns a piece as it should have been, `words` begin a sentence about it.
+
+    factor: what the signal or the times are to be multiplied by, for "late" the seconds, for "zero" what is to be added
+    [rad], else NaN. other: the second of two files.
+    """
 
     kind: str
     factor: float
@@ -74,7 +74,7 @@ class Mend:
     def suspicion(self, record: str, before: float, after: float) -> Suspicion:
         who = record or "every train record"
         said = f"{who}: {self.words} the error falls from {before:.3g} to {after:.2g} of the signal"
-        return Suspicion(self.kind, record, f"{said}.", self.other, self.factor, before, after)
+        return Suspicion(self.kind, record, f"{said}.", after)
 
 
 BOUNDS = Mend("bounds", np.nan, "bounds or fixed values that were given look wrong: with those that the model declares",
@@ -130,38 +130,30 @@ def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
     constants = {**defaults, **record.constants}
 
     def mend(words: str, change: Callable[..., dict[str, float]], kind: str = "key") -> Mend:
-        return Mend(kind, np.nan, words, of_pieces(with_keys_changed, defaults=defaults, change=change))
+        def undo(piece: Piece) -> Piece:
+            return with_constants(piece, change({**defaults, **piece.manoeuvre.constants}))
+
+        return Mend(kind, np.nan, words, of_pieces(undo))
 
     for key in plant.keys:
         if key.boolean:
             other = "true" if constants[key.constant] == 0.0 else "false"
-            yield mend(f"{key.key} looks wrong: with {other}", partial(flipped, name=key.constant))
+            yield mend(f"{key.key} looks wrong: with {other}", lambda given, n=key.constant: {n: 1.0 - given[n]})
         elif key.unlike:
             words = f"start and end ({key.unlike} and {key.constant}) look exchanged: the other way round"
-            yield mend(words, partial(swapped, a=key.constant, b=key.unlike))
+            yield mend(words, lambda given, a=key.constant, b=key.unlike: {a: given[b], b: given[a]})
     degrees = [k for k in plant.keys if k.key.endswith("_deg") and may_be_radians(k, constants[k.constant] / k.factor)]
     for several in sorted({tuple(degrees), *((k,) for k in degrees)} - {()}, key=len):
         words = (
             f"{' and '.join(k.key for k in several)} {'look' if several[1:] else 'looks'} given in radians: in degrees"
         )
-        yield mend(words, partial(multiplied, names=[k.constant for k in several], factor=DEGREES), "angle")
+        names = [k.constant for k in several]
+        yield mend(words, lambda given, names=names: {n: DEGREES * given[n] for n in names}, "angle")
 
 
 def may_be_radians(key: ManoeuvreKey, value: float) -> bool:
     low, high = range_of(key)
     return 0.0 < abs(value) <= 2.0 * np.pi and low <= DEGREES * value <= high
-
-
-def flipped(constants: Mapping[str, float], name: str) -> dict[str, float]:
-    return {name: 1.0 - constants[name]}
-
-
-def swapped(constants: Mapping[str, float], a: str, b: str) -> dict[str, float]:
-    return {a: constants[b], b: constants[a]}
-
-
-def multiplied(constants: Mapping[str, float], names: Iterable[str], factor: float) -> dict[str, float]:
-    return {name: factor * constants[name] for name in names}
 
 
 def scaled(record: Record, plant: Plant, output: str, factor: float) -> Record:
@@ -221,12 +213,6 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
     given = {n: v for n, v in old.items() if n not in piece.start_deviation}
     tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.each}
     return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index)[0]
-
-
-def with_keys_changed(
-    piece: Piece, defaults: Mapping[str, float], change: Callable[[Mapping[str, float]], dict[str, float]]
-) -> Piece:
-    return with_constants(piece, change({**defaults, **piece.manoeuvre.constants}))
 
 
 def with_input(piece: Piece, name: str, factor: float) -> Piece:

@@ -95,11 +95,10 @@ def profiles(records: LeastSquaresProblem, z: Array) -> tuple[Array, tuple[Profi
     best = fit(records, z)
     for _ in range(MOST_RESTARTS):
         found = tuple(profile(records, best, i) for i in range(len(best)))
-        lower = [(float(p.rise.min()), p.candidates[int(p.rise.argmin())]) for p in found if len(p.rise)]
-        rise, candidate = min(lower, key=lambda pair: pair[0], default=(0.0, np.empty(0)))
-        if rise > -BETTER:
+        lowest = min(found, key=lambda p: float(p.rise.min()))
+        if lowest.rise.min() > -BETTER:
             break
-        best = fit(records, records.shares(candidate))
+        best = fit(records, records.shares(lowest.candidates[int(lowest.rise.argmin())]))
     return best, found
 
 

@@ -333,13 +333,13 @@ def chosen(record: str, before: float, tried: Iterable[tuple[float, Mend]]) -> l
 def unlike(file: str, error: float) -> Suspicion:
     said = (f"{file}: the declared model explains nothing of it, whatever its parameters (error {error:.3g} of the "
             "signal), and no other sign, unit, clock or manoeuvre that was tried does.")  # fmt: skip
-    return Suspicion("unlike", file, said, before=error)
+    return Suspicion("unlike", file, said)
 
 
 def beyond(file: str, error: float) -> Suspicion:
     said = (f"{file}: the declared model misses it by {error:.3g} of its signal wherever it fits the train records "
             "best, and no mistake that was tried explains that: whether a record is wrong cannot be told.")  # fmt: skip
-    return Suspicion("unjudged", file, said, before=error)
+    return Suspicion("unjudged", file, said)
 
 
 def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[Suspicion]:
@@ -469,7 +469,7 @@ def of_position(record: Record) -> Iterator[Suspicion]:
         if alike > 0.9 and not 0.6 < size < 1.6:
             said = f"{record.file}: {header} moves {size:.3g} times as far as the speed says"
             wrong = f"{said}: the sign or unit of one of them, or time_s, looks wrong."
-            yield Suspicion("position", record.file, wrong, factor=size)
+            yield Suspicion("position", record.file, wrong)
 
 
 def of_times(record: Record) -> Iterator[Suspicion]:
@@ -477,7 +477,7 @@ def of_times(record: Record) -> Iterator[Suspicion]:
     interval = record.manoeuvre.interval
     if interval >= LONGEST_INTERVAL:
         yield Suspicion("time", record.file, f"{record.file}: its samples are {interval:.3g} s apart, which looks like "
-                        "times in ms: seconds are expected in time_s.", factor=1e-3)  # fmt: skip
+                        "times in ms: seconds are expected in time_s.")  # fmt: skip
 
 
 def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
@@ -499,7 +499,7 @@ def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
         if a.manoeuvre_file == b.manoeuvre_file:
             continue
         yield Suspicion("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE - 1} samples: one recording "
-                        "is given twice, records that do not overlap are expected.", b.file)  # fmt: skip
+                        "is given twice, records that do not overlap are expected.")  # fmt: skip
 
 
 def fingerprints(values: Array) -> NDArray[np.uint64]:

@@ -85,10 +85,6 @@ class Stencil:
     points: Array
     offsets: Array
 
-    @property
-    def n(self) -> int:
-        return int(self.points.shape[1])
-
 
 def stencil(u: Array, step: float, kind: str) -> Stencil:
     """Return the points at u + step and, when central, u - step; a point that would leave the cube turns inwards.
@@ -113,9 +109,9 @@ def slopes(stencil: Stencil, here: Array, there: Array) -> Array:
     with np.errstate(invalid="ignore"):
         quotients = (there - here) / stencil.offsets[:, np.newaxis]
     good = np.asarray(np.isfinite(quotients).all(axis=1))
-    if len(quotients) == stencil.n:
+    n = stencil.points.shape[1]
+    if len(quotients) == n:
         return np.where(good[:, np.newaxis], quotients, 0.0)
-    n = stencil.n
     a, b = stencil.offsets[:n, np.newaxis], stencil.offsets[n:, np.newaxis]
     first, second = quotients[:n], quotients[n:]
     with np.errstate(invalid="ignore"):

@@ -1,6 +1,5 @@
 """The local searches of NLopt, with and without derivatives: all run by `by_gradient`."""
 
-from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
@@ -10,7 +9,7 @@ import numpy as np
 from armid.identifiers.identifier import checked, checked_choice, checked_share
 from armid.identifiers.least_squares import CENTRAL, KINDS, slopes, stencil
 from armid.identifiers.pymoo_adapter import SEEDS, declared
-from armid.identifiers.search import Asker, Height, Method, Search, SearchTask, local_search
+from armid.identifiers.search import Asker, Calls, Height, Method, Search, SearchTask, local_search
 from armid.model import Array
 
 # A model of BOBYQA that reached beyond both bounds would be refused.
@@ -92,24 +91,6 @@ NLOPT = tuple(
     else declared(name, note, partial(by_values, algorithm))
     for name, (note, algorithm) in ALGORITHMS.items()
 )  # fmt: skip
-
-
-class Calls:
-    """Call an objective until it raises, then never again: L-BFGS goes on calling, and NLopt may lose the error."""
-
-    def __init__(self, value: Callable[[Array, Array], float]) -> None:
-        self.value = value
-        self.error: BaseException | None = None
-
-    def __call__(self, u: Array, gradient: Array) -> float:
-        """Return the objective at u, the gradient filled in where it is not empty."""
-        if self.error is not None:
-            raise self.error
-        try:
-            return self.value(u, gradient)
-        except BaseException as error:
-            self.error = error
-            raise
 
 
 def optimised(search: nlopt.opt, start: Array, calls: Calls) -> None:

@@ -12,18 +12,11 @@ from pymoo.core.algorithm import Algorithm
 from armid.errors import ArmidError
 from armid.identifiers.identifier import Identifier, accepts, refuse_unknown
 from armid.identifiers.pymoo_adapter import SearchAlgorithm
-from armid.identifiers.search import Asker, Search, SearchTask, in_thread
+from armid.identifiers.search import Asker, Calls, Search, SearchTask, in_thread
 from armid.model import Array
 from armid.problem.meter import PENALTY
 
-SEARCH_ARGUMENTS = {
-    "value": "function of a candidate, (n_parameters,), that returns its fitness as a number; or of several at once, "
-             "(n_candidates, n_parameters), that returns (n_candidates,)",
-    "low": "lower bounds, SI, (n_parameters,)", "high": "upper bounds, SI, (n_parameters,)",
-    "budget": "simulations; armid counts them and ends the search there",
-    "random": "numpy.random.Generator, from which all that is random is drawn",
-    "start": "where to start, SI, (n_parameters,): the best so far in a chain, else a random point of the box",
-}  # fmt: skip
+SEARCH_ARGUMENTS = ("value", "low", "high", "budget", "random", "start")
 
 
 def as_identifier(name: str, obj: Any) -> Identifier:
@@ -35,8 +28,10 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         Of the identifier.
     obj : Identifier, class or function
         A subclass of pymoo's Algorithm; a function of the budget that returns an algorithm; or a function that searches
-        by itself: `value` in its arguments is what it minimises, and it may name the others of `SEARCH_ARGUMENTS`.
-        Arguments with a default are options.
+        by itself: `value` in its arguments is what it minimises, a function of a candidate, (n_parameters,), or of
+        several at once, (n_candidates, n_parameters). It may name `low` and `high`, the bounds, SI; `budget`, the
+        simulations after which it is ended; `random`, numpy's Generator; `start`, SI, the best so far in a chain, else
+        a random point of the box. Arguments with a default are options.
 
     Returns
     -------
@@ -107,10 +102,10 @@ def searching(name: str, function: Callable[..., Any], budget: int, **options: A
                 function(**{key: given[key] for key in arguments_of(function) if key in given}, **options)
             except Exception:
                 # compiled libraries turn an error of a call into one of their own
-                if value.error is None:
+                if value.ask.error is None:
                     raise
-            if value.error is not None:
-                raise value.error
+            if value.ask.error is not None:
+                raise value.ask.error
             return True
 
         return attempt(task.ask) if task.ask is not None else (yield from in_thread(attempt))
@@ -119,25 +114,15 @@ def searching(name: str, function: Callable[..., Any], budget: int, **options: A
 
 
 class Value:
-    """Answer what a search asks; after an error, such as the end of the budget, raise it at every call.
-
-    A failed candidate gets a value above all that was seen, since few libraries can live with infinity.
-    """
+    """Answer what a search asks; a failed candidate gets a value above all that was seen, as few take infinity."""
 
     def __init__(self, ask: Asker, low: Array, high: Array) -> None:
-        self.ask, self.low, self.high = ask, low, high
-        self.error: BaseException | None = None
+        self.ask = Calls(lambda x: ask(np.clip(np.atleast_2d(x), low, high)).F)
         self.least, self.most = np.inf, -np.inf
 
     def __call__(self, x: ArrayLike) -> float | Array:
-        if self.error is not None:
-            raise self.error
         asked = np.asarray(x, dtype=np.float64)
-        try:
-            told = self.ask(np.clip(np.atleast_2d(asked), self.low, self.high)).F
-        except BaseException as error:
-            self.error = error
-            raise
+        told = self.ask(asked)
         finite = told[told < PENALTY]
         self.least, self.most = min([self.least, *finite]), max([self.most, *finite])
         failed = 2.0 * self.most - self.least if self.most > -np.inf else PENALTY

@@ -122,6 +122,23 @@ def local_search(task: SearchTask, routine: Callable[[Asker, Array], None]) -> S
     return True
 
 
+class Calls:
+    """Call a function until it raises, then never again: a library may go on calling, or lose the error."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.function = function
+        self.error: BaseException | None = None
+
+    def __call__(self, *given: Any) -> Any:
+        if self.error is not None:
+            raise self.error
+        try:
+            return self.function(*given)
+        except BaseException as error:
+            self.error = error
+            raise
+
+
 class Height:
     """Turn fitness values into heights of about 1, and give what failed a height above all that was seen.
 

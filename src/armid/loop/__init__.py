@@ -23,7 +23,6 @@ Beside it: missing_signal and empirical (where no effect will do), result
 """
 
 from armid.loop.close_loop import close_loop
-from armid.loop.diagnose import Diagnosis, Finding, diagnose
 from armid.loop.result import ClosedLoop, Judgement, Step, report_of
 
-__all__ = ["ClosedLoop", "Diagnosis", "Finding", "Judgement", "Step", "close_loop", "diagnose", "report_of"]
+__all__ = ["ClosedLoop", "Judgement", "Step", "close_loop", "report_of"]

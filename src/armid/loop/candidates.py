@@ -63,11 +63,7 @@ class EffectKey:
 
     @property
     def public(self) -> str:
-        """Name in reports, whatever the form.
-
-        >>> EffectKey("unnamed_torque").public, EffectKey("flux_saturation", "atan").public
-        ('unnamed:torque', 'flux_saturation')
-        """
+        """Name in reports, whatever the form."""
         if self.name.startswith(ROUGHLY):
             return self.name.replace(ROUGHLY, CONSTANT, 1)
         return self.name.replace(UNNAMED, SHOWN_AS, 1) if self.is_empirical else self.name
@@ -139,10 +135,6 @@ class Library:
     def _by_compiled_name(self) -> dict[str, EffectKey]:
         return {key.compiled: key for key in self.candidates}
 
-    def public_model(self, active: Active) -> Model:
-        """Return the declared model with some candidates added, under their public names, in the order given."""
-        return Model(self.declared.plant, (*self.declared.effects, *(self.candidates[k.declared] for k in active)))
-
     def problem(self, active: Active, near: Mapping[str, float] | None = None) -> WhiteRecords:
         """Return the least-squares problem of the declared model with some candidates, on all train records.
 
@@ -162,14 +154,9 @@ class Library:
             if len(alone) < max(len(active), 2):
                 # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
                 replays = self.replays(model, space, near or {}, self.misfit, on_one=bool(active))
-                self._problems[key] = WhiteRecords(replays, space, self.data)
             else:
-                joined = []
-                for same in zip(*alone, strict=True):
-                    each = zip(*(r.calibrations for r in same), strict=True)
-                    finest = tuple(max(c, key=lambda one: one.schedule.substeps) for c in each)
-                    joined.append(replace(same[0], calibrations=finest))
-                self._problems[key] = WhiteRecords(tuple(joined), space, self.data)
+                replays = tuple(with_finest(same[0], same) for same in zip(*alone, strict=True))
+            self._problems[key] = WhiteRecords(replays, space, self.data)
         return self._problems[key]
 
     def about(self, replays: Sequence[Replay], misfit: float) -> "Library":
@@ -404,6 +391,12 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     pairs = zip(replays, others, strict=True)
     calibrations = ((new, old) for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
     return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
+
+
+def with_finest(replay: Replay, others: Sequence[Replay]) -> Replay:
+    """Return a replay with the finest calibration that others have of each of its pieces, of equal ones the first."""
+    each = zip(*(r.calibrations for r in others), strict=True)
+    return replace(replay, calibrations=tuple(max(c, key=lambda one: one.schedule.substeps) for c in each))
 
 
 def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:

@@ -397,10 +397,14 @@ def decide(search: Search) -> Decision:
 
 
 def with_curve(found: Decision) -> Decision:
-    """Look for an empirical curve beside the effects, where these leave more than noise, and not for want of a step."""
+    """Look for an empirical curve beside the effects, where these leave more than noise, and not for want of a step.
+
+    Nor where the fit of these, or of the best with one effect more, crept: a curve could be judged no better.
+    """
     # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
     is_answered = found.refused is not None and not is_significant(found.largest)
-    if found.constants is not None or is_answered or found.chosen.crept:
+    more = found.search.of_size(len(found.chosen.active) + 1)[:1]
+    if found.constants is not None or is_answered or any(f.crept for f in (found.chosen, *more)):
         return found
     missing, term = empirical_term(found.chosen, found.search)
     if term is None:
@@ -430,7 +434,7 @@ def predicting_best(levels: Sequence[SearchLevel]) -> list[SearchLevel]:
 
     There significance is had for nothing, and what wins on train may lose on what was left out.
     """
-    earned = [level for level in levels if level.earned]
+    earned = [level for level in levels if not level.refused]
     if len(earned) < 2 or not earned[-1].best.dwarfs_noise:
         return earned
     alike = predicted_alike([level.best for level in earned])
@@ -495,7 +499,8 @@ def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, member
     fit = with_standard_accuracy(fit)
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
     remains = any(r.diagnosis.significant for r in (seen, unseen) if r is not None)
-    model = library.public_model(fit.active)
+    model = Model(library.declared.plant,
+                  (*library.declared.effects, *(library.candidates[k.declared] for k in fit.active)))  # fmt: skip
     return Judgement(fit, model, estimates(fit, library, remains, biases, members), seen, unseen)
 
 
@@ -557,5 +562,4 @@ def advice_for(
         weight = float(np.sqrt(rivals[0].trust))
         return weight * np.concatenate([level.white(y, [y.shape[-1]]) for level, y in pairs], axis=-1)
 
-    found = advise(rivals, white, None, speed_limit, threads=threads)
-    return found[:MOST_ADVICE]
+    return advise(rivals, white, None, speed_limit, threads=threads)[:MOST_ADVICE]

@@ -62,12 +62,6 @@ class ConstantModel:
         return next(iter(self.off)) if len(self.off) == 1 else TOGETHER
 
     @property
-    def shares(self) -> dict[str, float]:
-        """By which share of its value each product is off, those left out that hardly moved."""
-        pairs = zip(self.off, self.fit.constants.values(), strict=True)
-        return {n.removeprefix(NAMED): share for n, share in pairs if n in self.moved}
-
-    @property
     def moved(self) -> tuple[str, ...]:
         """Names of the products, those that hardly moved left out where there are many."""
         least = min(TOLD, *sorted(map(abs, self.off.values()))[-MOST_TOLD:])
@@ -199,8 +193,7 @@ def is_outdone(constants: ConstantModel, named: Fit, n_candidates: int) -> bool:
     if constants.is_stretched:
         return named.chi2 < constants.chi2
     # What is left out of a fit is no test: the constants stay as all records have them.
-    compared = compare(constants.fit, named, n_candidates**n, n_extra=n)
-    return compared.p < FAMILYWISE and compared.gain > 0.0
+    return compare(constants.fit, named, n_candidates**n, n_extra=n).fits_better
 
 
 def constants_beside(models: Sequence[ConstantModel]) -> tuple[str, ...]:
@@ -213,7 +206,9 @@ def measurements(models: Sequence[ConstantModel]) -> list[str]:
     """Return which constants to measure, and how well, to tell whether they are what the records show."""
     said = []
     for model in models[:MOST_TOLD]:
-        largest = sorted(model.shares.items(), key=lambda pair: -abs(pair[1]))[:MOST_TOLD]
+        pairs = zip(model.off, model.fit.constants.values(), strict=True)
+        shares = {n.removeprefix(NAMED): share for n, share in pairs if n in model.moved}
+        largest = sorted(shares.items(), key=lambda pair: -abs(pair[1]))[:MOST_TOLD]
         said += [f"Measure {name} to {abs(share) / SURE:.1%}: off by {share:+.1%}, it would explain these records"
                  f"{'' if len(model.off) == 1 else ' together with others'}." for name, share in largest]  # fmt: skip
     return list(dict.fromkeys(said))
@@ -349,7 +344,7 @@ def with_trend(start: Fit, moves: int | Product) -> Trend:
     """
     base, fit, value, square = start.records, start, 0.0, 1.0
     for step_number in range(N_STEPS):
-        column = beyond(fit.basis, slope_of(start if isinstance(moves, Product) else fit, moves) * order_of(base))
+        column = beyond(fit.basis, slope_of(fit, moves) * order_of(base))
         square = float(column @ column) + FARTHEST_TREND**-2.0
         step = (float(column @ fit.residual) - value / FARTHEST_TREND**2) / square
         value += step

@@ -68,12 +68,11 @@ class Residuals:
 
     @cached_property
     def diagnosis(self) -> "Diagnosis":
-        return diagnose(self)
-
-    @property
-    def variance(self) -> float:
-        """What tests of structure divide by: 1 for known noise, else the mean square of the residual itself."""
-        return 1.0 if self.data.known else float(np.mean(self.residual**2))
+        """Tests of size, time, dependence and frequency; what diverges is no noise, whatever they would make of it."""
+        if not np.isfinite(self.residual).all():
+            return Diagnosis((Finding("size", "all records", np.inf, 0.0),), self.data.known)
+        tests = (size_tests, repeat_tests, time_tests, dependence_tests, band_tests)
+        return Diagnosis(tuple(f for test in tests for f in test(self)), self.data.known)
 
     @property
     def noise_rms(self) -> float:
@@ -252,7 +251,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Hold all tests of a residual; significant when the least chance, times the number of tests, is below 1 %."""
+    """Hold all tests of a residual; significant when the least chance, times their number, is below `SIGNIFICANCE`."""
 
     findings: tuple[Finding, ...]
     noise_known: bool
@@ -270,17 +269,6 @@ class Diagnosis:
     def of_kind(self, kind: str) -> list[Finding]:
         """Return the findings of one kind, most striking first."""
         return sorted((f for f in self.findings if f.kind == kind), key=lambda f: (f.p, -f.ratio))
-
-
-def diagnose(seen: Residuals) -> Diagnosis:
-    """Test a residual: its size, its correlation in time, on what it depends, and where it is.
-
-    That of a simulation that diverges is no noise, whatever these tests would make of it.
-    """
-    if not np.isfinite(seen.residual).all():
-        return Diagnosis((Finding("size", "all records", np.inf, 0.0),), seen.data.known)
-    tests = (size_tests, repeat_tests, time_tests, dependence_tests, band_tests)
-    return Diagnosis(tuple(f for test in tests for f in test(seen)), seen.data.known)
 
 
 def chance(ratio: float, free: float, known: float) -> float:
@@ -380,7 +368,7 @@ def structure(seen: Residuals, where: str, place: NDArray[np.int64], samples: ND
     indicators *= samples[:, np.newaxis]
     white = seen.data.white(seen.data.by_record(indicators.T)).T
     along, rank = square_along(beyond(seen.basis, white), seen.residual)
-    square = along / seen.variance
+    square = along / (1.0 if seen.data.known else float(np.mean(seen.residual**2)))
     if not seen.data.known:
         # Neighbours tell the same: of the residual's own scatter only the independent samples count.
         square *= seen.data.independent(seen.residual) / len(seen.residual)

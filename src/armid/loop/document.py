@@ -400,19 +400,15 @@ def disagreeing_sentence(found: ClosedLoop) -> str:
 def constants_sentence(found: ClosedLoop) -> str:
     """Say by how much which constants are off."""
     step, shares = found.steps[0], found.after.fit.constants
-    moved = sorted((n for n in step.constants), key=lambda n: -abs(shares[first_member(n)]))
-    told = ", ".join(f"{n.removeprefix(NAMED)} {shares[first_member(n)]:+.1%}" for n in moved[:MOST_PORTS])
+    moved = sorted((n for n in step.constants), key=lambda n: -abs(shares[members(n)[0]]))
+    told = ", ".join(f"{n.removeprefix(NAMED)} {shares[members(n)[0]]:+.1%}" for n in moved[:MOST_PORTS])
     others = f"; so would {' or '.join(step.alternatives)}" if step.alternatives else ""
     known = found.campaign.tolerances
-    beyond = any(abs(shares[first_member(n)]) > sum(known[each] for each in members(n)) for n in moved)
+    beyond = any(abs(shares[members(n)[0]]) > sum(known[each] for each in members(n)) for n in moved)
     within = ", some beyond" if beyond else " within"
     lead = "Constants do what an effect would" if found.after.significant else "No effect is needed"
     return (f"{lead}: with constants off{within} their tolerances ({told}) {remains(found)} on {judged_on(found)}"
             f"{others}.")  # fmt: skip
-
-
-def first_member(name: str) -> str:
-    return members(name)[0]
 
 
 def members(name: str) -> list[str]:

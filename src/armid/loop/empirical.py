@@ -65,7 +65,7 @@ def empirical_term(named: Fit, search: Search) -> tuple[Missing | None, Term | N
         if criterion(term.fit, n_eff) >= criterion(named, n_eff):
             break
         judged = compare(named, term.fit, n_extra=max(term.fit.n_free - named.n_free, 1))
-        if not judged.earned or judged.left_out[1] >= judged.left_out[0] or not term.fit.needs(term.fit.active[-1]):
+        if judged.why or judged.left_out[1] >= judged.left_out[0] or not term.fit.needs(term.fit.active[-1]):
             continue
         if not named.dwarfs_noise or named not in predicted_alike([named, term.fit]):
             return missing, term

@@ -228,12 +228,12 @@ def share_panel(axis: Any, missing: Missing) -> None:
 
 def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -> None:
     """Draw the signal of every record against one variable, with the curve where it is the one that was fitted."""
-    model, signal = missing.lacking.records.replays[0].model, missing.signal_at(best.port)
+    model, signal = missing.lacking.records.replays[0].model, next(s for s in missing.signals if s.port == best.port)
     factor, name = shown(1.0, unit_of(variable, model))
-    for segment, values in zip(missing.segments if signal else (), signal.signals if signal else (), strict=True):
+    for segment, values in zip(missing.segments, signal.signals, strict=True):
         colour = COLOURS[segment.group % len(COLOURS)]
         axis.plot(factor * segment.variables[variable], values, ".", ms=3, color=colour)
-    if signal is not None and variable == best.variable and best.factor == "1":
+    if variable == best.variable and best.factor == "1":
         knots = np.linspace(best.first, best.last, len(best.heights))
         seen = np.concatenate([m.variables[variable] for m in missing.segments])
         heights = np.linalg.lstsq(hats(seen, best.first, best.last), np.concatenate(signal.signals), rcond=None)[0]

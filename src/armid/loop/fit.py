@@ -16,7 +16,7 @@ from armid.estimation.constants import Product, products
 from armid.estimation.design import BOX
 from armid.estimation.information import start_changes
 from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
-from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer
+from armid.loop.candidates import Active, EffectKey, calibrated_replays, is_finer, with_finest
 from armid.loop.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.problem.starts import fits_starts, with_starts
@@ -153,20 +153,16 @@ class Fit:
         A Wald test; a residual that is no noise scatters with its correlation in time, see `WhitenedData.trust`, and
         the estimate with the measured starts.
         """
-        places, away = self.strengths_of(key)
+        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
+        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
+        null = np.array([nulls[i] for i in places], dtype=np.float64)
+        free = np.flatnonzero(space.free)[places]
+        away = self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
         weighed = self.jacobian * np.sqrt(self.records.data.trust(self.residual))[:, np.newaxis]
         covariance = np.linalg.inv(weighed.T @ weighed + BOX * np.eye(self.n_free))
         moved = self.answer @ self.start_slopes
         covariance = (covariance + moved @ moved.T)[np.ix_(places, places)]
         return not places or bool(away @ np.linalg.solve(covariance, away) > chdtri(len(places), OPEN))
-
-    def strengths_of(self, key: EffectKey) -> tuple[list[int], Array]:
-        """Return the places of an effect's strengths among the free parameters, and how far each is from its null."""
-        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
-        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
-        null = np.array([nulls[i] for i in places], dtype=np.float64)
-        free = np.flatnonzero(space.free)[places]
-        return places, self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""
@@ -227,16 +223,9 @@ def with_standard_accuracy(fit: Fit) -> Fit:
     standard = calibrated_replays([r.record for r in records.replays], fit.model, records.space, fit.values)
     if not is_finer(standard, records.replays):
         return with_own_starts(fit)
-    # the pieces are those of the fit, whose constants may be others than the record's
+    # The pieces are those of the fit, whose constants may be others than the record's; none is simulated coarser.
     pairs = zip(records.replays, standard, strict=True)
-    # nor coarser than what the fit was made with
-    replays = tuple(
-        replace(ours, calibrations=tuple(
-            max(both, key=lambda c: c.schedule.substeps)
-            for both in zip(theirs.calibrations, ours.calibrations, strict=True)
-        ))
-        for ours, theirs in pairs
-    )  # fmt: skip
+    replays = tuple(with_finest(ours, (theirs, ours)) for ours, theirs in pairs)
     again = fit_from(replace(records, replays=replays), fit.active, [fit.z])
     return with_own_starts(replace(again, constants=fit.constants))
 
@@ -268,11 +257,6 @@ class Comparison:
     gain: float
     p: float
     left_out: tuple[float, float]
-
-    @property
-    def earned(self) -> bool:
-        """Whether the larger model is significant, cheaper by the criterion, and no worse on what was left out."""
-        return not self.why
 
     @property
     def fits_better(self) -> bool:

@@ -106,9 +106,6 @@ class Missing:
     signals: tuple[MissingSignal, ...]
     dependences: tuple[Dependence, ...]
 
-    def signal_at(self, port: str) -> MissingSignal | None:
-        return next((s for s in self.signals if s.port == port), None)
-
 
 def missing_from(lacking: Fit, library: Library) -> Missing:
     """Recover the missing signal at every port of a fitted model, and on what it depends there.

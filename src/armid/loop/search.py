@@ -72,13 +72,8 @@ class SearchLevel:
         return self.fits[0]
 
     @property
-    def earned(self) -> bool:
-        """Whether its best is preferred to the smaller ones."""
-        return not self.refused
-
-    @property
     def refused(self) -> str:
-        """Which threshold was not reached, in words; "" where all were."""
+        """Which threshold was not reached, in words; "" where its best is preferred to the smaller ones."""
         return "" if self.comparison is None else self.comparison.why
 
 
@@ -141,7 +136,7 @@ class Search:
                 break
             levels.append(level)
             self.library = self.library.about(level.best.records.replays, level.best.misfit)
-            if level.earned:
+            if not level.refused:
                 if self.enough(level):
                     earned = len(levels)
                     break
@@ -163,7 +158,7 @@ class Search:
                 level = self.judged(fits, found[earned - 1].best)
                 self.note_round(len(fits[0].active), level.refused)
             found.append(level)
-            earned = len(found) if level.earned else earned
+            earned = earned if level.refused else len(found)
         return found[:earned]
 
     def next_level(self, last: SearchLevel, smaller: Fit) -> SearchLevel | None:
@@ -197,7 +192,7 @@ class Search:
         if (best := self.of_size(size)[0]).crept:
             self.free_shapes([best])
             best = self.of_size(size)[0]
-        if not best.crept and (size <= THOROUGH or self.judged(self.of_size(size), smaller).earned):
+        if not best.crept and (size <= THOROUGH or not self.judged(self.of_size(size), smaller).refused):
             self.exchange(size, last.best)
         # An exchange may have found a better model of the size before.
         smaller = self.of_size(size - 1)[0] if size - len(smaller.active) == 1 else smaller

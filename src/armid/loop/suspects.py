@@ -7,7 +7,6 @@ suspect. One effect explains all records with one strength, a fault one record: 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 from scipy.special import chdtri
@@ -25,7 +24,6 @@ from armid.record import Piece, Record
 from armid.record.broken import broken_samples
 from armid.units import shown
 
-T = TypeVar("T")
 FREED, LEFT_OUT, REPORTED = "freed", "left_out", "reported"
 # Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),
 # as a share, in radians or metres.
@@ -452,15 +450,12 @@ def disagreeing_record(fits: Sequence[Fit]) -> Suspect | None:
 
 def without_record(base: WhiteRecords, index: int) -> WhiteRecords:
     data, out = base.data, of_file(base, index)
-    samples = np.concatenate([np.arange(data.edges[i], data.edges[i + 1]) for i in out])
-
-    def rest(several: tuple[T, ...]) -> tuple[T, ...]:
-        return tuple(each for i, each in enumerate(several) if i not in out)
-
-    freed = None if data.freed is None else np.delete(data.freed, samples, axis=0)
-    fewer = replace(data, records=rest(data.records), levels=rest(data.levels), kept=np.delete(data.kept, samples),
-                    sound=np.delete(data.sound, samples), freed=freed)  # fmt: skip
-    return replace(base, replays=rest(base.replays), data=fewer)
+    left = [i for i in range(len(data.records)) if i not in out]
+    samples = np.repeat([i in left for i in range(len(data.records))], np.diff(data.edges))
+    fewer = replace(data, records=tuple(data.records[i] for i in left), levels=tuple(data.levels[i] for i in left),
+                    kept=data.kept[samples], sound=data.sound[samples],
+                    freed=None if data.freed is None else data.freed[samples])  # fmt: skip
+    return replace(base, replays=tuple(base.replays[i] for i in left), data=fewer)
 
 
 def stretch_of(squares: Array) -> tuple[int, int]:

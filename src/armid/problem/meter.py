@@ -1,7 +1,7 @@
 """The meter: the budget of a run, cut off exactly, and the one log of its evaluations."""
 
 from abc import abstractmethod
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -214,6 +214,10 @@ class Metered(Problem):  # type: ignore[misc]
     def __init__(self, meter: Meter | None, **of_pymoo: Any) -> None:
         super().__init__(**of_pymoo)
         self.meter = meter
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Share the problem and its meter: pymoo copies its problem, what is counted is one."""
+        return self
 
     @abstractmethod
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:

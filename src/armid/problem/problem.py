@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -210,6 +209,8 @@ class IdentificationProblem(Metered):
         self.names = space.free_names
         self.units = tuple(u for u, f in zip(space.units, space.free, strict=True) if f)
         self.measured = [r.measured for r in replays]
+        # what each record weighs in the fitness, and what its signals are divided by, both (n_records,)
+        self.record_weights, self.sizes = weights_of(fitness, replays), output_sizes(replays)
         super().__init__(meter, n_var=len(self.names), n_obj=1, xl=space.low[space.free], xu=space.high[space.free])
 
     def value(self, X: Array) -> Array:
@@ -232,20 +233,6 @@ class IdentificationProblem(Metered):
         signals = signals_of(self.replays, candidates)
         values = fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights, self.sizes)
         return values, signals
-
-    @cached_property
-    def record_weights(self) -> Array:
-        """What each record weighs in the fitness, (n_records,)."""
-        return weights_of(self.fitness, self.replays)
-
-    @cached_property
-    def sizes(self) -> Array:
-        """What the signals of each record are divided by, (n_records,)."""
-        return output_sizes(self.replays)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "IdentificationProblem":
-        """Share the records and the meter: pymoo copies its problem, the measurement is one."""
-        return self
 
 
 def fitness_of(

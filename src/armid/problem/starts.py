@@ -62,7 +62,7 @@ def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
             signals, answers = start.linear(start.constants, spread)
             residual, slopes = start.residual(signals), start.seen_slopes(answers)
             for i in np.flatnonzero(np.isfinite(chi2)):
-                chi2[i] += start.left(residual[i], slopes[:, i])
+                chi2[i] += float(np.sum(start.beyond(residual[i], slopes[:, i]) ** 2))
     return np.asarray(spread[int(np.argmin(chi2))])
 
 
@@ -144,10 +144,6 @@ class Start:
         piece = self.pieces[0]
         deviations = np.array([piece.start_deviation[name] for name in self.names])
         return np.array(list(piece.shown_start.values())), WIDER * deviations
-
-    def left(self, residual: Array, slopes: Array) -> float:
-        """Return the sum of squares that no start brings down, infinite where the simulation diverges."""
-        return float(np.sum(self.beyond(residual, slopes) ** 2))
 
     def beyond(self, residual: Array, slopes: Array) -> Array:
         """Return what no start can do of a residual, (n_seen,), infinite where the simulation diverges."""

@@ -230,11 +230,7 @@ class Document:
 
 
 def listing(title: str, text: str, folded: bool = False) -> Listing:
-    return Listing(title, lines(text), folded)
-
-
-def lines(text: str) -> tuple[Line, ...]:
-    return tuple(Line(line) for line in text.splitlines())
+    return Listing(title, tuple(map(Line, text.splitlines())), folded)
 
 
 def changed(before: str, after: str) -> tuple[Line, ...]:

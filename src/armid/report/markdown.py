@@ -1,7 +1,6 @@
 """Write a document as Markdown; figures are the PNG files beside it."""
 
 import re
-from collections.abc import Iterator
 
 from armid.report.document import Document, Figure, Gallery, Listing, Part, Sentences, Table, Text
 
@@ -17,26 +16,19 @@ def markdown(document: Document, made_by: str = "") -> str:
     return "\n\n".join(part for part in texts if part) + "\n"
 
 
-def part_texts(part: Part, section: str) -> Iterator[str]:
+def part_texts(part: Part, section: str) -> list[str]:
     if isinstance(part, Text):
-        yield escaped(part.text)
-        return
+        return [escaped(part.text)]
     if isinstance(part, Gallery):
-        yield f"![{escaped(part.slider or part.name)}]({part.name}.png)" if part.name else ""
-        return
+        return [f"![{escaped(part.slider or part.name)}]({part.name}.png)"] if part.name else []
     if (isinstance(part, Table) and not part.most) or (isinstance(part, Listing) and part.folded):
-        return
-    yield f"### {escaped(part.title)}" if part.title not in ("", section) else ""
+        return []
+    title = f"### {escaped(part.title)}" if part.title not in ("", section) else ""
     if isinstance(part, Table):
-        yield table_text(part)
-        yield escaped(part.note)
-    elif isinstance(part, Figure):
-        yield f"![{escaped(part.title)}]({part.name}.png)"
-        yield escaped(part.caption)
-    elif isinstance(part, Sentences):
-        yield bullets(part.sentences)
-    elif isinstance(part, Listing):
-        yield code(part)
+        return [title, table_text(part), escaped(part.note)]
+    if isinstance(part, Figure):
+        return [title, f"![{escaped(part.title)}]({part.name}.png)", escaped(part.caption)]
+    return [title, bullets(part.sentences) if isinstance(part, Sentences) else code(part)]
 
 
 def table_text(table: Table) -> str:

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stand.arm import PARAMETERS
-from stand.blind.draw import Drawn, brief, draw, one_stroke, six_strokes, weigh, weigh_alone
+from stand.blind.draw import Drawn, brief, draw, one_stroke, six_strokes, weigh
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Planted, Suite, cases_of, read_suite, shuffled
 from stand.campaign import EXACT, campaign_text, record_text
@@ -50,37 +49,18 @@ def campaign_files(name: str, gyro: Gyro, records: list[Record], constants: tupl
 def _entry(suite: Suite, case: Case, drawn: Drawn, records: list[Record]) -> Entry:
     """Give the truth of a campaign, the noise in its records, and what its effects do to the held-out error.
 
-    Speeds in rad/s; `declared_fit` is the stand's own fit of the declared model to the strokes without their noise.
+    `declared_fit` is what the stand's own fit of the declared model leaves of the strokes without their noise [rad/s].
     """
-    floor, truth = noise_floor(records), drawn.arm
-    joint = weigh(drawn, np.array([each.gyro for each in drawn.trajectories]), suite.ranges) if case.planted else None
-    effects = []
-    for each in case.planted:
-        # what it alone does to the best fit of the declared model
-        alone = joint if len(case.planted) == 1 else weigh_alone(drawn, Effects(**each.sizes), suite.ranges)
-        effects.append(planted_entry(each) | {"alone": alone.told(floor["holdout"]) if alone else None})
-    fit = None
-    if joint:
-        found = {name: getattr(joint.arm, name) for name in PARAMETERS}
-        fit = {
-            "parameters": {name: brief(value) for name, value in found.items()},
-            "bias": {name: brief(value / getattr(truth, name) - 1.0) for name, value in found.items()},
-            **joint.told(floor["holdout"]),
-        }
-    raw = joint.raw if joint else (0.0,) * len(records)
+    floor = noise_floor(records)
     return {
         "class": case.label,
         "index": case.index,
-        "parameters": {name: getattr(truth, name) for name in suite.ranges},
-        "effects": effects,
-        "noise": {
-            "kind": "coloured" if case.coloured else "white",
-            "rms_deg_s": drawn.gyro.noise_deg_s,
-            "bandwidth_hz": drawn.gyro.noise_bandwidth_hz or None,
-        },
+        "parameters": {name: getattr(drawn.arm, name) for name in suite.ranges},
+        "effects": [planted_entry(each) for each in case.planted],
+        "noise": {"kind": "coloured" if case.coloured else "white", "rms_deg_s": drawn.gyro.noise_deg_s},
         "floor": floor,
-        "records": [record_entry(*pair) for pair in zip(records, raw, strict=True)],
-        "declared_fit": fit,
+        "records": [record_entry(each) for each in records],
+        "declared_fit": weigh(drawn, suite.ranges, floor["holdout"]) if case.planted else None,
     }
 
 
@@ -90,10 +70,9 @@ def planted_entry(planted: Planted) -> Entry:
     return {**told, "strength": planted.strength, "sizes": dict(planted.sizes)}
 
 
-def record_entry(record: Record, raw: float) -> Entry:
-    """Tell of a record, its noise and what the effects change in it at the true parameters [rad/s]."""
-    told = {"file": record.file, "role": record.role, **record.manoeuvre.told()}
-    return told | {"noise": brief(record.noise), "raw_change": brief(raw)}
+def record_entry(record: Record) -> Entry:
+    """Tell of a record and its noise [rad/s]."""
+    return {"file": record.file, "role": record.role, **record.manoeuvre.told(), "noise": brief(record.noise)}
 
 
 def noise_floor(records: list[Record]) -> dict[str, float | None]:

@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 from stand import RefusalError
 from stand.arm import GRAVITY, Arm, Manoeuvre
 from stand.blind.suite import Case, Suite
-from stand.effects import Effects
 from stand.gyro import Gyro, rms
 from stand.motion import SAMPLES_PER_SECOND, Motion, Trajectory, simulate
 
@@ -199,48 +198,27 @@ def fit_declared(manoeuvres: Sequence[Manoeuvre], speeds: FloatArray, truth: Arm
     return arm_at(best.x)
 
 
-Entry = dict[str, Any]
 MATTERS = 1.2
 """Effects matter when they raise the held-out error to this multiple of its noise."""
 
 
-@dataclass(frozen=True)
-class Weight:
-    """Hold a noise-free fit of the declared model: the arm found, and what it leaves in each role [rad/s].
+def weigh(drawn: Drawn, ranges: Ranges, floor: float | None) -> dict[str, Any]:
+    """Fit the declared model to the true speeds of the train strokes, and tell what it leaves in each role [rad/s].
 
-    `raw` is what the effects change in each stroke at the true parameters [rad/s].
+    `holdout_ratio` is the held-out error over its noise, `floor`; None without holdout.
     """
-
-    arm: Arm
-    left: dict[str, float | None]
-    raw: tuple[float, ...]
-
-    def told(self, floor: float | None) -> Entry:
-        """Tell what is left, and the held-out error over its noise that comes of it (None without holdout)."""
-        holdout = self.left["holdout"]
-        ratio = None if holdout is None or not floor else brief(math.hypot(holdout, floor) / floor)
-        left = {"left_train": brief(self.left["train"]), "left_holdout": brief(holdout)}
-        return left | {"holdout_ratio": ratio, "matters": None if ratio is None else ratio > MATTERS}
-
-
-def weigh(drawn: Drawn, speeds: FloatArray, ranges: Ranges) -> Weight:
-    """Fit the declared model to true speeds [rad/s], (n_strokes, n_samples); the train strokes alone decide."""
-    manoeuvres = [manoeuvre for manoeuvre, _ in drawn.strokes]
-    of = {role: [i for i, (_, each) in enumerate(drawn.strokes) if each == role] for role in ("train", "holdout")}
-    shown = {role: ([manoeuvres[i] for i in places], speeds[places]) for role, places in of.items()}
+    shown = {}
+    for role in ("train", "holdout"):
+        places = [i for i, (_, each) in enumerate(drawn.strokes) if each == role]
+        shown[role] = [drawn.strokes[i][0] for i in places], np.array([drawn.trajectories[i].gyro for i in places])
     arm = fit_declared(*shown["train"], drawn.arm, ranges)
     left = {role: rms(misses([arm], *some)) if some[0] else None for role, some in shown.items()}
-    return Weight(arm, left, tuple(rms(miss) for miss in misses([drawn.arm], manoeuvres, speeds)[0]))
-
-
-def weigh_alone(drawn: Drawn, effects: Effects, ranges: Ranges) -> Weight | None:
-    """Weigh one effect of several, as if the arm had it alone; None where that arm would leave its travel."""
-    try:
-        motions = [Motion(drawn.arm, manoeuvre, effects) for manoeuvre, _ in drawn.strokes]
-        speeds = [simulate(motion, drawn.duration_s, TOLERANCE).gyro for motion in motions]
-    except RefusalError:
-        return None
-    return weigh(drawn, np.array(speeds), ranges)
+    held = left["holdout"]
+    ratio = None if held is None or not floor else brief(math.hypot(held, floor) / floor)
+    return {
+        "left_train": brief(left["train"]), "left_holdout": brief(held), "holdout_ratio": ratio,
+        "matters": None if ratio is None else ratio > MATTERS,
+    }  # fmt: skip
 
 
 def brief(value: float | None) -> float | None:
