@@ -137,6 +137,17 @@ def test_beside_a_fit_that_creeps_nothing_is_exchanged_and_nothing_more_is_looke
     ]  # fmt: skip
 
 
+def test_no_curve_is_looked_for_where_the_next_effect_creeps(monkeypatch):
+    one, two = a_fit(1e4, "a"), a_fit(1e3, "ab")
+    looked = []
+    monkeypatch.setattr(closing, "empirical_term", lambda chosen, _: looked.append(chosen) or (None, None))
+    monkeypatch.setattr(closing, "replace", lambda found, missing: found)
+    found = SimpleNamespace(search=Search(None, known(one, two)), chosen=one, refused=None, constants=None)
+    for two.crept in (False, True):
+        assert closing.with_curve(found) is found
+    assert looked == [one]
+
+
 @pytest.mark.slow
 def test_a_pair_is_found_where_steps_over_a_narrow_sign_creep(tmp_path):
     """Campaign c381 of the families of seed 149: the arm nearly stops, and the drive that brakes loses most of itself.
