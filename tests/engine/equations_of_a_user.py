@@ -99,6 +99,10 @@ def branches(omega, level):
     return 0.0
 
 
+def nested_selections(omega, level):
+    return np.where(omega > 0.3, -level, np.where(omega > 0.1, -0.5 * level, 0.0))
+
+
 def loop(omega, level):
     total = 0.0
     for step in range(STEPS):
@@ -144,6 +148,6 @@ pair = (lambda omega, level: level + omega * 0.0, lambda omega, level: level * (
 VECTOR = [
     plain, with_helper, with_helper_by_name, helper_named_as_port, helper_of_helper, constants, constants_of_modules,
     imported_by_name, choice, logic, several_lines, where_and_clip, three_at_once, defaults, powers, closed_over, short,
-    *pair,
+    *pair, nested_selections,
 ]  # fmt: skip
 BY_LANE = [branches, loop, repeated, rare, calls_branches, names_of_the_loop]

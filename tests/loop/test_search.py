@@ -142,10 +142,19 @@ def test_no_curve_is_looked_for_where_the_next_effect_creeps(monkeypatch):
     looked = []
     monkeypatch.setattr(closing, "empirical_term", lambda chosen, _: looked.append(chosen) or (None, None))
     monkeypatch.setattr(closing, "replace", lambda found, missing: found)
-    found = SimpleNamespace(search=Search(None, known(one, two)), chosen=one, refused=None, constants=None)
-    for two.crept in (False, True):
+    monkeypatch.setattr(closing, "is_significant", lambda _: True)
+    for fits, crept, sought, said in (
+        ([one], (False, False), 1, []), ([one, two], (False, False), 1, []), ([one, two], (True, False), 0, ["a"]),
+        ([one, two], (False, True), 0, ["a + b"]),
+    ):  # fmt: skip
+        one.crept, two.crept = crept
+        search = Search(None, known(*fits))
+        found = SimpleNamespace(search=search, chosen=one, refused=None, constants=None)
         assert closing.with_curve(found) is found
-    assert looked == [one]
+        assert closing.with_curve(found) is found
+        assert [r["refused"] for r in search.rounds] == [f"the fit of {names} {search_of.CREEPS}" for names in said]
+        assert looked == [one] * 2 * sought
+        looked.clear()
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Let the tests import the test stand, which lives beside the package and not in it."""
+"""How a program of the stand refuses, for all tests of it."""
 
 from collections.abc import Callable
 from pathlib import Path

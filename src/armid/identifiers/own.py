@@ -28,10 +28,11 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         Of the identifier.
     obj : Identifier, class or function
         A subclass of pymoo's Algorithm; a function of the budget that returns an algorithm; or a function that searches
-        by itself: `value` in its arguments is what it minimises, a function of a candidate, (n_parameters,), or of
-        several at once, (n_candidates, n_parameters). It may name `low` and `high`, the bounds, SI; `budget`, the
-        simulations after which it is ended; `random`, numpy's Generator; `start`, SI, the best so far in a chain, else
-        a random point of the box. Arguments with a default are options.
+        by itself: `value` in its arguments is what it minimises, a function of a candidate, (n_parameters,), that
+        returns a number, or of several at once, (n_candidates, n_parameters), that returns (n_candidates,). It may name
+        `low` and `high`, the bounds, and `start`, the best so far in a chain, else a random point of the box, SI, each
+        (n_parameters,); `budget`, the simulations after which it is ended; `random`, numpy's Generator. Arguments with
+        a default are options.
 
     Returns
     -------
@@ -114,7 +115,7 @@ def searching(name: str, function: Callable[..., Any], budget: int, **options: A
 
 
 class Value:
-    """Answer what a search asks; a failed candidate gets a value above all that was seen, as few take infinity."""
+    """Answer what a search asks; what failed gets a value above all that was seen, as few libraries take infinity."""
 
     def __init__(self, ask: Asker, low: Array, high: Array) -> None:
         self.ask = Calls(lambda x: ask(np.clip(np.atleast_2d(x), low, high)).F)

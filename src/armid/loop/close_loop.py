@@ -57,7 +57,7 @@ from armid.loop.result import (
     estimates,
     unseen_biases_of,
 )
-from armid.loop.search import COMPARABLE, Search, SearchLevel
+from armid.loop.search import COMPARABLE, CREEPS, Search, SearchLevel
 from armid.loop.suspects import (
     FREED,
     LEFT_OUT,
@@ -399,12 +399,19 @@ def decide(search: Search) -> Decision:
 def with_curve(found: Decision) -> Decision:
     """Look for an empirical curve beside the effects, where these leave more than noise, and not for want of a step.
 
-    Nor where the fit of these, or of the best with one effect more, crept: a curve could be judged no better.
+    Not where their fit crept, as its chi2 is not that of its estimate, nor where that of the best with one effect more
+    did: how far a name would come is not known, and a curve might stand in its place. The log of rounds says so.
     """
     # Rivals that would do are an answer, though not a name; rivals that leave a discrepancy all the same are none.
     is_answered = found.refused is not None and not is_significant(found.largest)
     more = found.search.of_size(len(found.chosen.active) + 1)[:1]
-    if found.constants is not None or is_answered or any(f.crept for f in (found.chosen, *more)):
+    crept = next((f for f in (found.chosen, *more) if f.crept), None)
+    if found.constants is not None or is_answered:
+        return found
+    if crept is not None:
+        said = f"the fit of {' + '.join(crept.names)} {CREEPS}"
+        if is_significant(found.chosen) and said not in {r["refused"] for r in found.search.rounds}:
+            found.search.note_round(len(crept.active) + 1, said)
         return found
     missing, term = empirical_term(found.chosen, found.search)
     if term is None:

@@ -157,8 +157,8 @@ class ClosedLoop(Result):
     advised, in words. known_together: which parameters and constants the train records give only together, in words.
     suspects: records that differ, and samples that are no data; error_all_records: "before" and
     "after" -> errors on train and holdout with nothing left out. library, search: everything that was tried. missing:
-    the signal that the named effects leave unexplained, None where they leave nothing; term: the empirical term for it,
-    None where none earned its place.
+    the signal that the named effects leave unexplained, None where they leave nothing or it was not sought; term: the
+    empirical term for it, None where none earned its place.
     """
 
     kind: ClassVar[Kind] = LOOP
