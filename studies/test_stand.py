@@ -8,7 +8,7 @@
 The stand plays the machine: it simulates the declared arm, with any undeclared effects that are asked for, and measures
 it with a noisy gyro. It shares no code with `src/`, so a campaign is an independent check of what identifies it.
 `blind` makes many campaigns that do not tell their truth: OUT_FOLDER.key.json does, which `studies/blind/score.py`
-alone reads. RESULTS_FOLDER holds a folder for each campaign with the report.json of `armid close-loop`.
+reads, and no loop. RESULTS_FOLDER holds a folder for each campaign with the report.json of `armid close-loop`.
 `advice` makes campaigns of few strokes that leave two effects in doubt, `advised` adds the record that was advised,
 and in its place a random one.
 No machine was measured; the constants of the arm are engineering estimates. `--help` lists every option.

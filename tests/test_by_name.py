@@ -144,10 +144,13 @@ def test_an_identification_and_its_parts_are_small(found, tmp_path):
         assert len(str(inspect.signature(getattr(armid, name)))) < 800
 
 
-def test_a_folder_whose_name_is_no_utf_8(found, tmp_path):
+def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
     folder = tmp_path / os.fsdecode(b"m\xe9s")
     assert "report.html" in found.save(folder, {"command": f"armid identify --out {folder}", "settings": {}})
-    assert r"m\udce9s" in (folder / "report.html").read_text(encoding="utf-8")
+    saved = [(folder / page).read_text(encoding="utf-8") for page in ("report.html", "report.md")]
+    assert r"m\udce9s" in saved[0]
+    assert run("report", str(folder)).code == 0
+    assert [(folder / page).read_text(encoding="utf-8") for page in ("report.html", "report.md")] == saved
 
 
 @pytest.mark.parametrize(("call", "said"), [

@@ -1,7 +1,6 @@
 """How fast, how right and how large: the engine and the framework of armid against their baselines.
 
     armid bench [--quick]                 from the root of the project
-    cd studies; python -m bench [--quick]
 
 - __main__: every measurement in one run; samples: what is measured
 - engine: against scipy and a plain compiled loop (baselines), with effects, on two threads, and the fitness

@@ -1,13 +1,11 @@
 """Every ratio in one run."""
 
-import argparse
 from collections.abc import Callable
 from functools import partial
 
-from armid.registry import load_registry
 from bench.engine import effects_row, engine_rows, fitness_rows, threads_row
 from bench.framework import framework_rows
-from bench.measure import Row, bench_table
+from bench.measure import Row
 from bench.processes import memory_rows, scale_rows, startup_row
 
 Part = Callable[[], Row | list[Row]]
@@ -28,24 +26,14 @@ def bench_parts(quick: bool = False) -> dict[str, Part]:
     return {name: partial(measure, **(options if quick else {})) for name, (measure, options) in parts.items()}
 
 
-def run_bench(progress: Callable[[str], None] | None = None, quick: bool = False) -> list[Row]:
+def run_bench(quick: bool = False) -> list[Row]:
     """Measure everything, one part after the other, and return the rows of the table.
 
-    progress: called with the name of each part before it starts. quick: fewer repetitions, rougher figures.
+    quick: fewer repetitions, rougher figures.
     Raises ArmidError when armid cannot be called as a program.
     """
     rows: list[Row] = []
-    for name, part in bench_parts(quick).items():
-        if progress:
-            progress(name)
+    for part in bench_parts(quick).values():
         found = part()
         rows += found if isinstance(found, list) else [found]
     return rows
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m bench", description="Measure speed, error and memory.")
-    parser.add_argument("--quick", action="store_true", help="fewer repetitions: rougher figures in a few seconds")
-    options = parser.parse_args()
-    load_registry()
-    print(bench_table(run_bench(quick=options.quick)))

@@ -29,7 +29,7 @@ BY_KIND = (
 )
 BY_FAMILY = "Time of the processor to close one campaign, and what was withdrawn, by family."
 MISSES = "Every campaign that speaks against a target, and why."
-CONSTANT, SAMPLES = "constant:", ("gap", "clipped", "stuck", "spikes")
+CONSTANT = "constant:"
 # A fault counts that moves its record by so many times the noise; held-out is at the noise within this factor of it.
 MOVES, AT_NOISE = 2.0, 1.1
 # Held-out is worse that is by more than this share, and above the noise.
@@ -181,13 +181,13 @@ def by_kind(frame: DataFrame) -> tables.Table:
 
 
 def by_family(frame: DataFrame) -> tables.Table:
-    lines = [
-        {"family": name, "n": len(part), "withdrawn": part["withdrawn"].mean(), "median": part["cpu_seconds"].median(),
-         "most": part["cpu_seconds"].max()} for name, part in frame.groupby("family", sort=False)
-    ]  # fmt: skip
+    lines = frame.groupby("family", sort=False).agg(
+        n=("campaign", "size"), withdrawn=("withdrawn", "mean"), median=("cpu_seconds", "median"),
+        most=("cpu_seconds", "max"),
+    ).reset_index()  # fmt: skip
     show: Show = {"family": "family", "n": ("n", ".0f"), "withdrawn": ("withdrawn [%]", "%"),
             "median": ("CPU median [s]", ".3g"), "most": ("CPU most [s]", ".3g")}  # fmt: skip
-    return tables.Table("by_family", "Families", BY_FAMILY, DataFrame(lines), show)
+    return tables.Table("by_family", "Families", BY_FAMILY, lines, show)
 
 
 def misses(frame: DataFrame) -> tables.Table:

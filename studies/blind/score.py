@@ -4,7 +4,7 @@
 
 RESULTS is what `armid study` wrote (it holds study.sqlite, read here with sqlite3), or a folder with a report.json in a
 folder for each campaign, as `armid export reports` writes it; times are known of the first alone. KEY is the file that
-the test stand wrote beside the campaigns; nothing but a scorer opens it. DIR gets report.md, each table as CSV, each
+the test stand wrote beside the campaigns; no loop opens it. DIR gets report.md, each table as CSV, each
 figure as PNG. The judgements and targets are the test stand's, which shares no code with armid.
 """
 

@@ -107,7 +107,7 @@ def is_wrong_alone(rows: DataFrame) -> "Series[bool]":
 def targets_table(targets: Sequence[Target], words: str) -> Table:
     """Return one line an aim, those that inform only left to the file."""
     frame = DataFrame([
-        {"question": t.question, "measured": measured(t), "target": t.limit, "n": t.among,
+        {"question": t.question, "measured": measured(t), "target": asked(t), "n": t.among,
          "result": {True: "met", False: "missed", None: ""}[t.met], "found": t.found} for t in targets
     ])  # fmt: skip
     show = {"question": "question", "measured": "measured", "target": "target", "n": ("n", ".0f"), "result": "result"}
@@ -122,6 +122,12 @@ def measured(target: Target) -> str:
         return f"{target.found:.4g}"
     low, high = wilson(round(target.found * target.among), target.among)
     return f"{100 * target.found:.3g} % ({100 * low:.1f} to {100 * high:.1f} %)"
+
+
+def asked(target: Target) -> str:
+    """Return what was asked, of a share in per cent as it was measured."""
+    sign, _, number = target.limit.partition(" ")
+    return f"{sign} {100 * float(number):g} %" if number and target.is_share else target.limit
 
 
 def answers_by_class(rows: DataFrame) -> Table:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from stand import RefusalError
-from stand.arm import PARAMETERS, TRAVEL_DEG, Manoeuvre
-from stand.blind.campaign import campaign_files, measure_strokes, planted_entry
+from stand.arm import TRAVEL_DEG, Manoeuvre
+from stand.blind.campaign import campaign_files, entry_of, measure_strokes
 from stand.blind.draw import Drawn, draw, run, six_strokes
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Kind, Suite, kind_of, made_of_table, make_suite
@@ -99,16 +99,7 @@ def started(proof: Proof, first: First) -> tuple[Drawn, list[Record], Entry]:
     case = first.case()
     drawn = draw(proof.suite, case, np.random.default_rng([*first.key, 1]), strokes)
     records = measure_strokes(proof.suite, drawn, case.effects(), np.random.default_rng([*first.key, 2]))
-    entry = {
-        "class": "pair",
-        "pair": list(first.pair.names),
-        "place": first.place,
-        "parameters": {name: getattr(drawn.arm, name) for name in PARAMETERS},
-        "effects": [planted_entry(each) for each in case.planted],
-        "noise": {"kind": "white", "rms_deg_s": drawn.gyro.noise_deg_s},
-        "floor": {"train": None, "holdout": None},
-        "declared_fit": None,
-    }
+    entry = entry_of(case, drawn, records) | {"class": "pair", "pair": list(first.pair.names), "place": first.place}
     return drawn, records, entry
 
 

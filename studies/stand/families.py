@@ -21,7 +21,7 @@ import numpy as np
 
 from stand import RefusalError
 from stand.arm import PARAMETERS, Arm
-from stand.blind.campaign import SUITE, campaign_files, measure_strokes, noise_floor, planted_entry, record_entry
+from stand.blind.campaign import SUITE, campaign_files, entry_of, measure_strokes
 from stand.blind.draw import Drawn, draw_arm, run, six_strokes
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Suite, read_suite, signed
@@ -95,13 +95,7 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
     if trend:
         there = truth.effects()
         fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, there, there)}
-    entry = {
-        "class": family, "index": index, "parameters": {name: getattr(arm, name) for name in suite.ranges},
-        "effects": [planted_entry(p) for p in planted],
-        "noise": {"kind": "coloured" if index % 2 else "white"}, "floor": noise_floor(records),
-        "records": [record_entry(each) for each in records], "declared_fit": None, "fault": fault,
-        "constants": off, "dirt": dirt,
-    }  # fmt: skip
+    entry = entry_of(truth, drawn, records) | {"fault": fault, "constants": off, "dirt": dirt}
     return files, entry
 
 
@@ -187,7 +181,7 @@ def dirtied(table: Any, dirt: str, rng: np.random.Generator) -> Any:
 
 def main(words: Sequence[str]) -> int:
     """Make the campaigns of some families as the command line says; give the exit code, 2 when refused."""
-    parser = suite_parser("families.py", "Make campaigns as real ones are.", SUITE)
+    parser = suite_parser("stand/families.py", "Make campaigns as real ones are.", SUITE)
     parser.add_argument("families", nargs="+", metavar="FAMILY=N", help=", ".join(FAMILIES))
     return make_as_told(_make_families, words, parser)
 

@@ -13,6 +13,7 @@ import pytest
 
 from armid.cli.new import KINDS
 from armid.model import EFFECTS
+from armid.study.runner import TIME_LIMIT_S
 
 ROOT = Path(__file__).parents[2]
 
@@ -102,6 +103,7 @@ def test_help_tells_every_option(run, every_command):
             text = " ".join(ran.out.split())
             assert "--plugin FILE.py:attribute" in text
             assert "This runs the Python code of the file" in text
+    assert f"[default: ({TIME_LIMIT_S:g})]" in " ".join(run("study", "--help").out.split())
     assert run("-h").out == run("--help").out
     assert "..." not in run("--help").out.partition("Commands:")[2]
 

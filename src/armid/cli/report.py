@@ -21,6 +21,7 @@ from armid.report.result import (
     document_of,
     refuse_damaged,
     refuse_unwritable,
+    write_pages,
 )
 
 
@@ -61,9 +62,6 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     printed; one that is not complete is reported as far as it is, and the report says so. An analysis of your own,
     --plugin FILE.py:name, becomes a section of it.
     """
-    from armid.report.html import html
-    from armid.report.markdown import markdown
-
     kind = kind_in(folder)
     if kind is None:
         report_study(folder, key, plugins)
@@ -74,10 +72,8 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     document = document_of(folder, kind, str(folder))
     with NewFiles(folder) as files, refuse_damaged(folder, kind):
         present(document)
-        page = html(document)
-        files.path(kind.page).write_text(page, encoding="utf-8")
-        files.path(kind.markdown).write_text(markdown(document), encoding="utf-8")
-    say(f"wrote {kind.page} ({len(page.encode()) / 1e6:.1f} MB) and {kind.markdown} to {folder}")
+        write_pages(document, kind, files)
+    say(f"wrote {kind.page} ({(folder / kind.page).stat().st_size / 1e6:.1f} MB) and {kind.markdown} to {folder}")
     give(answer=document.said, folder=folder, files=files.names)
 
 

@@ -1,4 +1,4 @@
-"""`armid import`: campaigns from public measured data."""
+"""`armid import`: campaigns from public measured data; `armid export`: stored results for other programs."""
 
 from pathlib import Path
 

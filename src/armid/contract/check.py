@@ -1,4 +1,4 @@
-"""The entrance to all contracts; those of a campaign and of a fitness."""
+"""The entrance to all contracts; those of a campaign, a fitness and an analysis."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product

@@ -198,8 +198,9 @@ class Section:
 class Document:
     """A whole document.
 
-    of: what made it, in a word or two. answer: up to three sentences. warning: what must be known first, "" for
-    nothing. facts: how it was made, a sentence each. main: the parts of the sections that a terminal shows.
+    of: what made it, in a word or two. answer: a few sentences, the first of them alone enough. warning: what must be
+    known first, "" for nothing. facts: how it was made, a sentence each. main: the parts of the sections that a
+    terminal shows.
     """
 
     title: str

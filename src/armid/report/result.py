@@ -130,8 +130,6 @@ class Result(Shown):
 
         made_by: the command that is running and its settings, for the page.
         """
-        from armid.report.html import html
-        from armid.report.markdown import markdown
         from armid.report.style import save
 
         kind, (result, details, figures) = self.kind, self.parts
@@ -144,9 +142,16 @@ class Result(Shown):
                 stored = {"made_by": dict(made_by or {}), **details}
                 files.path(DETAILS).write_text(json.dumps(stored, allow_nan=False) + "\n", encoding="utf-8")
             document = document_of(files.place, kind, str(folder))
-            files.path(kind.markdown).write_text(markdown(document), encoding="utf-8", errors=ODD_NAMES)
-            files.path(kind.page).write_text(html(document), encoding="utf-8", errors=ODD_NAMES)
+            write_pages(document, kind, files)
         return files.names
+
+
+def write_pages(document: "Document", kind: Kind, files: "NewFiles") -> None:
+    from armid.report.html import html
+    from armid.report.markdown import markdown
+
+    for name, text in ((kind.markdown, markdown(document)), (kind.page, html(document))):
+        files.path(name).write_text(text, encoding="utf-8", errors=ODD_NAMES)
 
 
 def document_of(folder: Path, kind: Kind, name: str) -> "Document":

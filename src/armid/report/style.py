@@ -1,7 +1,7 @@
 """The style of every figure, and how figures are written."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -231,16 +231,13 @@ def name_distance(axis: Any) -> float:
     return float(APART_INCH / (axis.figure.get_size_inches()[1] / grid.nrows - FRAME_INCH))
 
 
-def spread(heights: Iterable[float], apart: float) -> list[float]:
+def spread(heights: Sequence[float], apart: float) -> Array:
     """Return rising heights moved at least so far apart, as little as it takes in the sense of least squares.
 
     What has to be moved moves as a group that stays around its mean; groups are kept within 0 and 1 if they fit.
     """
-    groups: list[list[float]] = []
-    for i, height in enumerate(heights):
-        groups.append([height - apart * i])
-        while len(groups) > 1 and np.mean(groups[-2]) > np.mean(groups[-1]):
-            groups[-2:] = [groups[-2] + groups[-1]]
-    levels = [float(np.mean(group)) for group in groups for _ in group]
-    room = 1.0 - apart * (len(levels) - 1)
-    return [min(max(level, 0.0), max(room, 0.0)) + apart * i for i, level in enumerate(levels)]
+    from scipy.optimize import isotonic_regression
+
+    steps = apart * np.arange(len(heights))
+    room = max(1.0 - apart * (len(heights) - 1), 0.0)
+    return np.clip(isotonic_regression(heights - steps).x, 0.0, room) + steps

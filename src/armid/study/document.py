@@ -13,7 +13,7 @@ from armid.report.files import write_files
 from armid.report.html import html
 from armid.report.markdown import markdown
 from armid.report.result import NewFiles
-from armid.study.analyses.analysis import PAPER, Evidence, wide_runs
+from armid.study.analyses.analysis import PAPER, Evidence, is_swarm, wide_runs
 from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, own_sections
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
@@ -100,7 +100,7 @@ def beside_paper(evidence: Evidence, frame: Any) -> tuple[str, ...]:
     """Return whether the paper's table is reproduced, and beaten at a quarter of the cost; nothing without its row."""
     setting = evidence.settings[0]
     ours = frame[(frame["variant"] != PAPER) & (frame["setting"] == setting)].set_index("variant")
-    swarms = ours.loc[[v for v in ours.index if v.startswith("pso") and "+" not in v]]
+    swarms = ours.loc[[v for v in ours.index if is_swarm(v)]]
     printed = frame.loc[frame["variant"] == PAPER, "largest_median"]
     if printed.empty or swarms.empty:
         return ()

@@ -212,10 +212,11 @@ class LoopSpec:
     """Declare a study that closes the loop on every campaign of a folder.
 
     campaigns: folder of campaigns, relative to the study's file. made_by: the command that makes it, for people. key:
-    file that holds the truth, for who scores; neither study nor report opens it. report: for who scores too. only:
-    patterns of names of campaigns. candidates: effects to look for, empty: all; without: those that are left out.
-    rivals: patterns of names of campaigns -> the effects that are looked for there, in place of the candidates.
-    suite: what the campaigns are made of, for who makes them; the study does not read it.
+    file that holds the truth, for who scores; neither study nor report opens it. report: given where they are
+    SYNTHETIC, which the page then says. only: patterns of names of campaigns. candidates: effects to look for, empty:
+    all; without: those that are left out. rivals: patterns of names of campaigns -> the effects that are looked for
+    there, in place of the candidates. suite: what the campaigns are made of, for who makes them; the study does not
+    read it.
     """
 
     name: str = field(metadata=STUDY_NAME)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from stand.arm import PARAMETERS
 from stand.blind.draw import Drawn, brief, draw, one_stroke, six_strokes, weigh
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
 from stand.blind.suite import Case, Planted, Suite, cases_of, read_suite, shuffled
@@ -28,7 +29,11 @@ def make_campaign(suite: Suite, seed: int, named: tuple[str, Case]) -> tuple[dic
     drawn = draw(suite, case, np.random.default_rng([seed, 2, case.index]), strokes_of)
     records = measure_strokes(suite, drawn, case.effects(), np.random.default_rng([seed, 3, case.index]))
     files = {**campaign_files(name, drawn.gyro, records), "README.md": f"# {name}\n\n{SAID}\n"}
-    return files, _entry(suite, case, drawn, records)
+    entry = entry_of(case, drawn, records)
+    if case.planted:
+        # what the stand's own fit of the declared model leaves of the strokes without their noise [rad/s]
+        entry["declared_fit"] = weigh(drawn, suite.ranges, entry["floor"]["holdout"])
+    return files, entry
 
 
 def measure_strokes(suite: Suite, drawn: Drawn, effects: Effects, rng: np.random.Generator) -> list[Record]:
@@ -46,21 +51,17 @@ def campaign_files(name: str, gyro: Gyro, records: list[Record], constants: tupl
     return files | {"campaign.toml": campaign_text([SAID], name, gyro, records, constants=constants)}
 
 
-def _entry(suite: Suite, case: Case, drawn: Drawn, records: list[Record]) -> Entry:
-    """Give the truth of a campaign, the noise in its records, and what its effects do to the held-out error.
-
-    `declared_fit` is what the stand's own fit of the declared model leaves of the strokes without their noise [rad/s].
-    """
-    floor = noise_floor(records)
+def entry_of(case: Case, drawn: Drawn, records: list[Record]) -> Entry:
+    """Give what the key tells of a campaign: its truth, and the noise in its records [rad/s]."""
     return {
         "class": case.label,
         "index": case.index,
-        "parameters": {name: getattr(drawn.arm, name) for name in suite.ranges},
+        "parameters": {name: getattr(drawn.arm, name) for name in PARAMETERS},
         "effects": [planted_entry(each) for each in case.planted],
         "noise": {"kind": "coloured" if case.coloured else "white", "rms_deg_s": drawn.gyro.noise_deg_s},
-        "floor": floor,
+        "floor": noise_floor(records),
         "records": [record_entry(each) for each in records],
-        "declared_fit": weigh(drawn, suite.ranges, floor["holdout"]) if case.planted else None,
+        "declared_fit": None,
     }
 
 

@@ -35,7 +35,7 @@ def write_campaigns(options: argparse.Namespace, named: Mapping[str, Any], make:
     with replacing(options.folder) as fresh, ProcessPoolExecutor(options.processes) as pool:
         run = map if options.processes == 1 else pool.map
         entries = dict(zip(named, run(partial(_write_campaign, fresh, make), named.items()), strict=True))
-        head = {"made_by": "studies/test_stand.py blind", "unit": "rad/s", "seed": options.seed}
+        head = {"made_by": options.program, "unit": "rad/s", "seed": options.seed}
         text = json.dumps({**head, "campaigns": entries}, indent=1) + "\n"
         key_path(options.folder.resolve()).write_text(text)
 
@@ -53,6 +53,7 @@ def _write_campaign(fresh: Path, make: Make, named: tuple[str, Any]) -> Entry:
 def suite_parser(program: str, said: str, suite: Path, processes: int = 1) -> Parser:
     """Give the parser of a command that makes many campaigns; suite, processes: what it takes unless told."""
     parser = Parser(prog=program, description=f"{said} SYNTHETIC.", allow_abbrev=False)
+    parser.set_defaults(program=f"studies/{program}")
     parser.add_argument("folder", type=Path, metavar="OUT_FOLDER", help="where the campaign folders go")
     parser.add_argument("--seed", type=int, required=True, help="seed of all that is drawn")
     parser.add_argument("--suite", type=Path, default=suite, help=f"what describes it (default studies/{suite.name})")

@@ -1,7 +1,6 @@
 """Hold the judgements of a suite against the targets."""
 
 import operator
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
@@ -44,7 +43,7 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
     not_claimed = [row["judgement"] != "claimed" for row in unlisted]
     return [
         without_report(missing, len(rows) + missing),
-        *_controls(rows),
+        share("controls: false alarms", _of(rows, "control"), lambda row: row["judgement"] != "right", "<= 0.02"),
         *_singles(rows),
         share("two effects: both right", _of(rows, "two"), _is_right, ">= 0.8"),
         *_fits(rows),
@@ -61,59 +60,33 @@ def without_report(missing: int, among: int) -> Target:
     return aim("campaigns without a report", missing, among, "= 0")
 
 
-def _controls(rows: Sequence[Row]) -> list[Target]:
-    lines = []
-    for words, noise, limit in (("", ("white", "coloured"), "<= 0.02"), (" with white noise", ("white",), ""),
-                                (" with coloured noise", ("coloured",), "")):  # fmt: skip
-        some = [row for row in _of(rows, "control") if row["noise"] in noise]
-        lines.append(share(f"controls{words}: false alarms", some, lambda row: row["judgement"] != "right", limit))
-    return lines
-
-
 def _singles(rows: Sequence[Row]) -> list[Target]:
     singles = _of(rows, "single")
     weighty = [row for row in singles if row["matters"]]
     alone = [row["judgement"] == "wrong" and row["wrong_alone"] for row in weighty]
     held = "single effects that move the held-out error by more than 20 %"
-    lines = [
+    sizes = [row["group_of_truth"] for row in weighty if row["group_of_truth"]]
+    return [
         share(f"{held}: share of all", singles, lambda row: row["matters"], ">= 0.7"),
         share(f"{held}: right name, or a group that holds it", weighty, _is_right, ">= 0.95"),
         # the truth is in no name and no group, and a name stands without a group
         share(f"{held}: wrong name alone", alone, bool, "<= 0.02"),
+        _summary(f"{held}: mean size of the group that holds the truth", sizes, of=fmean),
     ]
-    for word, count in sorted(Counter(row["judgement"] for row in weighty).items()):
-        lines.append(Target(f"{held}: judged {word}", count / len(weighty), len(weighty), is_share=True))
-    for matching in (True, False):
-        some = [row for row in weighty if row["matching"] == matching]
-        form = "matching" if matching else "non-matching"
-        after = _column(some, "after_over_floor")
-        lines.append(share(f"{held}, {form} form: right name, or a group that holds it", some, _is_right))
-        lines.append(_summary(f"{held}, {form} form: held-out error over noise, median", after))
-    sizes = [row["group_of_truth"] for row in weighty if row["group_of_truth"]]
-    return [*lines, _summary(f"{held}: mean size of the group that holds the truth", sizes, of=fmean)]
 
 
 def _fits(rows: Sequence[Row]) -> list[Target]:
     """Look at the held-out error and the bias for listed effects in a matching form."""
     listed = [row for row in (*_of(rows, "single"), *_of(rows, "two")) if row["matching"]]
     held = "listed effects in a matching form"
-    before, after = (
-        [abs(row[f"bias_{when}_{name}"]) for row in listed for name in PARAMETERS] for when in ("before", "after")
-    )
+    bias = [abs(row[f"bias_after_{name}"]) for row in listed for name in PARAMETERS]
     errors = [row for row in listed if row["after_over_floor"] is not None]
-    lines = [
+    return [
         _summary(f"{held}: held-out error over noise, median", _column(listed, "after_over_floor"), "<= 1.1"),
         share(f"{held}: held-out error up to 1.10 of noise", errors, lambda row: row["after_over_floor"] <= 1.10),
         _summary(f"{held}: held-out error over noise before, median", _column(listed, "before_over_floor")),
-        _summary(f"{held}: bias of the four parameters, median", after, "<= 0.01"),
-        _summary(f"{held}: bias before, median", before),
-        _summary(f"{held}: bias before, largest", before, of=max),
-        _summary(f"{held}: bias after, largest", after, of=max),
+        _summary(f"{held}: bias of the four parameters, median", bias, "<= 0.01"),
     ]
-    for name in PARAMETERS:
-        some = [abs(row[f"bias_after_{name}"]) for row in listed]
-        lines.append(_summary(f"{held}: bias of {name}, median", some))
-    return lines
 
 
 def _of(rows: Sequence[Row], label: str) -> list[Row]:

@@ -217,11 +217,16 @@ class Evidence:
     @cached_property
     def interesting(self) -> list[str]:
         """The paper's own swarm in every form that was run, then the best of the others."""
-        own = [v for v in self.variants if v.startswith("pso") and "+" not in v]
+        own = [v for v in self.variants if is_swarm(v)]
         return own + [v for v in self.best_first if v not in own][:MOST_OTHERS]
 
     def of(self, setting: str) -> DataFrame:
         return self.runs[self.runs["setting"] == setting]
+
+
+def is_swarm(variant: str) -> bool:
+    """Tell whether a variant is the paper's swarm, in whatever form and with nothing after it."""
+    return variant.startswith("pso") and "+" not in variant
 
 
 def wide_runs(evidence: Evidence) -> DataFrame:

@@ -15,7 +15,7 @@ from pandas import DataFrame, Series
 from armid.model import Array
 from armid.report.document import Column, Figure, Part, Table, Text, slug
 from armid.report.style import INK, look, pyplot
-from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
+from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, is_swarm
 
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
 FLOOR = 1e-8
@@ -308,7 +308,7 @@ def swarm_pairs(evidence: Evidence) -> Table:
     problem_of, rows = {c["name"]: c["suite"] for c in evidence.study["cases"]}, []
     for setting in evidence.settings:
         values = final_values(evidence, setting)
-        swarm = next((v for v in values.columns if v.startswith("pso") and "+" not in v), None)
+        swarm = next((v for v in values.columns if is_swarm(v)), None)
         if swarm is None or values.empty or values.shape[1] < 2:
             continue
         logs = DataFrame(np.log(values), index=values.index, columns=values.columns)
