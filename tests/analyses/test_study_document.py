@@ -193,3 +193,5 @@ def test_the_answer_is_that_of_the_main_table(made):
     answer = report_of(made(seeds=2, noises=(0.0,), identifiers={"near": 1e-6, "far": 1e-1})).answer
     assert answer[0].startswith("Nearest to the truth: noise-free: near, ")
     assert "Of 2 identifiers the furthest is far with" in answer[1]
+    alone = report_of(made(seeds=2, noises=(0.0,), identifiers={"near": 1e-6})).answer
+    assert [sentence.partition(":")[0] for sentence in alone] == ["Nearest to the truth", "Complete"]

@@ -136,7 +136,7 @@ def known_kind(study: dict[str, Any]) -> str:
     return kind
 
 
-def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
+def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, ...]:
     """Return who came nearest to the truth, and how the others (or the paper's result) stand to that."""
     is_paper = overview.frame["variant"] == PAPER
     ours, paper = overview.frame[~is_paper], overview.frame[is_paper]
@@ -155,6 +155,8 @@ def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, str]:
         error = float(paper["largest_median"].iloc[0])
         return first, (f"{PAPER[0].upper()}{PAPER[1:]}, from its printed values on its own data, has {percent(error)}; "
                        f"{(medians < error).sum()} of {len(medians)} identifiers are below that.")  # fmt: skip
+    if len(medians) == 1:
+        return (first,)
     return first, f"Of {len(medians)} identifiers the furthest is {medians.idxmax()} with {percent(medians.max())}."
 
 
