@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import armid
 from armid.loop import close_loop
 from armid.loop.candidates import EffectKey
 from armid.loop.diagnose import square_along
 from armid.loop.equivalence import likest
 from armid.loop.fit import decomposed
-from armid.loop.score_test import rest_of, score
+from armid.loop.score_test import proven_biases, rest_of, score
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
 NAMES = ("coulomb", "quadratic_drag", "viscous")
+GAIN = "drive_gain"
 T = np.linspace(0.0, 1.0, 400)
 BASIS = np.linalg.qr(np.column_stack([np.ones_like(T), T]))[0]
 CHANGE = 3.0 * np.sin(9.0 * T) + 5.0 * T
@@ -27,7 +29,7 @@ def closed(write_axis, tmp_path_factory):
     speed = 8.0 / 5.0 * (1.0 - np.exp(-5.0 * times / 2.0)) + noise
     bounds = "[parameters.mass]\nlow = 1\nhigh = 4\n"
     campaign = read_campaign(write_axis(tmp_path_factory.mktemp("axis"), speed, bounds))
-    return close_loop(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in NAMES})
+    return close_loop(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in (*NAMES, GAIN)})
 
 
 def test_the_drop_is_what_the_change_takes_off_the_residual(closed):
@@ -90,3 +92,27 @@ def test_what_moves_the_signal_alike_is_found_with_its_amplitude():
 def test_none_is_near_where_it_moves_otherwise_the_other_way_or_not_at_all():
     for moved in (np.cos(9.0 * T), -np.sin(9.0 * T), 2.0 + 7.0 * T, np.zeros_like(T)):
         assert likest(CHANGE, moved[np.newaxis], BASIS) is None
+
+
+def test_a_bias_is_proven_where_another_strength_and_other_parameters_move_alike(closed):
+    """Force, mass and friction that grow alike leave the motion as it is: 30 % is the most that is tried.
+
+    Dry friction takes from the constant force what a smaller gain would; drag shows.
+    """
+    fit = closed.after.fit
+    assert list(fit.values) == ["mass", "viscous.slope"]
+    proven = proven_biases(fit, closed.library, 0.01)
+    for same in (GAIN, "coulomb"):
+        assert proven[same] / fit.x == pytest.approx([0.3, 0.3], rel=0.03)
+    assert np.all(proven["quadratic_drag"] < 0.05 * fit.x)
+    assert all("could bias it by" in doubt for e in closed.after.estimates[:2] for doubt in e.doubts)
+    assert not any(e.trusted for e in closed.after.estimates)
+
+
+def test_what_could_bias_a_parameter_unseen_holds_the_error_that_it_made():
+    """One stroke, synthetic: friction of 25 N m that the records do not show puts p0 off its true 3.05 MPa."""
+    found = armid.close_loop("studies/campaigns/one_stroke")
+    off = abs(found.parameters["p0"] / 3.05e6 - 1.0)
+    assert 0.05 < off < 0.1
+    proven = proven_biases(found.after.fit, found.library, 0.01)["coulomb"]
+    assert off < proven[list(found.after.fit.values).index("p0")] / found.parameters["p0"] < 4.0 * off

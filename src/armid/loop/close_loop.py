@@ -41,6 +41,7 @@ from armid.loop.equivalence import WITHIN, EffectGroup, group_of, rival_models
 from armid.loop.fit import Fit, behind, criterion, predicted_alike, with_standard_accuracy
 from armid.loop.missing_signal import Missing
 from armid.loop.result import (
+    BIASED,
     CARRIES_NOT,
     DISAGREES,
     EXPLAINED,
@@ -49,7 +50,6 @@ from armid.loop.result import (
     PARTLY,
     TOO_ALIKE,
     UNEXPLAINED,
-    Biases,
     ClosedLoop,
     Judgement,
     Step,
@@ -57,6 +57,7 @@ from armid.loop.result import (
     estimates,
     unseen_biases_of,
 )
+from armid.loop.score_test import proven_biases
 from armid.loop.search import COMPARABLE, CREEPS, Search, SearchLevel
 from armid.loop.suspects import (
     FREED,
@@ -169,8 +170,7 @@ def close_loop(
     holdout, stranger = suspect_held_out(found.chosen, campaign.holdout, library)
     suspects += [stranger] if stranger is not None else []
     there = replace(campaign, records=(*train, *holdout))
-    biases = unseen_biases_of(found.declared, search.scores_at(found.declared))
-    judged = [judge(f, library, there, biases, found.members if f is found.chosen else ()) for f in found.path]
+    judged = [judge(f, found, there, found.members if f is found.chosen else ()) for f in found.path]
     steps, before, after = steps_of(found, judged[1:]), judged[0], judged[-1]
     if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
         steps = tuple(replace(step, claimed=False) for step in steps)
@@ -498,17 +498,26 @@ def is_denied(before: Judgement, after: Judgement) -> bool:
     return is_more and new.errors.joint_nrmse > DENIED * old.errors.joint_nrmse
 
 
-def judge(fit: Fit, library: Library, campaign: Campaign, biases: Biases, members: Sequence[Fit]) -> Judgement:
+def judge(fit: Fit, found: "Decision", campaign: Campaign, members: Sequence[Fit]) -> Judgement:
     """Return errors, parameters and tests of a fit on train and holdout.
 
-    biases: see `unseen_biases_of`. members: models that cannot be told from it, over which intervals reach.
+    found: the decision to which the fit belongs. members: models that cannot be told from it, over which intervals
+    reach.
     """
+    library, curved = found.library, any(key.is_empirical for key in fit.active)
+    scored = found.declared if curved else fit
+    biases = [(s.key.public, s.biases) for s in found.search.scores_at(scored)]
     fit = with_standard_accuracy(fit)
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
     remains = any(r.diagnosis.significant for r in (seen, unseen) if r is not None)
+    # Where constants are others than declared, the candidates are posed with the declared ones.
+    if not (remains or curved or fit.constants):
+        library.say("looking for what could bias the parameters unseen")
+        biases += proven_biases(fit, library, BIASED).items()
     model = Model(library.declared.plant,
                   (*library.declared.effects, *(library.candidates[k.declared] for k in fit.active)))  # fmt: skip
-    return Judgement(fit, model, estimates(fit, library, remains, biases, members), seen, unseen)
+    told = unseen_biases_of(scored if curved else fit, biases)
+    return Judgement(fit, model, estimates(fit, library, remains, told, members), seen, unseen)
 
 
 def verdicts_of(

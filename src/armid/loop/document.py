@@ -68,6 +68,8 @@ MOST_TOLD, MOST_PORTS, MOST_EXACT = 3, 5, 5
 HOPELESS = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
+# A smaller share would read as 0 %.
+LEAST_SHARE = 0.005
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {
     "parameters": ("Parameters before and after", "Values with 95 % intervals; open marks are not to be trusted."),
@@ -468,8 +470,10 @@ def missing_sentences(missing: Missing) -> list[str]:
     ports = ", ".join(f"{s.port} {max(s.share, 0.0):.0%}" for s in missing.signals[:MOST_PORTS])
     said = [f"A signal without a form would remove this share of the residual at port: {ports}."]
     best = {d.variable: d for d in sorted(missing.dependences, key=lambda d: d.share)}
-    ranked = sorted(best.values(), key=lambda d: -d.share)[:MOST_PORTS]
-    curves = ", ".join(f"{d.variable}{TIMES[d.factor]} at {d.port} {max(d.share, 0.0):.0%}" for d in ranked)
+    ranked = sorted((d for d in best.values() if d.share >= LEAST_SHARE), key=lambda d: -d.share)[:MOST_PORTS]
+    curves = ", ".join(f"{d.variable}{TIMES[d.factor]} at {d.port} {d.share:.0%}" for d in ranked)
+    if not curves:
+        return [*said, "On what it depends was not found: no curve predicts parts left out of its fit."]
     return [*said, f"On what it depends, by the share that a curve predicts on parts left out of its fit: {curves}."]
 
 

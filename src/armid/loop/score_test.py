@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
+from armid.estimation.least_squares import descend
 from armid.loop.candidates import Activation, EffectKey, Library, activation_grid, idle
 from armid.loop.fit import UNTOLD, Fit, beyond
 from armid.loop.whitening import WhiteRecords
@@ -17,6 +18,9 @@ N_TRIED = 8
 MOST_TWINS = 16
 # A fall of chi2 that is not noticed among so many candidates.
 UNSEEN = 12.0
+# Share of the range whose secant is a slope; relative changes of a parameter that are tried, the largest first; of how
+# many shapes and signs of an effect; relative fall of chi2 in one step at which such a fit has arrived.
+SLIGHT, SIZES, N_PROVED, PROVED = 1e-4, (0.3, 0.1, 0.03, 0.012), 2, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +30,7 @@ class Score:
     drop: predicted fall of chi2. p: chance of such a drop from noise alone, for one candidate, its grid of shapes
     counted. starts: free parameters of the extended model from which to refit (shares of the range), best first.
     n_shapes: grid of shapes.
-    biases: by how much the effect could bias each free parameter unseen, relative to its value, (n_free,).
+    biases: by how much the effect could bias each free parameter unseen, to first order, SI, (n_free,).
     share: length of its sensitivity after projection off the parameters' as a share of that before. alignment: cosine
     between what is left of it and what is left of the residual; its square is the share of the residual that an
     unbounded amplitude would remove. twin: a candidate with a larger drop that would do the same, so that the records
@@ -114,7 +118,7 @@ def responses(
 
 
 def unseen_biases(current: Fit, moved: Array, answers: Array) -> Array:
-    """Return the largest relative change of each free parameter that strengths within the range could cause unseen.
+    """Return the largest change of each free parameter, SI, that strengths within the range could cause unseen.
 
     A strength a adds a^2 q to chi2, q the squared length of the change of the signal beyond the reach of the
     parameters; below UNSEEN it is not noticed, while the parameters make up for the rest.
@@ -125,8 +129,68 @@ def unseen_biases(current: Fit, moved: Array, answers: Array) -> Array:
     if not current.n_free or not good.any():
         return np.zeros(current.n_free)
     share = np.minimum(1.0, np.sqrt(UNSEEN / np.maximum(square_beyond(current.basis, moved[good]), 1e-12)))
-    largest = np.max(np.abs(answers[good]) * share[:, np.newaxis], axis=0) * current.records.span
-    return np.asarray(largest / np.maximum(np.abs(current.x), 1e-300))
+    return np.asarray(np.max(np.abs(answers[good]) * share[:, np.newaxis], axis=0) * current.records.span)
+
+
+def proven_biases(current: Fit, library: Library, least: float) -> dict[str, Array]:
+    """Return by how much each candidate could bias the free parameters unseen, SI, {public name: (n_free,)}.
+
+    A bias is proven by a fit: the parameters are fitted beside a strength of the effect, and chi2 rises by no more than
+    UNSEEN. That holds where the motion answers to strengths along a curve, which secants leave (see `unseen_biases`).
+    least: relative change of a parameter below which none is looked for.
+    """
+    library = library.about(current.records.replays, current.misfit)
+    found: dict[str, Array] = {}
+    keys = library.joinable(current.active)
+    for key, own in zip(keys, library.each(lambda key: proven_bias(current, library, key, least), keys), strict=True):
+        found[key.public] = np.maximum(own, found.get(key.public, 0.0))
+    return found
+
+
+def proven_bias(current: Fit, library: Library, key: EffectKey, least: float) -> Array:
+    """Return what `proven_biases` asks for of one candidate, (n_free,)."""
+    records, found = library.problem((*current.active, key), current.values), np.zeros(current.n_free)
+    every, _ = activation_grid(records, key)
+    grid = [replace(a, share=SLIGHT) for a in every if a.share == every[0].share]
+    moved = responses(current, records, grid)
+    good = np.isfinite(moved).all(axis=1)
+    moved[~good] = 0.0
+    answers = (current.answer @ moved.T).T
+    relative = np.abs(answers) * current.records.span / np.where(current.x == 0.0, np.inf, np.abs(current.x))
+    reach = np.minimum(1.0, np.sqrt(UNSEEN / np.maximum(square_beyond(current.basis, moved), 1e-12)))
+    promised = np.max(relative, axis=1, initial=0.0) * np.where(good, reach, 0.0)
+    for i in np.argsort(-promised, kind="stable")[:N_PROVED]:
+        if promised[i] <= least:
+            break
+        shares = dict.fromkeys(min(size / float(relative[i].max()), 1.0) for size in SIZES)
+        for share in (s for s in shares if s <= reach[i]):
+            x = fitted_beside(current, records, grid[i].at(share), current.z - share * answers[i])
+            if x is not None:
+                found = np.maximum(found, np.abs(x - current.x))
+                break
+    return found
+
+
+def fitted_beside(current: Fit, records: WhiteRecords, strength: Mapping[str, float], z: Array) -> Array | None:
+    """Return the free parameters of a fit, SI, fitted beside a given effect; None where the records tell of it.
+
+    z: from where, shares of the range.
+    """
+    space = records.space
+    for name, value in strength.items():
+        space = space.with_fixed(name, value)
+    order = [list(current.values).index(name) for name in space.free_names]
+    posed, without = replace(records, space=space), candidate_at(records, current.values)
+    left = records.data.white([r.measured for r in records.replays]) - records.whole_signals(without[np.newaxis])[0]
+    limit, start = float(left @ left) + UNSEEN, np.clip(z, 0.0, 1.0)[order]
+    if not np.isfinite(posed.chi2(start[np.newaxis])[0]):
+        return None
+    end = descend(posed, [start], PROVED, limit=limit)
+    if posed.chi2(end[np.newaxis])[0] > limit:
+        return None
+    x = np.empty(current.n_free)
+    x[order] = posed.values(end)
+    return x
 
 
 def square_beyond(basis: Array, moved: Array) -> Array:

@@ -483,7 +483,8 @@ def suspect_sentence(s: Suspect) -> str:
     if s.kind == "push":
         return f"{s.record}: pushed from {s.from_s:.3g} to {s.to_s:.3g} s; it is left out."
     if s.kind == "label" or s.value is None or s.low is None or s.high is None:
-        return f"{s.record} looks like a record of another load{'; it is left out' if s.action == LEFT_OUT else ''}."
+        left = "; it is left out" if s.action == LEFT_OUT else ""
+        return f"{s.record} looks like a record of another load, or of other inputs than it tells{left}."
     if s.kind == "trend":
         grew, low, high = ("larger" if s.value > 0.0 else "smaller"), *sorted((abs(s.low), abs(s.high)))
         size = f"{factor * abs(s.value):.3g}{unit} ({factor * low:.3g} to {factor * high:.3g})"
