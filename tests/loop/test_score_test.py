@@ -1,10 +1,13 @@
 """Scores, what stands behind them, and what could take an effect's place: geometry that the score does not use."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import armid
+from armid.estimation.mends import Suspicion
 from armid.loop import close_loop
 from armid.loop.candidates import EffectKey
 from armid.loop.diagnose import square_along
@@ -22,14 +25,18 @@ CHANGE = 3.0 * np.sin(9.0 * T) + 5.0 * T
 
 
 @pytest.fixture(scope="module")
-def closed(write_axis, tmp_path_factory):
-    """An axis whose viscous friction is not declared, recorded with a little noise."""
+def axis(write_axis, tmp_path_factory):
+    """Return a campaign of an axis whose viscous friction is not declared, recorded with a little noise."""
     times = np.arange(401) / 200.0
     noise = 1e-3 * np.random.default_rng(1).standard_normal(401)
     speed = 8.0 / 5.0 * (1.0 - np.exp(-5.0 * times / 2.0)) + noise
     bounds = "[parameters.mass]\nlow = 1\nhigh = 4\n"
-    campaign = read_campaign(write_axis(tmp_path_factory.mktemp("axis"), speed, bounds))
-    return close_loop(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in (*NAMES, GAIN)})
+    return read_campaign(write_axis(tmp_path_factory.mktemp("axis"), speed, bounds))
+
+
+@pytest.fixture(scope="module")
+def closed(axis):
+    return close_loop(Model(axis.plant), axis, {n: EFFECTS[n] for n in (*NAMES, GAIN)})
 
 
 def test_the_drop_is_what_the_change_takes_off_the_residual(closed):
@@ -116,3 +123,18 @@ def test_what_could_bias_a_parameter_unseen_holds_the_error_that_it_made():
     assert 0.05 < off < 0.1
     proven = proven_biases(found.after.fit, found.library, 0.01)["coulomb"]
     assert off < proven[list(found.after.fit.values).index("p0")] / found.parameters["p0"] < 4.0 * off
+
+
+def test_what_the_screen_suspects_is_told_where_the_loop_found_nothing_better(axis, monkeypatch):
+    seen = [Suspicion(kind, "axis.csv", f"axis.csv: {kind}.") for kind in ("late", "unjudged", "rest")]
+    monkeypatch.setattr(import_module("armid.loop.close_loop"), "screen", lambda *_: seen)
+    explained, at_a_loss = (
+        close_loop(Model(axis.plant), axis, {n: EFFECTS[n] for n in names}, curve=False)
+        for names in (["viscous"], ["drive_gain"])
+    )
+    assert (explained.verdict, at_a_loss.verdict) == ("explained", "unexplained")
+    assert "axis.csv: late." not in explained.next_steps
+    assert at_a_loss.next_steps[:2] == ("axis.csv: late.", "axis.csv: rest.")
+    for found in (explained, at_a_loss):
+        assert "axis.csv: rest." in found.next_steps
+        assert "axis.csv: unjudged." not in found.next_steps

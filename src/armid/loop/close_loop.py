@@ -85,8 +85,9 @@ MOST_COMPARED = 4
 MOST_FAULTY = 4
 # Held-out records deny an addition with which their error is so many times that before, and that of the noise.
 DENIED, OVER_NOISE = 1.02, 1.1
-# Mistakes of the screen of records that leave nothing to search for.
+# Mistakes of the screen of records that leave nothing to search for, and what it tells whatever the loop finds.
 GROSS = ("sign", "unit", "time", "angle", "exchanged", "input", "position")
+TOLD = (*GROSS, "start", "noise", "rest", "twice")
 
 
 # Threads of the linear algebra inside our own threads would only wait for each other.
@@ -194,7 +195,9 @@ def close_loop(
     together = known_together(named, library)
     # A record held out that is one of those to train on is none.
     screened = (*screened, *given_twice(campaign.records))
-    told_first = dict.fromkeys(s.sentence for s in screened if s.kind in (*GROSS, "start", "noise", "rest", "twice"))
+    # Other suspicions rest on the declared model: they are told where nothing better was found.
+    at_a_loss = not {UNEXPLAINED, CARRIES_NOT}.isdisjoint(verdicts)
+    told_first = dict.fromkeys(s.sentence for s in screened if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
     said = (*told_first, *next_steps_of(found, suspects))
     return ClosedLoop(there, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
                       found.rivals, advice, said, together, tuple(suspects), every, library, search, found.missing,
