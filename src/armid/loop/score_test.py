@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from scipy.special import chdtrc
@@ -18,9 +19,9 @@ N_TRIED = 8
 MOST_TWINS = 16
 # A fall of chi2 that is not noticed among so many candidates.
 UNSEEN = 12.0
-# Share of the range whose secant is a slope; relative changes of a parameter that are tried, the largest first; of how
-# many shapes and signs of an effect; relative fall of chi2 in one step at which such a fit has arrived.
-SLIGHT, SIZES, N_PROVED, PROVED = 1e-4, (0.3, 0.1, 0.03, 0.012), 2, 1e-4
+# Share of the range whose secant is a slope; relative changes of a parameter that are tried, the largest first; by what
+# factor a promise has to exceed what is proven; relative fall of chi2 in one step at which such a fit has arrived.
+SLIGHT, SIZES, MORE, PROVED = 1e-4, (0.3, 0.1, 0.03, 0.012), 1.5, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,42 +134,73 @@ def unseen_biases(current: Fit, moved: Array, answers: Array) -> Array:
 
 
 def proven_biases(current: Fit, library: Library, least: float) -> dict[str, Array]:
-    """Return by how much each candidate could bias the free parameters unseen, SI, {public name: (n_free,)}.
+    """Return by how much candidates could bias the free parameters unseen, SI, {public name: (n_free,)}.
 
     A bias is proven by a fit: the parameters are fitted beside a strength of the effect, and chi2 rises by no more than
     UNSEEN. That holds where the motion answers to strengths along a curve, which secants leave (see `unseen_biases`).
+    Those that promise most come first; what promises hardly more than is proven already is not asked.
     least: relative change of a parameter below which none is looked for.
     """
     library = library.about(current.records.replays, current.misfit)
+    each = library.each(lambda key: promised_biases(current, library, key), library.joinable(current.active))
     found: dict[str, Array] = {}
-    keys = library.joinable(current.active)
-    for key, own in zip(keys, library.each(lambda key: proven_bias(current, library, key, least), keys), strict=True):
-        found[key.public] = np.maximum(own, found.get(key.public, 0.0))
+    known = np.zeros(current.n_free)
+    for promise in sorted(chain.from_iterable(each), key=lambda p: -float(p.sizes.max(initial=0.0))):
+        if np.any(promise.sizes > np.maximum(least, MORE * known)):
+            bias = proven_bias(current, promise)
+            name = promise.key.public
+            found[name] = np.maximum(bias, found.get(name, 0.0))
+            known = np.maximum(known, bias / magnitudes(current))
     return found
 
 
-def proven_bias(current: Fit, library: Library, key: EffectKey, least: float) -> Array:
-    """Return what `proven_biases` asks for of one candidate, (n_free,)."""
-    records, found = library.problem((*current.active, key), current.values), np.zeros(current.n_free)
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """Hold what one shape and sign of a candidate promises to first order.
+
+    records: the problem with the candidate. answer: of the parameters, shares of the range per full strength,
+    (n_free,). shares: strengths that are tried, the largest first. sizes: relative changes of the parameters at the
+    first of them, (n_free,).
+    """
+
+    key: EffectKey
+    records: WhiteRecords
+    activation: Activation
+    answer: Array
+    shares: tuple[float, ...]
+    sizes: Array
+
+
+def promised_biases(current: Fit, library: Library, key: EffectKey) -> list[Promise]:
+    records, found = library.problem((*current.active, key), current.values), []
+    own = np.array([library.owner(name) is None for name in current.values])
     every, _ = activation_grid(records, key)
     grid = [replace(a, share=SLIGHT) for a in every if a.share == every[0].share]
-    moved = responses(current, records, grid)
-    good = np.isfinite(moved).all(axis=1)
-    moved[~good] = 0.0
-    answers = (current.answer @ moved.T).T
-    relative = np.abs(answers) * current.records.span / np.where(current.x == 0.0, np.inf, np.abs(current.x))
-    reach = np.minimum(1.0, np.sqrt(UNSEEN / np.maximum(square_beyond(current.basis, moved), 1e-12)))
-    promised = np.max(relative, axis=1, initial=0.0) * np.where(good, reach, 0.0)
-    for i in np.argsort(-promised, kind="stable")[:N_PROVED]:
-        if promised[i] <= least:
-            break
-        shares = dict.fromkeys(min(size / float(relative[i].max()), 1.0) for size in SIZES)
-        for share in (s for s in shares if s <= reach[i]):
-            x = fitted_beside(current, records, grid[i].at(share), current.z - share * answers[i])
-            if x is not None:
-                found = np.maximum(found, np.abs(x - current.x))
-                break
+    for activation, moved in zip(grid, responses(current, records, grid), strict=True):
+        if np.isfinite(moved).all():
+            answer = current.answer @ moved
+            slopes = np.abs(answer) * current.records.span / magnitudes(current)
+            largest = float(slopes[own].max(initial=0.0)) or float(slopes.max(initial=1e-300))
+            unseen = np.sqrt(UNSEEN / max(float(square_beyond(current.basis, moved[np.newaxis])[0]), 1e-12))
+            tried = dict.fromkeys(min(size / largest, 1.0) for size in SIZES)
+            shares = tuple(share for share in tried if share <= unseen)
+            found.append(Promise(key, records, activation, answer, shares, slopes * max(shares, default=0.0)))
     return found
+
+
+def magnitudes(current: Fit) -> Array:
+    """Return what changes of the free parameters are relative to, infinite for a value of 0, (n_free,)."""
+    return np.where(current.x == 0.0, np.inf, np.abs(current.x))
+
+
+def proven_bias(current: Fit, promise: Promise) -> Array:
+    """Return the largest change of the parameters, SI, (n_free,), of those tried that the records do not show."""
+    for share in promise.shares:
+        strength, z = promise.activation.at(share), current.z - share * promise.answer
+        x = fitted_beside(current, promise.records, strength, z)
+        if x is not None:
+            return np.asarray(np.abs(x - current.x))
+    return np.zeros(current.n_free)
 
 
 def fitted_beside(current: Fit, records: WhiteRecords, strength: Mapping[str, float], z: Array) -> Array | None:
