@@ -1,4 +1,4 @@
-"""Score candidate effects at a fit: how far each would bring the residual down, were the records linear in it."""
+"""Score candidate effects at a fit: how far each would lower the residual, were the records linear, and could bias it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
