@@ -1,4 +1,4 @@
-"""Score candidate effects at a fit: how far each would lower the residual, were the records linear, and could bias it."""
+"""Score candidate effects at a fit: by how much each would lower the residual, or bias a parameter unseen."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
