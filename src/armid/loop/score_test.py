@@ -129,8 +129,13 @@ def unseen_biases(current: Fit, moved: Array, answers: Array) -> Array:
     good = np.isfinite(moved).all(axis=1)
     if not current.n_free or not good.any():
         return np.zeros(current.n_free)
-    share = np.minimum(1.0, np.sqrt(UNSEEN / np.maximum(square_beyond(current.basis, moved[good]), 1e-12)))
+    share = np.minimum(1.0, unseen_strengths(current, moved[good]))
     return np.asarray(np.max(np.abs(answers[good]) * share[:, np.newaxis], axis=0) * current.records.span)
+
+
+def unseen_strengths(current: Fit, moved: Array) -> Array:
+    """Return the strength up to which each activation is not noticed, see `unseen_biases`, (n_activations,)."""
+    return np.asarray(np.sqrt(UNSEEN / np.maximum(square_beyond(current.basis, moved), 1e-12)))
 
 
 def proven_biases(current: Fit, library: Library, least: float) -> dict[str, Array]:
@@ -158,13 +163,14 @@ def proven_biases(current: Fit, library: Library, least: float) -> dict[str, Arr
 class Promise:
     """Hold what one shape and sign of a candidate promises to first order.
 
-    records: the problem with the candidate. answer: of the parameters, shares of the range per full strength,
-    (n_free,). shares: strengths that are tried, the largest first. sizes: relative changes of the parameters at the
-    first of them, (n_free,).
+    records: the problem with the candidate. limit: chi2 up to which it is not noticed. answer: of the parameters,
+    shares of the range per full strength, (n_free,). shares: strengths that are tried, the largest first. sizes:
+    relative changes of the parameters at the first of them, (n_free,).
     """
 
     key: EffectKey
     records: WhiteRecords
+    limit: float
     activation: Activation
     answer: Array
     shares: tuple[float, ...]
@@ -176,15 +182,18 @@ def promised_biases(current: Fit, library: Library, key: EffectKey) -> list[Prom
     own = np.array([library.owner(name) is None for name in current.values])
     every, _ = activation_grid(records, key)
     grid = [replace(a, share=SLIGHT) for a in every if a.share == every[0].share]
-    for activation, moved in zip(grid, responses(current, records, grid), strict=True):
+    without = records.whole_signals(candidate_at(records, current.values)[np.newaxis])[0]
+    left = records.data.white([r.measured for r in records.replays]) - without
+    limit, changes = float(left @ left) + UNSEEN, responses(current, records, grid)
+    for activation, moved, unseen in zip(grid, changes, unseen_strengths(current, changes), strict=True):
         if np.isfinite(moved).all():
             answer = current.answer @ moved
             slopes = np.abs(answer) * current.records.span / magnitudes(current)
             largest = float(slopes[own].max(initial=0.0)) or float(slopes.max(initial=1e-300))
-            unseen = np.sqrt(UNSEEN / max(float(square_beyond(current.basis, moved[np.newaxis])[0]), 1e-12))
             tried = dict.fromkeys(min(size / largest, 1.0) for size in SIZES)
             shares = tuple(share for share in tried if share <= unseen)
-            found.append(Promise(key, records, activation, answer, shares, slopes * max(shares, default=0.0)))
+            sizes = slopes * max(shares, default=0.0)
+            found.append(Promise(key, records, limit, activation, answer, shares, sizes))
     return found
 
 
@@ -196,29 +205,24 @@ def magnitudes(current: Fit) -> Array:
 def proven_bias(current: Fit, promise: Promise) -> Array:
     """Return the largest change of the parameters, SI, (n_free,), of those tried that the records do not show."""
     for share in promise.shares:
-        strength, z = promise.activation.at(share), current.z - share * promise.answer
-        x = fitted_beside(current, promise.records, strength, z)
+        x = fitted_beside(current, promise, share)
         if x is not None:
             return np.asarray(np.abs(x - current.x))
     return np.zeros(current.n_free)
 
 
-def fitted_beside(current: Fit, records: WhiteRecords, strength: Mapping[str, float], z: Array) -> Array | None:
-    """Return the free parameters of a fit, SI, fitted beside a given effect; None where the records tell of it.
-
-    z: from where, shares of the range.
-    """
-    space = records.space
-    for name, value in strength.items():
+def fitted_beside(current: Fit, promise: Promise, share: float) -> Array | None:
+    """Return the free parameters of a fit, SI, fitted beside a strength; None where the records tell of it."""
+    space = promise.records.space
+    for name, value in promise.activation.at(share).items():
         space = space.with_fixed(name, value)
     order = [list(current.values).index(name) for name in space.free_names]
-    posed, without = replace(records, space=space), candidate_at(records, current.values)
-    left = records.data.white([r.measured for r in records.replays]) - records.whole_signals(without[np.newaxis])[0]
-    limit, start = float(left @ left) + UNSEEN, np.clip(z, 0.0, 1.0)[order]
+    posed = replace(promise.records, space=space)
+    start = np.clip(current.z - share * promise.answer, 0.0, 1.0)[order]
     if not np.isfinite(posed.chi2(start[np.newaxis])[0]):
         return None
-    end = descend(posed, [start], PROVED, limit=limit)
-    if posed.chi2(end[np.newaxis])[0] > limit:
+    end = descend(posed, [start], PROVED, limit=promise.limit)
+    if posed.chi2(end[np.newaxis])[0] > promise.limit:
         return None
     x = np.empty(current.n_free)
     x[order] = posed.values(end)
