@@ -2,7 +2,7 @@
 
     armid bench [--quick]                 from the root of the project
 
-- __main__: every measurement in one run; samples: what is measured
+- run: every measurement in one run; samples: what is measured
 - engine: against scipy and a plain compiled loop (baselines), with effects, on two threads, and the fitness
 - framework: where the time of one identification goes; processes: memory, large campaigns, the second start
 - measure: a line of the table, the clock, the table

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from armid.errors import ArmidError
-from bench import __main__ as bench
 from bench import processes
+from bench import run as bench
 from bench.baselines import plain_loop
 from bench.engine import ALLOWED, effects_row, engine_rows, loosest_tolerance, scipy_outputs, threads_row
 from bench.framework import framework_rows, identification, pymoo_framework, sample_replays

@@ -66,7 +66,7 @@ def test_a_user_s_things_are_listed(run, mine, what, name, line):
 
 def test_bench_prints_one_table(run, monkeypatch):
     """Of one part, really measured; tests/bench measures each."""
-    from bench import __main__ as bench
+    from bench import run as bench
     from bench.engine import fitness_rows
 
     monkeypatch.setattr(bench, "bench_parts", lambda *_: {"fitness": lambda: fitness_rows(rounds=1, n_candidates=4)})

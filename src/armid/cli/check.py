@@ -122,11 +122,11 @@ def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
     simulation, errors in rad/s, memory in MB beside what the results themselves take.
     """
     roots = (Path.cwd(), Path(__file__).parents[3])
-    studies = next((root / "studies" for root in roots if (root / "studies" / "bench" / "__main__.py").is_file()), None)
+    studies = next((root / "studies" for root in roots if (root / "studies" / "bench" / "run.py").is_file()), None)
     if studies is None:
         raise ArmidError("there is no studies/bench here: the root of armid's source, which holds it, is expected")
     sys.path.insert(0, str(studies))
     load_registry(plugins)
-    rows = import_module("bench.__main__").run_bench(quick=quick)
+    rows = import_module("bench.run").run_bench(quick=quick)
     say(import_module("bench.measure").bench_table(rows))
     give(rows=[vars(row) for row in rows])
