@@ -73,6 +73,7 @@ LEAST_SHARE = 0.005
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {
     "parameters": ("Parameters before and after", "Values with 95 % intervals; open marks are not to be trusted."),
+    "motion": ("Measured and simulated motion", "Grey: measured. The coloured lines are the model before and after."),
     "ranking": ("Candidates for the first effect", "Bars: fall of chi2 that the score predicts. Diamonds: that which a "
                 "full fit with this effect alone reached."),
     "diagnosis": ("Where the discrepancy is", "Mean square of the residual in units of the noise's, part by part, "
@@ -133,6 +134,8 @@ def loop_document(
         Section("Parameters", (parameters, *beside, *figures.get("parameters", ()))),
     ]
     if details:
+        if "motion" in figures:
+            sections.insert(1, Section("Motion", figures["motion"]))
         sections.append(candidates_section(details["candidates"], figures.get("ranking", ())))
         drawn = tuple(f for name in ("diagnosis", "autocorrelation", "missing") for f in figures.get(name, ()))
         told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))

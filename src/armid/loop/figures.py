@@ -11,6 +11,7 @@ from armid.loop.diagnose import Diagnosis, Residuals
 from armid.loop.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
 from armid.model import Array
+from armid.problem.problem import Replay
 from armid.report.document import points, record_axes, small_axes
 from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, pyplot
 from armid.units import shown
@@ -32,6 +33,7 @@ def figures_of(
     report, details: what is stored of the loop, see `report_of` and `details_of`.
     """
     made: dict[str, Callable[[], Any]] = {
+        "motion": partial(motion_figure, found),
         "residuals": partial(residual_figure, found),
         "diagnosis": partial(diagnosis_figure, found),
         "ranking": partial(ranking_figure, report["campaign"], details["candidates"]["listed"]),
@@ -41,11 +43,34 @@ def figures_of(
     return made if found.missing is None else made | {"missing": partial(missing_figure, found, found.missing)}
 
 
+def shown_records(found: ClosedLoop) -> list[tuple[Replay, Array, Array]]:
+    """Return the records that are drawn, each with its residual before and after."""
+    views = ((found.before.train, found.after.train), (found.before.holdout, found.after.holdout))
+    return [row for old, new in views if old is not None and new is not None
+            for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS:]  # fmt: skip
+
+
+def motion_figure(found: ClosedLoop) -> Any:
+    """Draw the measured motion of each record, and the motion simulated before and after."""
+    rows = shown_records(found)
+    figure, axes = record_axes(len(rows), 2.9)
+    for (axis,), (replay, *residuals) in zip(axes, rows, strict=True):
+        factor, unit = shown(1.0, replay.record.unit)
+        axis.plot(replay.times, factor * replay.measured, color=PALE, lw=3.5, label="measured")
+        for residual, (name, colour, _), width in zip(residuals, LOOKS, (1.3, 1.0), strict=True):
+            axis.plot(replay.times, factor * (replay.measured - residual), color=colour, lw=width, label=name)
+        axis.set(ylabel=f"{replay.record.output or 'output'} [{unit}]", xlabel="time [s]")
+        axis.margins(x=0.01)
+        axis.set_title(f"{replay.name} ({replay.record.role})", fontsize="medium")
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
+    names = " + ".join(found.effects) or "no effect added"
+    figure.suptitle(f"{found.campaign.name}: measured and simulated, before and after ({names})", fontsize="large")
+    return figure
+
+
 def residual_figure(found: ClosedLoop) -> Any:
     """Draw measured minus simulated of each record, before and after, with the noise as a band."""
-    views = ((found.before.train, found.after.train), (found.before.holdout, found.after.holdout))
-    rows = [row for old, new in views if old is not None and new is not None
-            for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS:]  # fmt: skip
+    rows = shown_records(found)
     figure, axes = record_axes(len(rows), 2.9)
     for (axis,), (replay, before, after) in zip(axes, rows, strict=True):
         curves = {"before": (replay.times, before), "after": (replay.times, after)}
