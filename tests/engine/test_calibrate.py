@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from arm_cases import box_of, drawn
 from armid.engine import Schedule, calibrate, probes, simulate
-from armid.loop.candidates import quickly_calibrated
+from armid.inference.library import quickly_calibrated
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 

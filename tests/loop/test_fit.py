@@ -5,9 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from armid.inference.library import EffectKey
+from armid.inference.model import Fit
 from armid.loop import search
-from armid.loop.candidates import EffectKey
-from armid.loop.fit import Fit, is_undetermined, parts_to_judge
+from armid.loop.fit import is_undetermined, parts_to_judge
 
 N = 100
 PARTS = [np.arange(N), np.arange(N, 2 * N), np.arange(2 * N, 3 * N)]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from armid.loop.candidates import EffectKey
+from armid.inference.library import EffectKey
+from armid.inference.missing_signal import dependences, missing_signal, motions, segments
 from armid.loop.empirical import empirical_effect
-from armid.loop.missing_signal import dependences, missing_signal, motions, segments
 from armid.model import Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of

@@ -9,12 +9,12 @@ from scipy.integrate import solve_ivp
 
 import armid
 from armid.estimation.mends import Suspicion
+from armid.inference.checks import square_along
+from armid.inference.library import EffectKey
+from armid.inference.model import decomposed
+from armid.inference.refit import likest
+from armid.inference.score_test import proven_biases, rest_of, score
 from armid.loop import close_loop
-from armid.loop.candidates import EffectKey
-from armid.loop.diagnose import square_along
-from armid.loop.equivalence import likest
-from armid.loop.fit import decomposed
-from armid.loop.score_test import proven_biases, rest_of, score
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 from armid.estimation.least_squares import side_by_side
+from armid.inference.library import EffectKey, Library, library_of
+from armid.inference.refit import best_along, finished, likest, substitutes, with_free_shapes
+from armid.inference.whitening import whitened
 from armid.loop import constants
 from armid.loop import search as search_of
-from armid.loop.candidates import EffectKey, Library, library_of
 from armid.loop.close_loop import Decision, unless_belied
 from armid.loop.constants import ConstantModel, is_outdone
-from armid.loop.equivalence import WITHIN, group_of, likest, substitutes
+from armid.loop.equivalence import WITHIN, group_of
 from armid.loop.fit import Comparison, behind
-from armid.loop.search import Search, SearchLevel, best_along, finished, with_free_shapes
+from armid.loop.search import Search, SearchLevel
 from armid.loop.suspects import is_earned, is_next_to_nothing
-from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from few_candidates import CANDIDATES, COMMON, TRUTH
 
+from armid.inference.checks import mains_hum
+from armid.inference.kinds.faults import Fault
 from armid.loop import close_loop, report_of
-from armid.loop.diagnose import mains_hum
 from armid.loop.document import conclusion
-from armid.loop.suspects import Fault
 from armid.model import PLANTS, Model
 from armid.record import read_campaign
 from armid.record.noise import noise_of

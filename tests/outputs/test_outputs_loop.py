@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from two_inertias import NOISE_ANGLE, NOISE_SPEED, TRUTH, two_inertias, write_drive
 
+from armid.inference.checks import holdout_residuals
+from armid.inference.kinds.faults import Fault
 from armid.loop import close_loop, report_of
-from armid.loop.diagnose import holdout_residuals
 from armid.loop.document import details_of, loop_document
 from armid.loop.figures import figures_of
-from armid.loop.suspects import Fault
 from armid.model import EFFECTS
 from armid.model.effects.sensor import sensor_effects
 from armid.record import read_campaign

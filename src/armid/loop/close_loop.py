@@ -13,7 +13,8 @@ from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import Estimates, with_fitted_starts
 from armid.estimation.screen import given_twice, screen
-from armid.loop.candidates import (
+from armid.inference.checks import holdout_residuals, is_significant, train_residuals
+from armid.inference.library import (
     CONSTANT,
     SHOWN_AS,
     UNNAMED,
@@ -23,6 +24,10 @@ from armid.loop.candidates import (
     constant_effects,
     library_of,
 )
+from armid.inference.missing_signal import Missing
+from armid.inference.model import Fit, with_standard_accuracy
+from armid.inference.score_test import proven_biases
+from armid.inference.whitening import whitened
 from armid.loop.constants import (
     ConstantModel,
     Trend,
@@ -35,11 +40,9 @@ from armid.loop.constants import (
     measurements,
     trends_of,
 )
-from armid.loop.diagnose import holdout_residuals, is_significant, train_residuals
 from armid.loop.empirical import Term, empirical_term
 from armid.loop.equivalence import WITHIN, EffectGroup, group_of, rival_models
-from armid.loop.fit import Fit, behind, criterion, predicted_alike, with_standard_accuracy
-from armid.loop.missing_signal import Missing
+from armid.loop.fit import behind, criterion, predicted_alike
 from armid.loop.result import (
     BIASED,
     CARRIES_NOT,
@@ -57,7 +60,6 @@ from armid.loop.result import (
     estimates,
     unseen_biases_of,
 )
-from armid.loop.score_test import proven_biases
 from armid.loop.search import COMPARABLE, CREEPS, Search, SearchLevel
 from armid.loop.suspects import (
     FREED,
@@ -69,7 +71,6 @@ from armid.loop.suspects import (
     mended_records,
     suspect_held_out,
 )
-from armid.loop.whitening import whitened
 from armid.model import EFFECTS, Effect, Model
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import space_of

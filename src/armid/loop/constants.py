@@ -15,15 +15,18 @@ from armid.errors import ArmidError
 from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_factors, moved_replays
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import LeastSquaresProblem, descend
-from armid.loop.candidates import ROUGHLY, Library
-from armid.loop.diagnose import is_significant, train_residuals
+from armid.inference.checks import is_significant, train_residuals
+from armid.inference.kinds.faults import simulated_file, with_measured
+from armid.inference.library import ROUGHLY, Library
+from armid.inference.model import Fit, beyond, decomposed, fit_from, with_own_starts
+from armid.inference.refit import unless_diverged
+from armid.inference.score_test import candidate_at
+from armid.inference.whitening import WhiteRecords
 from armid.loop.equivalence import MOST as TOO_MANY
 from armid.loop.equivalence import WITHIN, EffectGroup
-from armid.loop.fit import FAMILYWISE, Fit, beyond, compare, decomposed, fit_from, with_own_starts
-from armid.loop.score_test import candidate_at
-from armid.loop.search import Search, unless_diverged
-from armid.loop.suspects import FREED, Suspect, is_earned, simulated_file, with_measured
-from armid.loop.whitening import WhiteRecords
+from armid.loop.fit import FAMILYWISE, compare
+from armid.loop.search import Search
+from armid.loop.suspects import FREED, Suspect, is_earned
 from armid.model import Array
 from armid.record import Record
 

@@ -10,10 +10,10 @@ import numpy as np
 from armid.estimation.constants import NAMED
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
-from armid.loop.candidates import SHOWN_AS
-from armid.loop.diagnose import SIGNIFICANCE, Finding, Residuals, time_in_words
+from armid.inference.checks import SIGNIFICANCE, Finding, Residuals, time_in_words
+from armid.inference.library import SHOWN_AS
+from armid.inference.missing_signal import Missing
 from armid.loop.figures import candidate_figure, figures_of, record_figure
-from armid.loop.missing_signal import Missing
 from armid.loop.result import (
     CARRIED,
     CARRIES_NOT,

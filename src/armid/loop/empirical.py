@@ -7,11 +7,9 @@ from functools import partial
 import numpy as np
 
 from armid.errors import ArmidError
-from armid.loop.candidates import UNNAMED, EffectKey, Library, joined
-from armid.loop.diagnose import is_significant
-from armid.loop.equivalence import WITHIN
-from armid.loop.fit import Fit, behind, compare, criterion, fit_from, predicted_alike
-from armid.loop.missing_signal import (
+from armid.inference.checks import is_significant
+from armid.inference.library import UNNAMED, EffectKey, Library, joined
+from armid.inference.missing_signal import (
     N_HEIGHTS,
     Dependence,
     Missing,
@@ -20,8 +18,12 @@ from armid.loop.missing_signal import (
     knows,
     missing_from,
 )
-from armid.loop.score_test import free_values
-from armid.loop.search import Search, unless_diverged
+from armid.inference.model import Fit, fit_from
+from armid.inference.refit import unless_diverged
+from armid.inference.score_test import free_values
+from armid.loop.equivalence import WITHIN
+from armid.loop.fit import behind, compare, criterion, predicted_alike
+from armid.loop.search import Search
 from armid.model import Effect, Model, Parameter
 
 # Variables that a compiled term can choose from; factor of a curve -> the parameter that chooses it.

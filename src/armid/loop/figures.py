@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from armid.loop.diagnose import Diagnosis, Residuals
-from armid.loop.missing_signal import Dependence, Missing, hats
+from armid.inference.checks import Diagnosis, Residuals
+from armid.inference.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
 from armid.model import Array
 from armid.problem.problem import Replay

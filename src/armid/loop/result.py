@@ -11,13 +11,13 @@ from armid.estimation.constants import columns_of
 from armid.estimation.identify import JointErrors, errors_by_file, errors_entry, record_errors
 from armid.estimation.information import Information, information_of
 from armid.estimation.least_squares import held_by_bound
-from armid.loop.candidates import Library
-from armid.loop.diagnose import Diagnosis, Residuals
+from armid.inference.checks import Diagnosis, Residuals
+from armid.inference.library import Library
+from armid.inference.missing_signal import Missing
+from armid.inference.model import Fit
+from armid.inference.score_test import rest_of, score
 from armid.loop.empirical import Term
 from armid.loop.equivalence import EffectGroup
-from armid.loop.fit import Fit
-from armid.loop.missing_signal import Missing
-from armid.loop.score_test import rest_of, score
 from armid.loop.search import Search
 from armid.loop.suspects import Suspect
 from armid.model import Array, Model, is_late_as_a_whole

@@ -2,24 +2,34 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import partial
 from itertools import compress
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from armid.errors import ArmidError
-from armid.estimation.least_squares import REACH, descend, held_by_bound, spread_starts
-from armid.loop.candidates import Active, EffectKey, Library, declared_keys, points_within
-from armid.loop.diagnose import SIGNIFICANCE, is_significant, train_residuals
-from armid.loop.equivalence import WITHIN, substitutes
-from armid.loop.fit import Comparison, Fit, behind, compare, criterion, fit_from, with_own_starts
-from armid.loop.score_test import N_TRIED, Score, at_null, free_values, is_same, scores
-from armid.loop.whitening import WhiteRecords
-from armid.model import Array
+from armid.estimation.least_squares import REACH, held_by_bound, spread_starts
+from armid.inference.checks import SIGNIFICANCE, is_significant, train_residuals
+from armid.inference.library import Active, EffectKey, Library, declared_keys
+from armid.inference.model import Fit, fit_from
+from armid.inference.refit import (
+    accurate,
+    far_behind,
+    finished,
+    finished_near,
+    fit_near,
+    freed,
+    refitted,
+    start_of,
+    substitutes,
+    unless_diverged,
+    with_free_shapes,
+)
+from armid.inference.score_test import Score, is_same, scores
+from armid.loop.equivalence import WITHIN
+from armid.loop.fit import Comparison, behind, compare, criterion
 
 Trial = Callable[[], Fit]
-T = TypeVar("T")
 MOST_EFFECTS = 6
 # Up to so many effects are tried together where fewer earn nothing and more than noise is left.
 LOOK_AHEAD = 3
@@ -433,122 +443,3 @@ def parents(fits: Sequence[Fit]) -> list[Fit]:
         if len(found) == BEAM:
             break
     return found
-
-
-def far_behind(fit: Fit, best: Fit) -> float:
-    return float(max(fit.independent, best.independent) * np.log(fit.chi2 / best.chi2))
-
-
-def refitted(current: Fit, found: Score, library: Library, limit: float) -> Fit:
-    """Fit the extended model, from the best two of the starts of a score that are not next to each other.
-
-    limit: chi2 that must be in reach, else the fit is given up.
-    """
-    active = (*current.active, found.key)
-    records = library.problem(active)
-    chi2 = records.chi2(np.array(found.starts[:N_TRIED]))
-    first, second = (found.starts[i] for i in np.resize(np.argsort(chi2, kind="stable")[:2], 2))
-    starts = [first, second] if np.max(np.abs(second - first)) > 0.02 else [first]
-    return fit_from(records, active, starts, rough=True, limit=limit)
-
-
-def fit_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
-    records = library.problem(active, values)
-    return fit_from(records, active, [start_of(records, values)], rough=True)
-
-
-def finished(fit: Fit, library: Library) -> Fit:
-    """Return the fit at its estimate; where it crept there and has shapes set free, the better one by continuation."""
-    done = accurate(fit_from(fit.records, fit.active, [fit.z]), library)
-    shapes = {name for key in fit.active if key.free_shape for name in library.fixed_shapes(key)}
-    if not shapes or done.has_arrived:
-        return done
-    starts = continued(done, shapes)
-    again = unless_diverged(lambda: accurate(fit_from(done.records, fit.active, starts), library)) if starts else None
-    return done if again is None or done.chi2 < again.chi2 else again
-
-
-def finished_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
-    return finished(fit_near(active, values, library), library)
-
-
-def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
-    return np.clip(records.shares(free_values(records, values)), 0.0, 1.0)
-
-
-def accurate(fit: Fit, library: Library) -> Fit:
-    """Return the fit about its own starts, with finer steps where it ended where the engine's are too coarse."""
-    finer = library.recalibrated(fit.active, fit.values, fit.misfit)
-    return with_own_starts(fit if finer is None else fit_from(finer, fit.active, [fit.z]), roughly=True)
-
-
-# Shares of their range from which all shapes begin; then each alone from the best of so many places along its range:
-# the best period of a sampled control is a narrow one; of what is no time an eighth of them will do.
-STARTS, N_PLACES = (0.03, 0.5), 384
-# Values at which a shape is held in turn where a fit only crept, and the fall of chi2 in a step that leads on from one.
-N_HELD, LEADING = 8, 1e-2
-
-
-def continued(fit: Fit, shapes: Set[str]) -> list[Array]:
-    """Return for each shape that is no time the best estimate with it held in turn from its largest value to its least.
-
-    Each begins where the last one ended, the other shapes held as they are: over a wide sign chi2 is smooth, and leads
-    to where steps over a narrow one would only creep (continuation).
-    """
-    records, space = fit.records, fit.records.space
-    names = np.array(space.free_names)
-    is_shape = np.isin(names, list(shapes))
-    starts = []
-    for place in np.flatnonzero(is_shape):
-        if records.model.parameters[names[place]].unit == "s":
-            continue
-        z, found = fit.z.copy(), []
-        low, high = space.low[space.free][place], space.high[space.free][place]
-        for value in points_within(low, high, N_HELD)[::-1]:
-            z[place] = (value - low) / (high - low)
-            values = zip(names[is_shape], records.values(z)[is_shape], strict=True)
-            held = reduce(lambda there, shape: there.with_fixed(*shape), values, space)
-            posed = replace(records, space=held)
-            if np.isfinite(posed.chi2(z[~is_shape])[0]):
-                z[~is_shape] = descend(posed, [z[~is_shape]], LEADING)
-            found.append((float(posed.chi2(z[~is_shape])[0]), z.copy()))
-        starts.append(min(found, key=lambda one: one[0])[1])
-    return starts
-
-
-def freed(active: Active, key: EffectKey) -> Active:
-    return tuple(replace(k, free_shape=True) if k == key else k for k in active)
-
-
-def with_free_shapes(fit: Fit, key: EffectKey, library: Library) -> Fit:
-    """Return the fit with the fixed shapes of one of its effects free, such as the width over which a sign is smoothed.
-
-    A declared shape that is not the machine's leaves a residual that another effect would be taken for.
-    """
-    active = freed(fit.active, key)
-    records = library.problem(active, fit.values)
-    known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
-    z = records.shares(np.array([known[n] for n in records.space.free_names]))
-    free = np.array([n in library.fixed_shapes(key) for n in records.space.free_names])
-    starts = [np.where(free, share, z) for share in STARTS]
-    # The strength has taken up what it could of the shape's part, so that each shape is tried without it too.
-    rest = records.shares(at_null(records, fit.candidate, key)[records.space.free])
-    units = [records.model.parameters[n].unit for n in records.space.free_names]
-    starts += [best_along(records, at, place, N_PLACES if units[place] == "s" else N_PLACES // 8)
-               for place in map(int, np.flatnonzero(free)) for at in (z, rest)]  # fmt: skip
-    return fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts], rough=True)
-
-
-def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -> Array:
-    """Return a candidate with one of its free parameters where it does best, the others as they are, (n_free,)."""
-    tried = np.tile(z, (n, 1))
-    tried[:, place] = (np.arange(n) + 0.5) / n
-    return np.asarray(tried[np.argmin(records.chi2(tried))])
-
-
-def unless_diverged(trial: Callable[[], T]) -> T | None:
-    """Return what a fit gives, None where each of its starts diverges or it cannot be composed."""
-    try:
-        return trial()
-    except ArmidError:
-        return None

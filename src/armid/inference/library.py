@@ -18,7 +18,7 @@ from armid.engine import STANDARD, Calibration, Schedule, Simulation, probes, si
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.errors import ArmidError
 from armid.estimation.least_squares import side_by_side
-from armid.loop.whitening import WhitenedData, WhiteRecords
+from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import Array, Effect, Manoeuvre, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of

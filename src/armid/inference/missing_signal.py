@@ -10,10 +10,10 @@ from scipy.linalg import block_diag
 
 from armid.engine import Schedule, Simulation, along, simulate
 from armid.estimation.least_squares import WeightedRecords
-from armid.loop.candidates import EffectKey, Library
-from armid.loop.diagnose import variable_names
-from armid.loop.fit import Fit, beyond
-from armid.loop.score_test import candidate_at, free_values
+from armid.inference.checks import variable_names
+from armid.inference.library import EffectKey, Library
+from armid.inference.model import Fit, beyond
+from armid.inference.score_test import candidate_at, free_values
 from armid.model import Array, Effect, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space

@@ -13,9 +13,9 @@ from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
-from armid.loop.candidates import Library, calibrated_replays
-from armid.loop.fit import Fit, beyond, decomposed
-from armid.loop.whitening import WhitenedData, WhiteRecords, whitened, with_samples
+from armid.inference.library import Library, calibrated_replays
+from armid.inference.model import Fit, beyond, decomposed
+from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_samples
 from armid.model import Array, Model
 from armid.problem.problem import Replay
 from armid.record import Record

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.special import chdtrc
 
 from armid.estimation.least_squares import descend
-from armid.loop.candidates import Activation, EffectKey, Library, activation_grid, idle
-from armid.loop.fit import UNTOLD, Fit, beyond
-from armid.loop.whitening import WhiteRecords
+from armid.inference.library import Activation, EffectKey, Library, activation_grid, idle
+from armid.inference.model import UNTOLD, Fit, beyond
+from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
 # A refit may start from so many points of the grid of each candidate.

@@ -1,0 +1,240 @@
+"""A model fitted to the train records: the declared one with some effects, at its least-squares estimate."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, fdtrc
+
+from armid.errors import ArmidError
+from armid.estimation.constants import Product, products
+from armid.estimation.design import BOX
+from armid.estimation.information import start_changes
+from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
+from armid.inference.library import Active, EffectKey, calibrated_replays, is_finer, with_finest
+from armid.inference.whitening import WhiteRecords
+from armid.model import Array, Model
+from armid.problem.starts import fits_starts, with_starts
+
+# Relative change of the sum of squares at which a fit stops: far below the 1 that means anything in 10,000 samples.
+TOLERANCE, ROUGHLY = 1e-7, 1e-3
+ONLY_NOISE = 0.01
+# An effect is dropped whose strengths would be so far from their nulls by chance.
+OPEN = 0.05
+# A change of n_eff ln(chi2) that no comparison of two models tells from none.
+UNTOLD = 0.5
+# A residual of so many times the noise is the model's: then prediction decides and not significance.
+DWARFED = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Hold the declared model with some effects at its least-squares estimate.
+
+    active: the effects that were added. records: the least-squares problem. z: free parameters as shares of their
+    range, (n_free,). residual: whitened, measured minus simulated, (n_samples,). constants: by how much each differs
+    from its declared value, as a share of it; the records hold them so. rough: whether z is near the estimate only.
+    """
+
+    active: Active
+    records: WhiteRecords
+    z: Array
+    residual: Array
+    constants: Mapping[str, float] = field(default_factory=dict)
+    rough: bool = False
+    _products: dict[tuple[tuple[str, float], ...], tuple[Product, ...]] = field(default_factory=dict)
+
+    @cached_property
+    def chi2(self) -> float:
+        return float(self.residual @ self.residual)
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square of the residual in units of the noise, at least 1."""
+        return max(1.0, float(np.sqrt(self.chi2 / len(self.residual))))
+
+    @property
+    def dwarfs_noise(self) -> bool:
+        """Whether it leaves more than ten times the noise."""
+        return self.chi2 > DWARFED**2 * len(self.residual)
+
+    @property
+    def n_free(self) -> int:
+        return len(self.z)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Public names of the effects."""
+        return tuple(key.public for key in self.active)
+
+    @property
+    def model(self) -> Model:
+        """The compiled model, other candidates at their null included."""
+        return self.records.model
+
+    @property
+    def x(self) -> Array:
+        return self.records.values(self.z)
+
+    @property
+    def candidate(self) -> Array:
+        return np.asarray(self.records.space.complete(self.x[np.newaxis])[0])
+
+    @property
+    def values(self) -> dict[str, float]:
+        return dict(zip(self.records.space.free_names, map(float, self.x), strict=True))
+
+    @cached_property
+    def independent(self) -> float:
+        """How many samples of the residual are independent."""
+        return self.records.data.independent(self.residual)
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether the size of the residual is that of the noise: chi2 per sample not above 1 by chance of 1 %."""
+        level, n = self.records.data.levels[0], len(self.residual) - self.n_free
+        return level.known and bool(fdtrc(n, level.n_slow, self.chi2 / n) > ONLY_NOISE)
+
+    @cached_property
+    def has_arrived(self) -> bool:
+        """Whether a further step promises next to nothing of chi2; where that bends sharply, steps only creep."""
+        falls = promised_fall(self.jacobian.T @ self.jacobian, self.jacobian.T @ self.residual, self.z)
+        return falls <= ROUGHLY * self.chi2
+
+    @property
+    def crept(self) -> bool:
+        """Whether it holds several named effects and has not arrived: a single one may creep for want of another."""
+        return sum(not key.is_empirical for key in self.active) > 1 and not self.has_arrived
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Whitened derivatives of the signal by z, (n_samples, n_free); most models of a search are never asked."""
+        return self.records.with_all_samples().residual_and_slopes(self.z)[1]
+
+    @cached_property
+    def basis(self) -> Array:
+        return self._decomposed[0]
+
+    @cached_property
+    def answer(self) -> Array:
+        """How the free parameters answer to a change of the whitened signal, (n_free, n_samples)."""
+        return self._decomposed[1]
+
+    @cached_property
+    def _decomposed(self) -> tuple[Array, Array]:
+        return decomposed(self.jacobian)
+
+    @cached_property
+    def start_slopes(self) -> Array:
+        """What one standard deviation of each measured start does to the whitened signal, (n_samples, n_starts).
+
+        Without columns where records start at rest, or where their starts are fitted.
+        """
+        changes = list(start_changes(self.records.with_all_samples(), self.z))
+        return np.column_stack(changes) if changes else np.empty((len(self.residual), 0))
+
+    @property
+    def is_at_a_bound(self) -> bool:
+        """Whether a bound holds a strength or a shape of one of its effects."""
+        held = held_by_bound(self.records.space, self.x)
+        return any(bool(held[self.owned_by(key)].any()) for key in self.active)
+
+    def needs(self, key: EffectKey) -> bool:
+        """Whether the strengths of one of its effects, all together, are away from their nulls by more than is open.
+
+        A Wald test; a residual that is no noise scatters with its correlation in time, see `WhitenedData.trust`, and
+        the estimate with the measured starts.
+        """
+        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
+        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
+        null = np.array([nulls[i] for i in places], dtype=np.float64)
+        free = np.flatnonzero(space.free)[places]
+        away = self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
+        weighed = self.jacobian * np.sqrt(self.records.data.trust(self.residual))[:, np.newaxis]
+        covariance = np.linalg.inv(weighed.T @ weighed + BOX * np.eye(self.n_free))
+        moved = self.answer @ self.start_slopes
+        covariance = (covariance + moved @ moved.T)[np.ix_(places, places)]
+        return not places or bool(away @ np.linalg.solve(covariance, away) > chdtri(len(places), OPEN))
+
+    def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
+        """Return the constants within tolerances that the records see at the fit, see `products`."""
+        known = tuple(tolerances.items())
+        if known not in self._products:
+            self._products[known] = products(self.records, self.z, tolerances)
+        return self._products[known]
+
+    def owned_by(self, key: EffectKey) -> NDArray[np.bool_]:
+        return np.array([key.owns(name) for name in self.values], dtype=np.bool_)
+
+
+def beyond(basis: Array, signals: Array) -> Array:
+    """Return what is left of signals, (n_samples,) or (n_samples, n), beyond the reach of an orthonormal basis."""
+    return np.asarray(signals - basis @ (basis.T @ signals))
+
+
+def decomposed(columns: Array) -> tuple[Array, Array]:
+    """Return an orthonormal basis of columns, (n_rows, rank), and their pseudoinverse, (n_columns, n_rows).
+
+    Directions below 1e-7 of the largest are rounding.
+    """
+    scale = np.linalg.norm(columns, axis=0)
+    seen = scale > 0.0
+    inverse = np.zeros((columns.shape[1], len(columns)))
+    if not seen.any():
+        return np.empty((len(columns), 0)), inverse
+    left, values, right = np.linalg.svd(columns[:, seen] / scale[seen], full_matrices=False)
+    good = values > 1e-7 * values[0]
+    inverse[seen] = (right[good].T / values[good]) @ left[:, good].T / scale[seen, np.newaxis]
+    return np.asarray(left[:, good]), inverse
+
+
+def fit_from(
+    records: WhiteRecords, active: Active, starts: Sequence[Array], rough: bool = False, limit: float = np.inf
+) -> Fit:  # fmt: skip
+    """Return the best of the least-squares estimates from some starts (shares of the range).
+
+    rough: stop where a step lowers chi2 by less than a thousandth, or where chi2 will not come below the limit.
+    The residual is that of all samples, whatever the fit saw.
+    Raises ArmidError when every start diverges.
+    """
+    z = np.empty(0)
+    if records.space.free.any():
+        tried, tolerance, kept = np.array(starts), ROUGHLY if rough else TOLERANCE, records.data.estimates
+        chi2 = records.chi2(tried)
+        good = tried[np.isfinite(chi2)]
+        if not len(good):
+            raise ArmidError("each start of a fit diverged: other bounds are expected")
+        make = partial(descend, records, list(good), tolerance, limit=limit)
+        z = make() if kept is None else kept.recalled((tried, chi2, tolerance, limit), make)
+    return Fit(tuple(active), records, z, records.with_all_samples().residuals(z)[0], rough=rough)
+
+
+def with_standard_accuracy(fit: Fit) -> Fit:
+    """Return a fit about its own starts whose records are simulated on the engine's standard accuracy, or finer."""
+    records = fit.records
+    standard = calibrated_replays([r.record for r in records.replays], fit.model, records.space, fit.values)
+    if not is_finer(standard, records.replays):
+        return with_own_starts(fit)
+    # The pieces are those of the fit, whose constants may be others than the record's; none is simulated coarser.
+    pairs = zip(records.replays, standard, strict=True)
+    replays = tuple(with_finest(ours, (theirs, ours)) for ours, theirs in pairs)
+    again = fit_from(replace(records, replays=replays), fit.active, [fit.z])
+    return with_own_starts(replace(again, constants=fit.constants))
+
+
+def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
+    """Return a fit about the starts that fit it best, where starts of records are fitted (see problem/starts.py).
+
+    roughly: only as far as a comparison of models can tell, see UNTOLD.
+    """
+    if not fits_starts(fit.records.replays):
+        return fit
+    for _ in range(MOST_ROUNDS):
+        last, records = fit, replace(fit.records, replays=with_starts(fit.records.replays, fit.candidate))
+        fit = replace(fit_from(records, fit.active, [fit.z], rough=roughly), constants=fit.constants, rough=False)
+        untold = UNTOLD / fit.independent if roughly else 0.0
+        if np.all(np.abs(fit.z - last.z) <= SETTLED) or abs(last.chi2 / fit.chi2 - 1.0) <= max(SETTLED, untold):
+            break
+    return fit
