@@ -269,17 +269,18 @@ class Descent:
 
 def descend(
     records: LeastSquaresProblem, starts: Sequence[Array], tolerance: float, central: bool = False,
-    limit: float = np.inf,
+    limit: float = np.inf, most: int = MOST_STEPS,
 ) -> Array:  # fmt: skip
     """Return the best of the least-squares estimates in the box from some starts that do not diverge, (n_free,).
 
     Levenberg-Marquardt with steps cut at the box, which hold what the box holds (More 1978, doi:10.1007/BFb0067700).
     tolerance: relative fall of chi2 in one step at which a start has arrived. central: take slopes from central
     differences, at twice the price. limit: chi2 that must be in reach, see REACH; what gives up is where it was then.
+    most: steps.
     """
     first = np.clip(np.array(starts), 0.0, 1.0)
     paths = [Descent(z, r, float(r @ r)) for z, r in zip(first, records.residuals(first), strict=True)]
-    for _ in range(MOST_STEPS):
+    for _ in range(most):
         moving = [p for p in paths if not p.done]
         if not moving:
             break

@@ -120,6 +120,7 @@ class Library:
     say: Callable[[str], None]
     tolerances: Mapping[str, float] = field(default_factory=dict)
     misfit: float = 1.0
+    priors: Mapping[str, float] = field(default_factory=dict)
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
 
@@ -241,6 +242,17 @@ class Library:
         moved = {self.owner(n) for n in wanted}
         posed = {keys: p for keys, p in self._problems.items() if not declared_keys(keys) & moved}
         return replace(self, bounds={**self.bounds, **wider}, _problems=posed)
+
+    def log_odds(self, effect: str, default: float) -> float:
+        """Return the log prior odds of an effect: what the user knows of it, else the default."""
+        given = self.priors.get(effect)
+        return default if given is None else float(np.log(given / (1.0 - given)))
+
+    def strength_of(self, name: str, parameter: Parameter) -> float:
+        """Return the declared size of a strength: from its off value to the farther end of its range."""
+        assert parameter.null is not None
+        low, high = self.bounds.get(name, (parameter.low, parameter.high))
+        return max(abs(low - parameter.null), abs(high - parameter.null))
 
     def fixed_shapes(self, key: EffectKey) -> tuple[str, ...]:
         """Return the parameters of a candidate that are fixed by its declaration alone."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,8 @@ class Fit:
     active: the effects that were added. records: the least-squares problem. z: free parameters as shares of their
     range, (n_free,). residual: whitened, measured minus simulated, (n_samples,). constants: by how much each differs
     from its declared value, as a share of it; the records hold them so. rough: whether z is near the estimate only.
+    others: further unknowns that were fitted, see `unknowns.Freed`; the records hold their values. base: the records
+    before that, None where there are none.
     """
 
     active: Active
@@ -44,6 +47,8 @@ class Fit:
     residual: Array
     constants: Mapping[str, float] = field(default_factory=dict)
     rough: bool = False
+    base: WhiteRecords | None = None
+    others: tuple[Any, ...] = ()
     _products: dict[tuple[tuple[str, float], ...], tuple[Product, ...]] = field(default_factory=dict)
 
     @cached_property
@@ -112,6 +117,11 @@ class Fit:
     def jacobian(self) -> Array:
         """Whitened derivatives of the signal by z, (n_samples, n_free); most models of a search are never asked."""
         return self.records.with_all_samples().residual_and_slopes(self.z)[1]
+
+    @cached_property
+    def columns(self) -> Array:
+        """What one prior deviation of each further unknown does to the whitened signal, (n_samples, n_unknowns)."""
+        return np.array([f.column for f in self.others]).reshape(len(self.others), len(self.residual)).T
 
     @cached_property
     def basis(self) -> Array:

@@ -104,13 +104,13 @@ def freed(active: Active, key: EffectKey) -> Active:
     return tuple(replace(k, free_shape=True) if k == key else k for k in active)
 
 
-def with_free_shapes(fit: Fit, key: EffectKey, library: Library) -> Fit:
+def with_free_shapes(fit: Fit, key: EffectKey, library: Library, posed: WhiteRecords | None = None) -> Fit:
     """Return the fit with the fixed shapes of one of its effects free, such as the width over which a sign is smoothed.
 
     A declared shape that is not the machine's leaves a residual that another effect would be taken for.
     """
     active = freed(fit.active, key)
-    records = library.problem(active, fit.values)
+    records = library.problem(active, fit.values) if posed is None else posed
     known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
     z = records.shares(np.array([known[n] for n in records.space.free_names]))
     free = np.array([n in library.fixed_shapes(key) for n in records.space.free_names])

@@ -146,13 +146,35 @@ def yule_walker(covariance: Array, order: int) -> tuple[Array, float]:
 
 
 @dataclass(frozen=True, eq=False)
+class Cover:
+    """Hold the covariance B B' that a signal without a form adds to whitened noise: 1 + B B' = 1 + Q L Q'.
+
+    basis: Q, orthonormal, (n_samples, rank). sizes: L, (rank,).
+    """
+
+    basis: Array
+    sizes: Array
+
+    @classmethod
+    def of(cls, columns: Array) -> "Cover":
+        """Return the cover of columns B, each a signal of one standard deviation, (n_samples, n)."""
+        left, values, _ = np.linalg.svd(columns, full_matrices=False)
+        return cls(left, values**2)
+
+    def white(self, signals: Array) -> Array:
+        """Return signals divided by the root of the covariance, (..., n_samples)."""
+        shares = 1.0 - 1.0 / np.sqrt(1.0 + self.sizes)
+        return np.asarray(signals - ((signals @ self.basis) * shares) @ self.basis.T)
+
+
+@dataclass(frozen=True, eq=False)
 class WhitenedData:
     """Hold records with their noise, the outputs of one file as a record each.
 
     levels: noise of each record. kept: which of all samples enter fits, (n_samples,). sound: 0 where a sample is no
     data, else 1, (n_samples,). estimates: where those of fits are kept, None: nowhere. freed: what the largest size of
     each fault that was undone in the records does to the whitened signal, (n_samples, n_faults): its size is as unknown
-    as a parameter; None for none.
+    as a parameter; None for none. cover: of a signal without a form; None for none.
     """
 
     records: tuple[Record, ...]
@@ -161,6 +183,12 @@ class WhitenedData:
     sound: Array
     estimates: Estimates | None = None
     freed: Array | None = None
+    cover: Cover | None = None
+
+    @property
+    def log_cover(self) -> float:
+        """Log determinant of the covariance that a signal without a form adds."""
+        return 0.0 if self.cover is None else float(np.sum(np.log1p(self.cover.sizes)))
 
     @cached_property
     def lengths(self) -> tuple[tuple[int, ...], ...]:
@@ -188,7 +216,8 @@ class WhitenedData:
         triples = zip(self.levels, signals, self.lengths, strict=True)
         white = np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
         # What is no data weighs nothing, whoever asks.
-        return white if self.sound.all() else white * self.sound
+        white = white if self.sound.all() else white * self.sound
+        return white if self.cover is None else self.cover.white(white)
 
     @property
     def n_manoeuvres(self) -> int:

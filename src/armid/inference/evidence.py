@@ -1,0 +1,293 @@
+"""How probable the records are in a model: the log evidence of a fit, and of what may be added to it, to first order.
+
+By Laplace's approximation, with Student's t where a rest of few samples tells the noise,
+
+    log Z = -(nu + n)/2 ln(1 + (Q - n)/(nu + n)) + k/2 ln 2 pi - 1/2 ln |J'J + 2 pi D| + ln prior
+
+Q is the sum of squares over the noise, n the samples, nu the independent samples of the rest, J the whitened
+sensitivities to k parameters. D holds the squared prior densities, so that no Occam factor exceeds 1.
+Where the best model leaves more than noise, Q is tempered: only independent samples of what it leaves count.
+Adding a column X with a strength of prior deviation s to a fit with residual r multiplies the evidence by B,
+
+    2 ln B = (X'r)^2 / (|X|^2 + 1/s^2) - ln(1 + s^2 |X|^2),     X beyond what the unknowns of the fit can do.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import log_ndtr, logsumexp
+
+from armid.estimation.constants import NAMED
+from armid.inference.checks import is_significant
+from armid.inference.hypothesis import Proposal
+from armid.inference.library import EffectKey, Library
+from armid.inference.model import Fit
+from armid.model import Array
+
+# Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude.
+SCALES = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
+# Fewest independent samples of a residual that is no noise.
+FEWEST = 10.0
+LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Hold what a sum of squares counts, the same for all models that are compared.
+
+    n: independent samples. weight: of each square. rest: independent samples from which the noise is known.
+    """
+
+    n: float
+    weight: float
+    rest: float
+
+    def log_likelihood(self, chi2: float) -> float:
+        excess = (self.weight * chi2 - self.n) / (self.rest + self.n)
+        return float(-0.5 * (self.rest + self.n) * np.log1p(max(excess, -1.0 + 1e-12)))
+
+    def variance(self, chi2: float) -> float:
+        """Return the variance of the noise in its declared unit, as a fit shows it together with the rest."""
+        return max((self.rest + self.weight * chi2) / (self.rest + self.n), 0.5)
+
+    def reach(self, log_likelihood: float) -> float:
+        """Return the sum of squares at a log-likelihood."""
+        total = self.rest + self.n
+        return float((np.expm1(-2.0 * log_likelihood / total) * total + self.n) / self.weight)
+
+
+def scale_of(best: Fit) -> Scale:
+    """Return the scale on which the best model leaves what its residual shows.
+
+    Noise: each sample counts. More than noise: what is left is the model's error, of unknown size, and slow.
+    """
+    data, n = best.records.data, float(np.count_nonzero(best.records.data.sound))
+    if not is_significant(best):
+        return Scale(n, 1.0, data.n_noise(otherwise=n))
+    square = max(best.chi2 / n, 1.0)
+    independent = float(np.clip(best.independent, FEWEST, n))
+    # How much of the misfit is noise decides how much the rest still tells of its size.
+    return Scale(independent, independent / n / square, data.n_noise(otherwise=n) / square**2)
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Hold a fit to second order: all its unknowns A, their prior precision, and the residual.
+
+    doubts: further unknowns with a prior deviation of 1 that the fit holds at their prior mean, (n_samples, n).
+    """
+
+    fit: Fit
+    scale: Scale
+    library: Library
+    doubts: Array
+    without: EffectKey | None = None
+    change: Array | None = None
+
+    @cached_property
+    def kept(self) -> Array:
+        """Which free parameters are unknowns here."""
+        return np.ones(self.fit.n_free, dtype=bool) if self.without is None else ~self.fit.owned_by(self.without)
+
+    @cached_property
+    def unknowns(self) -> Array:
+        return np.hstack([self.fit.jacobian[:, self.kept], self.fit.columns, self.doubts])
+
+    @cached_property
+    def residual(self) -> Array:
+        return self.fit.residual if self.change is None else self.fit.residual + self.change
+
+    @cached_property
+    def density(self) -> Array:
+        """Prior density of each free parameter along its range, at the estimate, (n_free,)."""
+        fit, space = self.fit, self.fit.records.space
+        found = np.ones(fit.n_free)
+        for i, (name, value) in enumerate(fit.values.items()):
+            low, high = space.low[space.free][i], space.high[space.free][i]
+            is_shape = self.library.owner(name) is not None and fit.model.parameters[name].null is None
+            if is_shape and low > 0.0 and high > 5.0 * low:  # log-uniform
+                found[i] = (high - low) / (max(value, low) * np.log(high / low))
+        return found
+
+    @cached_property
+    def precision(self) -> Array:
+        """Prior precision of all unknowns."""
+        n_others = self.fit.columns.shape[1] + self.doubts.shape[1]
+        return np.concatenate([2.0 * np.pi * self.density[self.kept] ** 2, np.ones(n_others)])
+
+    @cached_property
+    def factor(self) -> tuple[Array, bool]:
+        normal = self.scale.weight * self.unknowns.T @ self.unknowns
+        return cho_factor(normal + np.diag(self.precision), lower=True)  # type: ignore[no-any-return]
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Posterior covariance of all unknowns, (n, n)."""
+        return self.scale.variance(self.fit.chi2) * cho_solve(self.factor, np.eye(len(self.precision)))
+
+    def beyond(self, columns: Array) -> tuple[Array, Array]:
+        """Return inner products of columns, (n, n_samples), with themselves and the residual, beyond the unknowns.
+
+        The answers of the unknowns, (n_unknowns, n), are the third.
+        """
+        mixed = self.scale.weight * (columns @ self.unknowns).T
+        answer = cho_solve(self.factor, mixed)
+        return mixed, answer
+
+    def products(self, columns: Array) -> tuple[Array, Array, Array]:
+        """Return Gram matrix and slopes of columns beyond the unknowns, and how the unknowns answer to each column."""
+        mixed, answer = self.beyond(columns)
+        gram = self.scale.weight * columns @ columns.T - mixed.T @ answer
+        gradient = self.scale.weight * (self.unknowns.T @ self.residual)
+        slope = self.scale.weight * columns @ self.residual - answer.T @ gradient
+        return gram, slope, answer
+
+    def squares(self, columns: Array) -> tuple[Array, Array, Array]:
+        """Return what `products` does, of the Gram matrix its diagonal."""
+        mixed, answer = self.beyond(columns)
+        square = self.scale.weight * np.einsum("ij,ij->i", columns, columns) - np.einsum("ij,ij->j", mixed, answer)
+        gradient = self.scale.weight * (self.unknowns.T @ self.residual)
+        slope = self.scale.weight * columns @ self.residual - answer.T @ gradient
+        return np.maximum(square, 0.0), slope, answer
+
+    @cached_property
+    def base(self) -> float:
+        return self.scale.rest + self.scale.weight * float(self.residual @ self.residual)
+
+    def student(self, fall: Array) -> Array:
+        """Return the rise of the log-likelihood by a fall of the weighted sum of squares."""
+        share = np.minimum(fall / self.base, 1.0 - 1e-9)
+        return np.asarray(-0.5 * (self.scale.rest + self.scale.n) * np.log1p(-share))
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Hold what a proposal does to the evidence, to first order.
+
+    log_factor: log Bayes factor of each variant and scale, their prior included, (n_variants, n_scales). strength:
+    expected, of each. answer: of the unknowns per full strength, (n_unknowns, n_variants). deviation: of the strength.
+    """
+
+    proposal: Proposal
+    log_factor: Array
+    strength: Array
+    answer: Array
+    deviation: Array
+
+    @cached_property
+    def total(self) -> float:
+        """Log Bayes factor of the hypothesis, without its prior odds."""
+        return float(logsumexp(self.log_factor))
+
+    @property
+    def posterior(self) -> float:
+        """Log odds that it holds beside the fit."""
+        return self.total + self.proposal.hypothesis.log_prior
+
+    def best(self, n: int) -> list[tuple[int, float]]:
+        """Return the best variants with their strengths, the best first."""
+        each = logsumexp(self.log_factor, axis=1)
+        order = np.argsort(-each, kind="stable")[:n]
+        return [(int(i), float(self.strength[i, np.argmax(self.log_factor[i])])) for i in order if np.isfinite(each[i])]
+
+
+def forecast(about: Expansion, proposal: Proposal) -> Forecast:
+    """Return the log Bayes factor of a proposal beside a fit, to first order."""
+    if proposal.joint:
+        return joint_forecast(about, proposal)
+    square, slope, answer = about.squares(proposal.columns)
+    # What the unknowns do whole leaves rounding.
+    seen = square > 1e-9 * about.scale.weight * np.einsum("ij,ij->i", proposal.columns, proposal.columns)
+    square, slope = np.where(seen, square, 0.0)[:, np.newaxis], np.where(seen, slope, 0.0)[:, np.newaxis]
+    variance = 1.0 / (square + proposal.scales**-2.0)
+    strength = variance * slope
+    rise = about.student(strength * slope) - 0.5 * np.log1p(square * proposal.scales**2)
+    deviation = np.sqrt(variance)
+    if proposal.one_sided:
+        rise = rise + np.log(2.0) + log_ndtr(strength / deviation)
+    log_factor = rise + proposal.variants[:, np.newaxis] - np.log(len(proposal.scales))
+    return Forecast(proposal, np.where(np.isfinite(log_factor), log_factor, -np.inf), strength, answer, deviation)
+
+
+def joint_forecast(about: Expansion, proposal: Proposal) -> Forecast:
+    """Return what `forecast` does where all columns act together, each with the same prior deviation."""
+    gram, slope, answer = about.products(proposal.columns)
+    values, vectors = np.linalg.eigh(0.5 * (gram + gram.T))
+    values, along = np.maximum(values, 0.0), vectors.T @ slope
+    spread = 1.0 / (values[:, np.newaxis] + proposal.scales**-2.0)
+    fall = np.sum(spread * along[:, np.newaxis] ** 2, axis=0)
+    rise = about.student(fall) - 0.5 * np.sum(np.log1p(values[:, np.newaxis] * proposal.scales**2), axis=0)
+    log_factor = rise + proposal.variants[0] - np.log(len(proposal.scales))
+    best = int(np.argmax(log_factor))
+    strengths = vectors @ (spread[:, best] * along)
+    total = answer @ strengths
+    moved = answer @ (vectors * np.sqrt(spread[:, best]))
+    return Forecast(proposal, log_factor[np.newaxis], np.broadcast_to(proposal.scales, (1, len(proposal.scales))),
+                    total[:, np.newaxis], np.sqrt(np.sum(moved**2, axis=1))[:, np.newaxis])  # fmt: skip
+
+
+def log_normal(values: Array, covariance: Array) -> float:
+    """Return the log density of a normal distribution about 0."""
+    _, determinant = np.linalg.slogdet(covariance)
+    square = float(values @ np.linalg.solve(covariance, values))
+    return float(-0.5 * (square + determinant + len(values) * LOG_2PI))
+
+
+def log_evidence(about: Expansion) -> float:
+    """Return the log evidence of a fit, without the prior odds of its hypotheses."""
+    fit, scale = about.fit, about.scale
+    density, factor = about.density, about.factor[0]
+    determinant = 2.0 * float(np.sum(np.log(np.diag(factor))))
+    # A strength counts with its own prior, below; the density along its box cancels there.
+    found = scale.log_likelihood(fit.chi2) + 0.5 * fit.n_free * LOG_2PI - 0.5 * determinant
+    found += float(np.sum(np.log(density)))
+    found -= 0.5 * sum(f.value**2 + f.unknown.lost(f.value) for f in fit.others)
+    found -= 0.5 * fit.records.data.log_cover
+    for key in fit.active:
+        found += log_strength(about, key)
+    return found
+
+
+def log_strength(about: Expansion, key: EffectKey) -> float:
+    """Return the log prior density of the strengths of an effect, averaged over their posterior and over the scales.
+
+    The strength is half-normal, or normal where it may have either sign, with one of the scales.
+    """
+    fit, space = about.fit, about.fit.records.space
+    low, high = space.low[space.free], space.high[space.free]
+    places, shares, sizes, found = [], [], [], 0.0
+    for i, (name, value) in enumerate(fit.values.items()):
+        parameter = fit.model.parameters[name]
+        if not key.owns(name) or parameter.null is None:
+            continue
+        far = about.library.strength_of(name, parameter)
+        places.append(i)
+        shares.append((value - parameter.null) / far)
+        sizes.append(far / (high[i] - low[i]))
+        found += 0.0 if low[i] < parameter.null < high[i] else np.log(2.0)
+    if not places:
+        return 0.0
+    size = np.array(sizes)
+    covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
+    each = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
+    return found + float(logsumexp(each) - np.log(len(SCALES)) - np.sum(np.log(size)))
+
+
+def doubts_of(fit: Fit, library: Library) -> Array:
+    """Return what one prior deviation of constants and starts that a fit holds does to it, (n_samples, n)."""
+    freed = any(f.unknown.name.startswith(NAMED) for f in fit.others)
+    held = [] if freed else [p.column for p in fit.products(library.tolerances)]
+    columns = [*held, *fit.start_slopes.T]
+    return np.array(columns).reshape(len(columns), len(fit.residual)).T
+
+
+def expansion_of(fit: Fit, scale: Scale, library: Library, with_doubts: bool = True) -> Expansion:
+    none = np.empty((len(fit.residual), 0))
+    return Expansion(fit, scale, library, doubts_of(fit, library) if with_doubts else none)
+
+
+def best_of(fits: Iterable[Fit], values: Sequence[float]) -> Fit:
+    return max(zip(fits, values, strict=True), key=lambda pair: pair[1])[0]

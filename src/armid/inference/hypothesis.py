@@ -1,0 +1,67 @@
+"""A hypothesis: something that may be true of the machine or of its records, and is not in the declared model."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from armid.inference.model import Fit
+from armid.model import Array
+
+
+@dataclass(frozen=True, order=True)
+class Hypothesis:
+    """Name one thing that may be true beside the declared model.
+
+    kind: "effect" (an effect of the library), "record" (a fault of one record), "drift" (a parameter or constant that
+    changes from record to record) or "unknown" (a signal without a form). name: the public name. form: which published
+    form of the effect, or the variable on which an unknown signal depends. log_prior: log odds before the data.
+    means: what the kind needs to apply the hypothesis.
+    """
+
+    kind: str
+    name: str
+    form: str = ""
+    log_prior: float = field(default=0.0, compare=False)
+    means: Any = field(default=None, compare=False)
+
+    @property
+    def public(self) -> tuple[str, str]:
+        """Kind and name, whatever the form."""
+        return self.kind, self.name
+
+
+# A model in words: the hypotheses that hold in it.
+Hypotheses = frozenset[Hypothesis]
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Hold one hypothesis beside a fit, to first order.
+
+    columns: change of the whitened signal per full strength, (n_variants, n_samples). joint: whether all columns act
+    together, each with a strength of its own; otherwise exactly one of them holds. one_sided: whether strengths are
+    positive. scales: prior standard deviations of a strength, equally likely, (n_scales,). variants: log prior of each
+    variant, (n_variants,). refit: of a fit, its expansion, the forecast and a sum of squares that must be in reach, the
+    model with the hypothesis.
+    """
+
+    hypothesis: Hypothesis
+    columns: Array
+    scales: Array
+    variants: Array
+    refit: Callable[..., Fit | None]
+    one_sided: bool = False
+    joint: bool = False
+
+
+def expected(number: float, n: int) -> float:
+    """Return the log prior odds of each of n hypotheses of which so many are expected to hold."""
+    p = min(number / max(n, 1), 0.5)
+    return float(np.log(p / (1.0 - p)))
+
+
+def words(hypotheses: Sequence[Hypothesis] | Hypotheses) -> str:
+    """Return a model in words."""
+    return " + ".join(sorted(h.name for h in hypotheses)) or "nothing"

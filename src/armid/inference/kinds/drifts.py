@@ -1,0 +1,97 @@
+"""Drifts: a parameter or a constant that changes in proportion to the order of the records."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from armid.estimation.constants import Product, moved_replays
+from armid.inference.evidence import Expansion, Forecast
+from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.kinds.faults import simulated_file, with_measured
+from armid.inference.library import Library
+from armid.inference.model import Fit
+from armid.inference.refit import unless_diverged
+from armid.inference.unknowns import Unknown, freed
+from armid.inference.whitening import WhiteRecords
+from armid.model import Array
+
+EXPECTED = 0.03
+# A drift is asked of so many files.
+FEWEST = 4
+# Its largest plausible size, as a share of the range or of the constant; prior deviations as shares of that.
+LARGEST, SCALES = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
+
+
+@dataclass(frozen=True)
+class OfParameter:
+    """Say which parameter of the declared model, or which constant, drifts."""
+
+    name: str
+    product: Product | None = None
+
+    def moved(self, at: Array, names: tuple[str, ...], records: WhiteRecords, value: float) -> WhiteRecords:
+        """Return records as they would be in the middle of the campaign; at: free parameters about which, shares."""
+        files, found = list(dict.fromkeys(r.file for r in records.data.records)), records
+        for place, file in enumerate(files):
+            index = next(i for i, r in enumerate(records.data.records) if r.file == file)
+            share, there, z = value * LARGEST * (place / (len(files) - 1.0) - 0.5), records, at
+            if self.product is not None:
+                there = replace(records, replays=moved_replays(records.replays, {self.product.names[0]: share}))
+            else:
+                z = at + share * np.array([name == self.name for name in names])
+            pairs = zip(simulated_file(records, index, at), simulated_file(there, index, z), strict=True)
+            found = with_measured(found, index, [x - y for x, y in pairs])
+        return found
+
+    def column(self, fit: Fit, records: WhiteRecords, z: Array, value: float) -> Array:
+        """Return what the largest plausible drift takes away of the residual."""
+        if self.product is not None:
+            return np.asarray(LARGEST * self.product.slope * order_of(records))
+        place = list(fit.values).index(self.name)
+        return np.asarray(LARGEST * records.residual_and_slopes(z)[1][:, place] * order_of(records))
+
+
+def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
+    """Return the drifts of parameters and constants, none where there are few records."""
+    if len({r.file for r in fit.records.data.records}) < FEWEST:
+        return []
+    own = [OfParameter(name) for name in fit.values if library.owner(name) is None]
+    own += [OfParameter(p.public, p) for p in fit.products(library.tolerances)]
+    return [Hypothesis("drift", one.name, "", expected(EXPECTED, len(own)), one) for one in own]
+
+
+def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
+    """Return the drifts that a fit does not hold, with what the largest plausible one does."""
+    held = {f.unknown.name for f in fit.others}
+    order, names, found = order_of(fit.records), list(fit.values), []
+    for hypothesis in known:
+        what: OfParameter = hypothesis.means
+        if f"drift of {hypothesis.name}" in held or (what.product is None and what.name not in names):
+            continue
+        slope = what.product.slope if what.product is not None else fit.jacobian[:, names.index(what.name)]
+        column = LARGEST * slope * order
+        if column.any():
+            found.append(Proposal(hypothesis, column[np.newaxis], SCALES, np.zeros(1), partial(refit, hypothesis)))
+    return found
+
+
+def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
+    """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
+    base, what, again = fit.base or fit.records, hypothesis.means, fit
+    for _ in range(2):
+        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again.z, tuple(again.values)),
+                          column=partial(what.column, again))  # fmt: skip
+        others = [f.unknown for f in fit.others if f.unknown.name != unknown.name]
+        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], limit, rough=True))  # noqa: B023
+        if tried is None:
+            return None
+        again = tried
+    return again
+
+
+def order_of(records: WhiteRecords) -> Array:
+    """Return the place of the file of each sample in the order of the campaign, from -1/2 to 1/2, (n_samples,)."""
+    files = list(dict.fromkeys(r.file for r in records.data.records))
+    places = np.array([files.index(r.file) for r in records.data.records]) / (len(files) - 1.0) - 0.5
+    return np.repeat(places, np.diff(records.data.edges))

@@ -1,0 +1,144 @@
+"""Effects of the library that may be missing: each form on a grid of its shapes, its strength from weak to strong."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from armid.estimation.least_squares import descend
+from armid.inference.evidence import SCALES, Expansion, Forecast
+from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.library import Activation, EffectKey, Library, activation_grid
+from armid.inference.model import ROUGHLY, Fit, fit_from
+from armid.inference.refit import unless_diverged
+from armid.inference.score_test import at_null, candidate_at, free_values
+from armid.inference.whitening import WhiteRecords
+from armid.model import Array
+
+# Effects that a campaign is expected to lack, of all in the library.
+EXPECTED = 0.7
+# Shares of the range over which a strength is tried: a slope, and two secants where the answer is no straight line.
+SLOPE = 1e-3
+SHARES = (SLOPE, 0.05, 0.4)
+# Variants of a forecast from which a fit may start.
+N_STARTS = 4
+# First steps of a fit, after which it shows how far it may lead.
+N_STEPS = 2
+
+
+def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
+    """Return a hypothesis for each form of each effect; the forms of one effect share its prior."""
+    names = {key.public for key in library.candidates}
+    forms = [key.public for key in library.candidates]
+    return {
+        key: Hypothesis("effect", key.public, key.form,
+                        library.log_odds(key.public, expected(EXPECTED, len(names))) - np.log(forms.count(key.public)),
+                        key)
+        for key in library.candidates
+    }  # fmt: skip
+
+
+def propose(fit: Fit, known: dict[EffectKey, Hypothesis], library: Library) -> list[Proposal]:
+    """Return the effects that are not in a fit, with what each would change."""
+    return proposals(fit, library.joinable(fit.active), known, library)
+
+
+def propose_forms(fit: Fit, known: dict[EffectKey, Hypothesis], library: Library) -> list[Proposal]:
+    """Return the other forms of the effects of a fit."""
+    mine, names = {key.declared for key in fit.active}, {key.public for key in fit.active}
+    return proposals(fit, [k for k in library.candidates if k.public in names and k not in mine], known, library)
+
+
+def proposals(
+    fit: Fit, keys: list[EffectKey], known: dict[EffectKey, Hypothesis], library: Library
+) -> list[Proposal]:  # fmt: skip
+    each = library.each(lambda key: proposal(fit, known[key], key, library), keys)
+    return [p for p in each if p is not None]
+
+
+def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library) -> Proposal | None:
+    records = beside(fit, (*fit.active, key), library)
+    every, _ = activation_grid(records, key)
+    grid = [replace(a, share=share) for a in every if a.share == every[0].share for share in SHARES]
+    moved = responses(records, fit, grid)
+    good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
+    if not len(good):
+        return None
+    chosen = [grid[i] for i in good]
+    variants = np.full(len(good), -np.log(len(grid)))
+    return Proposal(hypothesis, moved[good], SCALES, variants, partial(refit, key, chosen, library), one_sided=True)
+
+
+def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
+    """Return the problem with other effects on the records as a fit has them: its constants, faults and cover."""
+    posed = library.problem(active, fit.values)
+    if fit.records.data.cover is not None:
+        posed = replace(posed, data=fit.records.data)
+    for one in fit.others:
+        posed = one.unknown.moved(posed, one.value)
+    return posed
+
+
+def responses(records: WhiteRecords, fit: Fit, grid: list[Activation]) -> Array:
+    """Return the change of the whitened signal per full strength of each activation, (n_activations, n_samples)."""
+    population = np.tile(candidate_at(records, fit.values), (len(grid) + 1, 1))
+    for row, activation in zip(population[1:], grid, strict=True):
+        for name, value in activation.at(activation.share).items():
+            row[records.space.index(name)] = value
+    signals = records.whole_signals(population)
+    return np.asarray((signals[1:] - signals[0]) / np.array([a.share for a in grid])[:, np.newaxis])
+
+
+def refit(
+    key: EffectKey, grid: list[Activation], library: Library, fit: Fit, about: Expansion, ahead: Forecast, limit: float,
+    begun: Array | None = None,
+) -> Fit | None:  # fmt: skip
+    """Return the model with an effect, fitted from the best two of the starts that a forecast gives.
+
+    begun: where its first steps led; the fit goes on from there.
+    """
+    posed = beside(fit, (*fit.active, key), library)
+    if begun is None:
+        starts = np.array(starts_of(fit, about, ahead, posed, grid))
+        best = starts[np.argsort(posed.chi2(starts), kind="stable")[:2]]
+    else:
+        best = begun[np.newaxis]
+    again = unless_diverged(lambda: fit_from(posed, (*fit.active, key), list(best), rough=True, limit=limit))
+    return None if again is None else replace(again, others=fit.others, base=base_of(fit, again.active, library))
+
+
+def base_of(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords | None:
+    """Return the problem with other effects before any further unknown of a fit was moved, None where it has none."""
+    return None if fit.base is None else replace(library.problem(active, fit.values), data=fit.base.data)
+
+
+def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -> tuple[float, Array]:
+    """Return where the first steps of a fit from the best start lead: the sum of squares, and the candidate."""
+    key, grid = ahead.proposal.refit.args[:2]  # type: ignore[attr-defined]
+    posed = beside(fit, (*fit.active, key), library)
+    starts = np.array(starts_of(fit, about, ahead, posed, grid))
+    chi2 = posed.chi2(starts)
+    best = starts[int(np.argmin(chi2))]
+    if not np.isfinite(chi2.min()):
+        return np.inf, best
+    z = descend(posed, [best], ROUGHLY, most=N_STEPS)
+    return float(posed.chi2(z)[0]), z
+
+
+def starts_of(
+    fit: Fit, about: Expansion, ahead: Forecast, posed: WhiteRecords, grid: list[Activation]
+) -> list[Array]:  # fmt: skip
+    """Return extended candidates at expected and tried strengths, with the linear answer of the parameters."""
+    starts = []
+    for variant, strength in ahead.best(N_STARTS):
+        for share in dict.fromkeys((float(np.clip(strength, 0.01, 1.0)), grid[variant].share)):
+            z = np.clip(fit.z - share * ahead.answer[: fit.n_free, variant], 0.01, 0.99)
+            values = dict(zip(fit.values, fit.records.values(z), strict=True)) | grid[variant].at(share)
+            starts.append(np.clip(posed.shares(free_values(posed, values)), 1e-3, 1.0 - 1e-3))
+    return starts
+
+
+def change_without(fit: Fit, key: EffectKey) -> Array:
+    """Return what an effect of a fit does to the whitened signal, (n_samples,)."""
+    signals = fit.records.whole_signals(np.array([fit.candidate, at_null(fit.records, fit.candidate, key)]))
+    return np.asarray(signals[0] - signals[1])

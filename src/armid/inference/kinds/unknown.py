@@ -1,0 +1,137 @@
+"""A signal without a form at a port: a Gaussian process in time, or over one variable of the motion.
+
+What no effect of the library explains has a covariance of its own (Kennedy, O'Hagan 2001,
+doi:10.1111/1467-9868.00294): intervals count it, and no name is read off what it covers.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from armid.inference.evidence import Expansion, Forecast
+from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.library import Library
+from armid.inference.missing_signal import Segment, motions, segments
+from armid.inference.model import Fit, fit_from
+from armid.inference.refit import unless_diverged
+from armid.inference.score_test import candidate_at, free_values
+from armid.inference.whitening import Cover
+from armid.model import Array
+
+EXPECTED = 0.05
+# Prior deviations: rms by which the signal moves all records, in units of the noise.
+SCALES = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+# Lengths over which the signal forgets, as shares of the median duration of a piece; of a curve, of its range.
+LENGTHS, LENGTH_OF_CURVE = (0.07, 0.2), 0.25
+# Columns of a curve, knots under it, and the most columns of one piece in time.
+N_CURVE, N_KNOTS, MOST_IN_TIME = 6, 10, 20
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Hold the columns of every signal without a form about one fit: (port, variable) -> (n_samples, n)."""
+
+    columns: dict[tuple[str, str], Array]
+
+
+@lru_cache(maxsize=4)
+def signals_without_form(fit: Fit, library: Library) -> Signals:
+    """Return the columns of signals at every port, scaled so that each moves all records by the noise rms."""
+    records = fit.records
+    model, n = records.model, len(fit.residual)
+    ports = list(model.plant.ports)
+    levels = [level.rms for level in records.data.levels]
+    whole = segments(model, records.space, free_values(records, fit.values), records.replays, levels, ports)
+    whole = motions(model, candidate_at(records, fit.values), whole)
+    if sum(len(s.residual) for s in whole) != n:
+        return Signals({})
+    level = np.repeat(levels, [sum(lengths) for lengths in records.data.lengths])
+    order = places_of(whole, fit)
+
+    def white(column: Array) -> Array:
+        placed = np.empty_like(column)
+        placed[order] = column
+        parts = records.data.by_record((placed * level[:, np.newaxis]).T)
+        return replace(records.data, cover=None).white(parts).T
+
+    found: dict[tuple[str, str], Array] = {}
+    duration = float(np.median([s.knots[-1] - s.knots[0] for s in whole]))
+    for port in whole[0].gains:
+        for share in LENGTHS:
+            found[port, f"time ({share:g} of a record)"] = white(block_diag(*(
+                s.gains[port] @ process(s.knots, share * duration, MOST_IN_TIME) for s in whole)))  # fmt: skip
+        for variable in whole[0].variables:
+            for factor in whole[0].factors:
+                if variable not in (factor, "time"):
+                    name = variable if factor == "1" else f"{variable} x {factor}"
+                    found[port, name] = white(over_variable(whole, port, variable, factor))
+    sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in found.items()}
+    return Signals({key: column / sizes[key] for key, column in found.items()
+                    if np.isfinite(sizes[key]) and sizes[key] > 0.0})  # fmt: skip
+
+
+def places_of(whole: list[Segment], fit: Fit) -> Array:
+    """Return where the samples of the segments, outputs of a piece one behind the other, stand in the residual."""
+    data = fit.records.data
+    start = {id(replay): int(edge) for replay, edge in zip(fit.records.replays, data.edges, strict=False)}
+    found = []
+    for segment in whole:
+        for replay in segment.replays:
+            first = start[id(replay)] + sum(p.n_samples for p in replay.pieces[: segment.index])
+            found.append(first + np.arange(replay.pieces[segment.index].n_samples))
+    return np.concatenate(found)
+
+
+def process(times: Array, length: float, most: int) -> Array:
+    """Return the leading columns of a smooth Gaussian process at some times, (n_times, n)."""
+    kernel = np.exp(-0.5 * ((times[:, np.newaxis] - times) / length) ** 2)
+    values, vectors = np.linalg.eigh(kernel)
+    n = min(most, int(1.6 * (times[-1] - times[0]) / length) + 4, len(times))
+    return np.asarray(vectors[:, -n:] * np.sqrt(np.maximum(values[-n:], 0.0)))
+
+
+def over_variable(whole: list[Segment], port: str, variable: str, factor: str) -> Array:
+    """Return the columns of a curve over a variable of the motion, (n_samples, n)."""
+    every = np.concatenate([s.variables[variable] for s in whole])
+    low, high = float(every.min()), float(every.max())
+    curve = process(np.linspace(0.0, 1.0, N_KNOTS), LENGTH_OF_CURVE, N_CURVE)
+    columns = []
+    for s in whole:
+        place = np.clip((s.variables[variable] - low) / (high - low), 0.0, 1.0) * (N_KNOTS - 1)
+        hats = np.maximum(0.0, 1.0 - np.abs(place[:, np.newaxis] - np.arange(N_KNOTS)))
+        columns.append(s.gains[port] @ (hats * s.factors[factor][:, np.newaxis]) @ curve)
+    return np.concatenate(columns)
+
+
+def propose(fit: Fit, library: Library) -> list[Proposal]:
+    """Return a signal without a form at each port, in time and over each variable."""
+    if fit.records.data.cover is not None:
+        return []
+    known = signals_without_form(fit, library).columns
+    return [
+        Proposal(Hypothesis("unknown", port, variable, expected(EXPECTED, len(known)), (port, variable)),
+                 column.T, SCALES, np.zeros(1), partial(refit, library, (port, variable)), joint=True)
+        for (port, variable), column in known.items()
+    ]  # fmt: skip
+
+
+def refit(
+    library: Library, which: tuple[str, str], fit: Fit, about: Expansion, ahead: Forecast, limit: float
+) -> Fit | None:
+    """Return the model beside a signal without a form: fitted with its covariance, taken about its own estimate."""
+    again, scale = fit, ahead.best(1)[0][1]
+    for _ in range(2):
+        columns = signals_without_form(again, library).columns.get(which)
+        if columns is None:
+            return None
+        data = replace(again.records.data, cover=Cover.of(scale * columns))
+        records = replace(again.records, data=data)
+        tried = unless_diverged(lambda: fit_from(records, fit.active, [again.z]))  # noqa: B023
+        if tried is None:
+            return None
+        plain = replace(tried.records, data=replace(data, cover=None))
+        covered = replace(tried, others=fit.others, base=fit.base)
+        again = replace(covered, records=plain)
+    return covered

@@ -1,0 +1,151 @@
+"""The posterior over models: probabilities of hypotheses and sets, and intervals that count what may be missing.
+
+Every fitted model has its posterior weight; beside each model that was expanded, what was not fitted counts to first
+order. A parameter's interval holds 95 % of the mixture of all (Hoeting and others 1999, doi:10.1214/ss/1009212519).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import logsumexp, ndtr
+
+from armid.inference.evidence import Expansion, expansion_of
+from armid.inference.hypothesis import Hypotheses
+from armid.inference.search import Exploration
+from armid.model import Array
+
+# Models of a smaller weight than this, relative to the best, do not count.
+NEGLIGIBLE = float(np.log(1e-6))
+
+
+@dataclass(frozen=True, eq=False)
+class Atom:
+    """Hold one model of the mixture: its log weight, its hypotheses, means and deviations of the parameters."""
+
+    log_weight: float
+    names: frozenset[tuple[str, str]]
+    mean: Array
+    deviation: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Hold the mixture. parameters: names of those of the declared model, in the order of the atoms' values."""
+
+    atoms: tuple[Atom, ...]
+    parameters: tuple[str, ...]
+
+    @cached_property
+    def weights(self) -> Array:
+        each = np.array([a.log_weight for a in self.atoms])
+        return np.asarray(np.exp(each - logsumexp(each)))
+
+    @cached_property
+    def sets(self) -> dict[frozenset[tuple[str, str]], float]:
+        """Probability of each set of hypotheses, the most probable first."""
+        found: dict[frozenset[tuple[str, str]], float] = {}
+        for atom, weight in zip(self.atoms, self.weights, strict=True):
+            found[atom.names] = found.get(atom.names, 0.0) + float(weight)
+        return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+
+    def probability(self, kind: str, name: str | None = None) -> float:
+        """Return the probability of a hypothesis, or of any of a kind; a name counts in sets without `unknown`."""
+        total = 0.0
+        for names, weight in self.sets.items():
+            if kind == "effect" and name is not None and any(k == "unknown" for k, _ in names):
+                continue
+            total += weight * any(k == kind and name in (None, n) for k, n in names)
+        return total
+
+    @property
+    def nothing(self) -> float:
+        return self.sets.get(frozenset(), 0.0)
+
+    def of_kind(self, kind: str) -> dict[str, float]:
+        """Return the probabilities of the hypotheses of a kind, the most probable first."""
+        names = {n for s in self.sets for k, n in s if k == kind}
+        return dict(sorted(((n, self.probability(kind, n)) for n in names), key=lambda pair: -pair[1]))
+
+    def quantile(self, parameter: str, share: float) -> float:
+        """Return the value below which a share of the mixture lies."""
+        i = self.parameters.index(parameter)
+        means, deviations = (np.array([getattr(a, what)[i] for a in self.atoms]) for what in ("mean", "deviation"))
+        deviations = np.maximum(deviations, 1e-300)
+        low, high = float((means - 40.0 * deviations).min()), float((means + 40.0 * deviations).max())
+        for _ in range(200):
+            middle = 0.5 * (low + high)
+            below = float(self.weights @ ndtr((middle - means) / deviations))
+            low, high = (middle, high) if below < share else (low, middle)
+        return 0.5 * (low + high)
+
+    def interval(self, parameter: str) -> tuple[float, float]:
+        """Return the interval that holds 95 % of the mixture."""
+        return self.quantile(parameter, 0.025), self.quantile(parameter, 0.975)
+
+
+def posterior(found: Exploration) -> Posterior:
+    """Return the mixture of all models that were fitted, and of what may stand beside those that were expanded."""
+    library, scale = found.library, found.scale()
+    own = tuple(n for n in found.declared.values if library.owner(n) is None)
+    ranked, atoms = found.ranked(), []
+    top = ranked[0][1]
+    for model, value in ranked:
+        if value < top + NEGLIGIBLE:
+            continue
+        about = expansion_of(found.fits[model], scale, library)
+        mean, covariance = of_parameters(about, own)
+        names = frozenset(h.public for h in model)
+        atoms.append(Atom(value, names, mean, np.sqrt(np.diag(covariance))))
+        atoms += beside(found, model, value, about, own, mean, covariance, top)
+    return Posterior(tuple(atoms), own)
+
+
+def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
+    """Return the parameters of the declared model at a fit, SI, and their covariance."""
+    values = about.fit.values
+    places = [list(values).index(n) for n in own]
+    span = about.fit.records.span[places]
+    covariance = about.covariance[np.ix_(places, places)] * np.outer(span, span)
+    return np.array([values[n] for n in own]), covariance
+
+
+def beside(
+    found: Exploration, model: Hypotheses, value: float, about: Expansion, own: Sequence[str], mean: Array,
+    covariance: Array, top: float,
+) -> list[Atom]:  # fmt: skip
+    """Return the atoms of what was not fitted beside a model that was expanded, to first order."""
+    fit = about.fit
+    places = [list(fit.values).index(n) for n in own]
+    span, atoms = fit.records.span[places], []
+    names = frozenset(h.public for h in model)
+    for ahead in found.forecasts.get(model, ()):
+        hypothesis = ahead.proposal.hypothesis
+        if model | {hypothesis} in found.fits:
+            continue
+        weight = value + hypothesis.log_prior
+        for i, k in np.argwhere(ahead.log_factor + weight > top + NEGLIGIBLE):
+            if ahead.proposal.joint:
+                moved = -span * ahead.answer[places, 0]
+                spread = (span * ahead.deviation[places, 0]) ** 2
+            else:
+                answer = ahead.answer[places, i]
+                strength, deviation = ahead.strength[i, k], ahead.deviation[i, k]
+                if ahead.proposal.one_sided:
+                    strength, deviation = truncated(float(strength), float(deviation))
+                moved = -span * answer * strength
+                spread = (span * answer * deviation) ** 2
+            atoms.append(Atom(weight + float(ahead.log_factor[i, k]), names | {hypothesis.public}, mean + moved,
+                              np.sqrt(np.diag(covariance) + spread)))  # fmt: skip
+    return atoms
+
+
+def truncated(mean: float, deviation: float) -> tuple[float, float]:
+    """Return mean and deviation of a normal distribution of which only the positive part holds."""
+    if mean < -5.0 * deviation:
+        size = deviation**2 / max(-mean, 1e-300)
+        return size, size
+    at = mean / deviation
+    ratio = float(np.exp(-0.5 * at * at) / np.sqrt(2.0 * np.pi) / ndtr(at))
+    return mean + deviation * ratio, deviation * float(np.sqrt(max(1.0 - ratio * (at + ratio), 1e-6)))

@@ -1,0 +1,430 @@
+"""Explore models: while one that may be right is not expanded, add, add a pair, drop, swap, free its shapes.
+
+Occam's window (Madigan, Raftery 1994, doi:10.1080/01621459.1994.10476894): models whose posterior is far below that
+of the best are not expanded. To first order additions, pairs and swaps come from one Gram matrix at each model; what
+leads is fitted again, as a forecast ranks and does not judge.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from armid.estimation.constants import NAMED
+from armid.estimation.least_squares import spread_starts
+from armid.inference.checks import is_significant
+from armid.inference.evidence import (
+    Expansion,
+    Forecast,
+    Scale,
+    doubts_of,
+    expansion_of,
+    forecast,
+    log_evidence,
+    scale_of,
+)
+from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, words
+from armid.inference.kinds import drifts, effects, records, unknown
+from armid.inference.library import EffectKey, Library
+from armid.inference.model import Fit, fit_from
+from armid.inference.refit import accurate, finished, start_of, unless_diverged, with_free_shapes
+from armid.inference.refit import freed as freed_shape
+from armid.inference.unknowns import Unknown, constants_of, freed
+from armid.model import Array
+
+# A model is expanded whose posterior is above this share of the best one's.
+WINDOW = float(np.log(100.0))
+# What is more probable than this to first order, beside a model, is fitted.
+REFITTED = float(np.log(0.02))
+# Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
+N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED = 8, 3, 3, 4
+# Best models beside which a signal without a form is fitted.
+N_BESIDE = 2
+# Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
+N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
+# In log units: a fit that is so far behind is given up, and one that is so near is brought to its estimate.
+HOPELESS, NEAR = 60.0, 20.0
+# Models of the best number of effects that are expanded beside the window where more than noise is left.
+BEAM = 3
+
+
+@dataclass(eq=False)
+class Exploration:
+    """Hold every model that was fitted.
+
+    fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. completed: models at
+    their estimates with all unknowns freed. rounds: the log.
+    """
+
+    library: Library
+    known: dict[EffectKey, Hypothesis]
+    faults: list[Hypothesis] = field(default_factory=list)
+    drifts: list[Hypothesis] = field(default_factory=list)
+    constants: list[Unknown] = field(default_factory=list)
+    fits: dict[Hypotheses, Fit] = field(default_factory=dict)
+    forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
+    completed: set[Hypotheses] = field(default_factory=set)
+    rounds: list[dict[str, object]] = field(default_factory=list)
+    _evidence: dict[tuple[int, Scale], float] = field(default_factory=dict)
+    _scale: dict[int, Scale] = field(default_factory=dict)
+
+    @property
+    def declared(self) -> Fit:
+        return self.fits[frozenset()]
+
+    def scale(self) -> Scale:
+        """Return the scale of the model that leaves least: it shows what is noise."""
+        best = min(self.fits.values(), key=lambda f: f.chi2 + f.records.data.log_cover)
+        if id(best) not in self._scale:
+            self._scale[id(best)] = scale_of(best)
+        return self._scale[id(best)]
+
+    def log_posterior(self, model: Hypotheses, scale: Scale | None = None) -> float:
+        """Return the log posterior of a model, up to a constant."""
+        fit, scale = self.fits[model], scale or self.scale()
+        key = (id(fit), scale)
+        if key not in self._evidence:
+            self._evidence[key] = log_evidence(expansion_of(fit, scale, self.library))
+        return self._evidence[key] + sum(h.log_prior for h in model)
+
+    def ranked(self) -> list[tuple[Hypotheses, float]]:
+        """Return the models with their log posteriors, the best first."""
+        scale = self.scale()
+        each = [(model, self.log_posterior(model, scale)) for model in self.fits]
+        return sorted(each, key=lambda pair: -pair[1])
+
+    def take(self, model: Hypotheses, fit: Fit | None) -> bool:
+        """Keep a fit where it is better than the one that is known; tell whether it is."""
+        if fit is None or not np.isfinite(fit.chi2):
+            return False
+        known = self.fits.get(model)
+        if known is not None:
+            scale = self.scale()
+            if self.log_posterior(model, scale) >= log_evidence(expansion_of(fit, scale, self.library)) + sum(
+                h.log_prior for h in model
+            ):
+                return False
+        self.fits[model] = fit
+        return True
+
+
+def explore(library: Library, most: int = MOST_EXPANDED) -> Exploration:
+    """Return the models that the train records ask for, from the declared one on."""
+    found = Exploration(library, effects.hypotheses(library))
+    posed = library.problem(())
+    starts = spread_starts(posed) if posed.space.free.any() else ()
+    declared = accurate(fit_from(posed, (), starts), library)
+    found.constants = constants_of(declared.records, declared.z, library.tolerances)
+    found.fits[frozenset()] = with_constants(declared, found.constants)
+    found.faults = records.hypotheses(declared.records)
+    found.drifts = drifts.hypotheses(declared, library)
+    while len(found.forecasts) < most:
+        model = next_model(found)
+        if model is None and not add_unknown(found):
+            break
+        if model is not None:
+            complete(found, model)
+            expand(found, model)
+            finish(found)
+    finish_all(found)
+    return found
+
+
+def add_unknown(found: Exploration) -> bool:
+    """Fit a signal without a form beside the best models where these leave more than noise; tell whether it was new."""
+    ranked = found.ranked()
+    if not is_significant(found.fits[ranked[0][0]]) or any(h.kind == "unknown" for m in found.fits for h in m):
+        return False
+    library, scale, before = found.library, found.scale(), len(found.fits)
+    best = [m for m, _ in ranked[:N_BESIDE]] + [m for m, _ in ranked if not m]
+    for model in dict.fromkeys(best):
+        fit = found.fits[model]
+        about = expansion_of(fit, scale, library)
+        ahead = sorted((forecast(about, p) for p in unknown.propose(fit, library)), key=lambda f: -f.posterior)
+        for one in ahead[:N_OTHERS]:
+            for key, make in trial_of(found, model, about, one, np.inf):
+                found.take(key, make())
+    return len(found.fits) > before
+
+
+def next_model(found: Exploration) -> Hypotheses | None:
+    """Return the model that is to be expanded next, None where all in the window are.
+
+    Where the best model leaves more than noise, the best ones of each smaller size may lead on as well: a strong second
+    effect can mislead the choice of the first.
+    """
+    ranked = found.ranked()
+    best, top = ranked[0]
+    near = [m for m, value in ranked if value > top - WINDOW and not is_outdone(m, value, ranked)]
+    if is_significant(found.fits[best]) and found.fits[best].records.data.cover is None:
+        plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
+        sizes = range(1, len(best) + 1)
+        near = [m for n in sizes for m in [m for m in plain if len(m) == n][:BEAM]] + near
+    return next((m for m in near if m not in found.forecasts and len(m) < MOST_EFFECTS), None)
+
+
+def is_outdone(model: Hypotheses, value: float, ranked: Sequence[tuple[Hypotheses, float]]) -> bool:
+    """Tell whether a model with fewer of its hypotheses is more probable: then nothing is looked for beside it."""
+    return any(less < model and more > value for less, more in ranked)
+
+
+def with_constants(fit: Fit, constants: Sequence[Unknown]) -> Fit:
+    """Return a fit with all its further unknowns freed again, the constants that have a tolerance among them."""
+    kept = [f.unknown for f in fit.others if not f.unknown.name.startswith(NAMED)]
+    if not (kept or constants):
+        return replace(fit, rough=False)
+    again = unless_diverged(lambda: freed(fit, fit.base or fit.records, [*kept, *constants]))
+    return replace(again or fit, rough=False)
+
+
+def expand(found: Exploration, model: Hypotheses) -> None:
+    """Fit what leads beside a model: additions of every kind, pairs, swaps, drops, free shapes."""
+    fit, library, scale = found.fits[model], found.library, found.scale()
+    library = library.about(fit.records.replays, fit.misfit) if fit.base is None else library
+    library.say(f"expanding {words(model)}")
+    about, held = expansion_of(fit, scale, library), expansion_of(fit, scale, library, with_doubts=False)
+    proposals: list[Proposal] = effects.propose(fit, found.known, library)
+    names = {h.public for h in model}
+    others = [*records.propose(fit, found.faults, library), *drifts.propose(fit, found.drifts)]
+    others = [p for p in others if p.hypothesis.public not in names]
+    ahead = [forecast(about, p) for p in proposals]
+    ahead_held = [forecast(held, p) for p in proposals]
+    beside = [forecast(about, p) for p in others]
+    found.forecasts[model] = [*ahead, *beside]
+    limit = limit_of(found, scale)
+    trials: list[tuple[Hypotheses, Callable[[], Fit | None]]] = []
+    if is_significant(fit):
+        # Far from noise a straight line is a poor guess: the first steps of a fit tell which lead on.
+        begun = library.each(lambda a: effects.first_steps(fit, held, a, library), ahead_held)
+        for i in sorted(range(len(ahead)), key=lambda i: begun[i][0])[:N_ADDED]:
+            trials += trial_of(found, model, held, ahead_held[i], limit, begun[i][1])
+    else:
+        added = [i for i, f in enumerate(ahead) if max(f.posterior, ahead_held[i].posterior) > REFITTED]
+        for i in sorted(added, key=lambda i: -max(ahead[i].posterior, ahead_held[i].posterior))[:N_ADDED]:
+            trials += trial_of(found, model, held, ahead_held[i], limit)
+    trials += [t for f in leading(beside) for t in trial_of(found, model, about, f, limit)]
+    trials += drops(found, model, fit)
+    forms = effects.propose_forms(fit, found.known, library)
+    trials += swaps(found, model, fit, scale, [*proposals, *forms])
+    made = library.each(lambda t: t[1](), trials)
+    for (key, _), again in zip(trials, made, strict=True):
+        found.take(key, again)
+    for key, again in pairs(found, model, about, ahead, limit):
+        found.take(key, again)
+
+
+def limit_of(found: Exploration, scale: Scale) -> float:
+    """Return the sum of squares from which on a model is given up: far below the best one's posterior."""
+    best = max(value for _, value in found.ranked()[:1])
+    return scale.reach(min(best - HOPELESS, -1.0)) if np.isfinite(best) else np.inf
+
+
+def leading(forecasts: Sequence[Forecast]) -> list[Forecast]:
+    """Return those of each kind that lead and that are not improbable."""
+    found = []
+    for kind in ("record", "drift"):
+        mine = [f for f in forecasts if f.proposal.hypothesis.kind == kind and f.posterior > REFITTED]
+        found += sorted(mine, key=lambda f: -f.posterior)[:N_OTHERS]
+    return found
+
+
+def trial_of(
+    found: Exploration, model: Hypotheses, about: Expansion, ahead: Forecast, limit: float, *begun: Array
+) -> list[tuple[Hypotheses, Callable[[], Fit | None]]]:
+    """Return the fit of a model with one hypothesis more, where it is not known."""
+    key = model | {ahead.proposal.hypothesis}
+    if key in found.fits or not np.isfinite(ahead.total):
+        return []
+    return [(key, partial(ahead.proposal.refit, about.fit, about, ahead, limit, *begun))]
+
+
+def drops(found: Exploration, model: Hypotheses, fit: Fit) -> list[tuple[Hypotheses, Callable[[], Fit | None]]]:
+    """Return the fits of a model without one of its effects."""
+    trials = []
+    for hypothesis in model:
+        key = model - {hypothesis}
+        if hypothesis.kind == "effect" and key not in found.fits:
+            trials.append((key, partial(without, fit, hypothesis, found.library)))
+    return trials
+
+
+def without(fit: Fit, hypothesis: Hypothesis, library: Library) -> Fit | None:
+    active = tuple(k for k in fit.active if k.declared != hypothesis.means)
+    return near(fit, active, fit.values, library)
+
+
+def near(fit: Fit, active: tuple[EffectKey, ...], values: dict[str, float], library: Library) -> Fit | None:
+    """Return the model with some effects fitted from near, its other unknowns as a fit has them."""
+    posed = effects.beside(fit, active, library)
+    start = start_of(posed, values)
+    again = unless_diverged(lambda: fit_from(posed, active, [start], rough=True))
+    return None if again is None else replace(again, others=fit.others, base=effects.base_of(fit, active, library))
+
+
+def swaps(
+    found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal]
+) -> list[tuple[Hypotheses, Callable[[], Fit | None]]]:
+    """Return the fits in which what moves the records most alike takes the place of an effect of a model.
+
+    A swap partner that was never fitted would make a posterior that is sure of the wrong one.
+    """
+    trials: dict[Hypotheses, Callable[[], Fit | None]] = {}
+    for key in fit.active:
+        hypothesis = next((h for h in model if h.means == key.declared), None)
+        if hypothesis is None:
+            continue
+        about = Expansion(fit, scale, found.library, doubts_of(fit, found.library), key)
+        others = {k.public for k in fit.active if k != key}
+        each = [likest(about, p) for p in proposals if p.hypothesis.name not in others]
+        each.sort(key=lambda pair: -pair[0])
+        forms = [one for one in each if one[1].hypothesis.name == hypothesis.name]
+        for _, proposal, variant, strength in [*forms, *each[:N_SWAPPED]]:
+            other = model - {hypothesis} | {proposal.hypothesis}
+            if other not in found.fits:
+                trials[other] = partial(swapped, fit, key, proposal, variant, strength, found.library)
+    return list(trials.items())
+
+
+def likest(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, float]:
+    """Return how alike a proposal and the effect that an expansion does without move the records: squared cosine.
+
+    Both beyond what the other unknowns can do. Then the variant that is likest, and its strength in the effect's place.
+    """
+    assert about.without is not None
+    fit, own = about.fit, about.fit.owned_by(about.without)
+    slopes = fit.jacobian[:, own].T
+    nulls = [fit.model.parameters[n].null for n in np.array(list(fit.values))[own]]
+    low, span = fit.records.space.low[fit.records.space.free][own], fit.records.span[own]
+    away = np.array([0.0 if null is None else z - (null - a) / s
+                     for z, null, a, s in zip(fit.z[own], nulls, low, span, strict=True)])  # fmt: skip
+    n, grid = len(slopes), proposal.refit.args[1]  # type: ignore[attr-defined]
+    local = [i for i, a in enumerate(grid) if a.share == effects.SLOPE]
+    if not local:
+        return 0.0, proposal, 0, 0.0
+    gram, _, _ = about.products(np.vstack([slopes, proposal.columns[local]]))
+    inner, cross, squares = gram[:n, :n], gram[:n, n:], np.maximum(np.diag(gram)[n:], 1e-300)
+    regular = inner + 1e-9 * np.trace(inner) * np.eye(n) + 1e-300 * np.eye(n)
+    alike = np.einsum("ij,ij->j", cross, np.linalg.solve(regular, cross)) / squares
+    best = int(np.argmax(alike))
+    return float(alike[best]), proposal, local[best], float(away @ cross[:, best] / squares[best])
+
+
+def swapped(
+    fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library
+) -> Fit | None:
+    """Return the model with one effect in the place of another, its shapes free where those of the other are."""
+    new: EffectKey = proposal.hypothesis.means
+    grid = proposal.refit.args[1]  # type: ignore[attr-defined]
+    active = tuple(k for k in fit.active if k != key)
+    values = {n: v for n, v in fit.values.items() if not key.owns(n)}
+    values |= grid[variant].at(float(np.clip(strength, 0.01, 1.0)))
+    is_free = key.free_shape and bool(library.fixed_shapes(new))
+    each = [near(fit, (*active, k), values, library) for k in (new, replace(new, free_shape=True))[: 1 + is_free]]
+    return min((f for f in each if f is not None), key=lambda f: f.chi2, default=None)
+
+
+def pairs(
+    found: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast], limit: float
+) -> Iterable[tuple[Hypotheses, Fit | None]]:
+    """Yield the fits with two effects more that promise clearly more than the best single one."""
+    lead = sorted((f for f in ahead if np.isfinite(f.total)), key=lambda f: -f.posterior)[:N_LEADING]
+    if len(lead) < 2 or not is_significant(about.fit):
+        return
+    variants = [f.best(1)[0][0] for f in lead]
+    columns = np.array([f.proposal.columns[v] for f, v in zip(lead, variants, strict=True)])
+    gram, slope, _ = about.products(columns)
+    scale = about.scale
+    width = np.array([f.proposal.scales[int(np.argmax(f.log_factor[v]))] for f, v in zip(lead, variants, strict=True)])
+    prior = np.array([f.proposal.hypothesis.log_prior + f.proposal.variants[v] - np.log(len(f.proposal.scales))
+                      for f, v in zip(lead, variants, strict=True)])  # fmt: skip
+    best_single = lead[0].posterior
+    values: list[tuple[float, int, int, float, float]] = []
+    for i in range(len(lead)):
+        for k in range(i + 1, len(lead)):
+            if lead[i].proposal.hypothesis.name == lead[k].proposal.hypothesis.name:
+                continue
+            both = [i, k]
+            normal = gram[np.ix_(both, both)] + np.diag(width[both] ** -2.0)
+            mean = np.linalg.solve(normal, slope[both])
+            if (mean <= 0.0).any():
+                continue
+            rise = float(about.student(np.array(slope[both] @ mean)))
+            _, determinant = np.linalg.slogdet(normal)
+            total = rise - 0.5 * determinant - float(np.log(width[both]).sum()) + float(prior[both].sum())
+            values.append((total, i, k, float(mean[0]), float(mean[1])))
+    _ = scale
+    for total, i, k, first, second in sorted(values, reverse=True)[:N_PAIRS]:
+        one, two = lead[i].proposal, lead[k].proposal
+        key = model | {one.hypothesis, two.hypothesis}
+        if total <= best_single or key in found.fits or len(key) < len(model) + 2:
+            continue
+        values_of = dict(about.fit.values) | one.refit.args[1][variants[i]].at(float(np.clip(first, 0.01, 1.0)))  # type: ignore[attr-defined]
+        values_of |= two.refit.args[1][variants[k]].at(float(np.clip(second, 0.01, 1.0)))  # type: ignore[attr-defined]
+        active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
+        yield key, near(about.fit, active, values_of, found.library)
+
+
+def finish(found: Exploration) -> None:
+    """Bring the leading models of the best size to their estimates."""
+    best = found.ranked()[0][0]
+    leading = [m for m, _ in found.ranked() if len(m) == len(best)][:BEAM]
+    todo = [m for m in leading if found.fits[m].rough and found.fits[m].records.data.cover is None]
+    finished_each = [partial(estimated, found.fits[m], found.library) for m in todo]
+    for model, again in zip(todo, found.library.each(unless_diverged, finished_each), strict=True):
+        found.fits[model] = replace(again if again is not None else found.fits[model], rough=False)
+
+
+def finish_all(found: Exploration) -> None:
+    """Bring all models that may count to their estimates, all unknowns freed."""
+    while True:
+        ranked = found.ranked()
+        todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and m not in found.completed
+                and not is_outdone(m, value, ranked)]  # fmt: skip
+        if not todo:
+            return
+        for model in todo:
+            complete(found, model)
+
+
+def complete(found: Exploration, model: Hypotheses) -> None:
+    """Bring a model to its estimate, with its shapes, its constants and its further unknowns freed."""
+    if model in found.completed:
+        return
+    found.completed.add(model)
+    if model or found.constants:
+        again = unless_diverged(partial(completed, found.fits[model], found.library, found.constants))
+        found.fits[model] = again or replace(found.fits[model], rough=False)
+
+
+def estimated(fit: Fit, library: Library) -> Fit:
+    """Return a fit at its estimate, its further unknowns held."""
+    return settled(fit) if fit.others else finished(fit, library)
+
+
+def completed(fit: Fit, library: Library, constants: Sequence[Unknown]) -> Fit:
+    """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls."""
+    if fit.records.data.cover is not None:
+        return replace(fit, rough=False)
+    done = estimated(fit, library)
+    for key in done.active:
+        if not key.free_shape and library.fixed_shapes(key):
+            wide = unless_diverged(partial(reshaped, done, key, library))
+            if wide is not None and wide.chi2 < done.chi2 * (1.0 - 2.0 / len(done.residual)):
+                done = wide
+    return with_constants(done, constants)
+
+
+def reshaped(fit: Fit, key: EffectKey, library: Library) -> Fit:
+    """Return a fit with the fixed shapes of one of its effects free."""
+    if not fit.others:
+        return finished(with_free_shapes(fit, key, library), library)
+    active = freed_shape(fit.active, key)
+    wide = with_free_shapes(fit, key, library, effects.beside(fit, active, library))
+    return settled(replace(wide, others=fit.others, base=effects.base_of(fit, active, library)))
+
+
+def settled(fit: Fit) -> Fit:
+    """Return a fit at its estimate, its further unknowns held."""
+    again = fit_from(fit.records, fit.active, [fit.z])
+    return replace(again, others=fit.others, base=fit.base)

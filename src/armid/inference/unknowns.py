@@ -1,0 +1,158 @@
+"""Unknowns of a fit beside the parameters of the engine: constants within tolerances, sizes of faults, drifts.
+
+Each has a normal prior with a standard deviation of 1 in its own unit: min |r(z, v)|^2 + |v|^2. About known values v0
+the signals answer to v along columns C, so that the best v of each candidate z is had by a projection (Golub, Pereyra
+1973, doi:10.1137/0710036): min over z of (r + C v0)' (1 + C C')^-1 (r + C v0). The columns are taken anew at each turn.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from armid.errors import ArmidError
+from armid.estimation.constants import Product, moved_replays, products
+from armid.estimation.least_squares import LeastSquaresProblem, descend
+from armid.inference.model import ROUGHLY, Fit
+from armid.inference.whitening import Cover, WhiteRecords
+from armid.model import Array
+
+# Step of the differences, and the farthest step of a turn, in prior standard deviations.
+STEP, FARTHEST = 1e-2, 3.0
+# Turns at most, and the fall of the sum of squares at which they end.
+MOST_TURNS, SETTLED = 8, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Unknown:
+    """Declare an unknown.
+
+    moved: the records as they are with a value of it. lost: samples that a value leaves out. column: of records, a
+    candidate and a value, how much of the residual a unit of it takes away; None: by differences.
+    """
+
+    name: str
+    moved: Callable[[WhiteRecords, float], WhiteRecords]
+    lost: Callable[[float], float] = lambda _: 0.0
+    column: Callable[[WhiteRecords, Array, float], Array] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Freed:
+    """Hold an unknown of a fit: its value in prior deviations, and its change of the whitened signal per deviation."""
+
+    unknown: Unknown
+    value: float
+    column: Array
+
+
+def constant(product: Product) -> Unknown:
+    """Return a constant, or several that act as one, as an unknown whose prior is its tolerance."""
+    return Unknown(product.public, lambda records, value: replace(
+        records, replays=moved_replays(records.replays, {product.names[0]: value * product.tolerance})))  # fmt: skip
+
+
+def constants_of(records: WhiteRecords, z: Array, tolerances: Mapping[str, float]) -> list[Unknown]:
+    """Return the constants that records see at a candidate, those that act as one together."""
+    return [constant(p) for p in products(records, z, tolerances)] if tolerances else []
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedRecords(LeastSquaresProblem):
+    """Pose records whose further unknowns take their best values at each candidate, about known ones."""
+
+    records: WhiteRecords = field(kw_only=True)
+    columns: Array = field(kw_only=True)
+    values_known: Array = field(kw_only=True)
+
+    @cached_property
+    def cover(self) -> Cover:
+        return Cover.of(self.columns)
+
+    @cached_property
+    def measured(self) -> Array:
+        return self.cover.white(self.records.measured + self.columns @ self.values_known)
+
+    def signals(self, Z: Array) -> Array:
+        return self.cover.white(self.records.signals(Z))
+
+
+def moved(records: WhiteRecords, unknowns: Sequence[Unknown], values: Sequence[float] | Array) -> WhiteRecords:
+    """Return records with the values of some unknowns."""
+    for unknown, value in zip(unknowns, values, strict=True):
+        if value != 0.0:
+            records = unknown.moved(records, float(value))
+    return records
+
+
+def freed(
+    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], limit: float = np.inf, rough: bool = False
+) -> Fit:  # fmt: skip
+    """Return a fit with some unknowns freed, from where it stands.
+
+    base: the records of the fit before any of the unknowns was moved. limit: as of `descend`. rough: the columns of the
+    unknowns that the fit holds already stay as they are.
+    Raises ArmidError where it diverges.
+    """
+    known = {f.unknown.name: f.value for f in fit.others}
+    kept = {f.unknown.name: f.column for f in fit.others} if rough else {}
+    values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
+    columns = np.empty((len(fit.residual), 0))
+    tolerance = ROUGHLY if rough else 1e-6
+    cost = cost_of(base, unknowns, values, z)
+    for _ in range(MOST_TURNS):
+        records = moved(base, unknowns, values)
+        columns = columns_about(base, unknowns, values, z, kept)
+        posed = ProjectedRecords((), base.space, records=records, columns=columns, values_known=values)
+        new_z = descend(posed, [z], tolerance, limit=limit) if len(z) else z
+        residual = records.residuals(new_z)[0] + columns @ values
+        best = np.linalg.solve(np.eye(len(unknowns)) + columns.T @ columns, columns.T @ residual)
+        step, best_cost, share = np.clip(best - values, -FARTHEST, FARTHEST), np.inf, 1.0
+        while share > 0.05:  # a step of a late record may be too long
+            best_cost = cost_of(base, unknowns, values + share * step, new_z)
+            if best_cost < cost:
+                break
+            share *= 0.5
+        if not best_cost < cost:
+            break
+        values, z, fall = values + share * step, new_z, cost - best_cost
+        cost = best_cost
+        if fall < (1.0 if rough else SETTLED) * max(cost / len(residual), 1.0):
+            break
+    if not np.isfinite(cost):
+        raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
+    records = moved(base, unknowns, values)
+    others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
+    return replace(fit, records=records, z=z, residual=records.with_all_samples().residuals(z)[0], base=base,
+                   others=others, rough=rough)  # fmt: skip
+
+
+def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array) -> float:
+    """Return the sum of squares, the priors and the samples that are left out counted."""
+    residual = moved(base, unknowns, values).residuals(z)[0]
+    lost = sum(u.lost(float(v)) for u, v in zip(unknowns, values, strict=True))
+    total = float(residual @ residual) + float(values @ values) + lost
+    return total if np.isfinite(total) else np.inf
+
+
+def columns_about(
+    base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, kept: Mapping[str, Array]
+) -> Array:
+    """Return the change of the whitened signal per deviation of each unknown, (n_samples, n_unknowns).
+
+    kept: columns that are known.
+    """
+    here, found = moved(base, unknowns, values).residuals(z)[0], []
+    for i, unknown in enumerate(unknowns):
+        if unknown.name in kept:
+            column = kept[unknown.name]
+        elif unknown.column is not None:
+            rest = moved(base, [u for u in unknowns if u is not unknown], np.delete(values, i))
+            column = unknown.column(rest, z, float(values[i]))
+        else:
+            there = values.copy()
+            there[i] += STEP
+            column = (here - moved(base, unknowns, there).residuals(z)[0]) / STEP
+        found.append(column if np.isfinite(column).all() else np.zeros_like(here))
+    return np.array(found).reshape(len(unknowns), len(here)).T
