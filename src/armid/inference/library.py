@@ -20,6 +20,7 @@ from armid.errors import ArmidError
 from armid.estimation.least_squares import side_by_side
 from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import Array, Effect, Manoeuvre, Model, Parameter
+from armid.model.parameter import powers_of
 from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
 from armid.problem.starts import fits_starts
@@ -121,6 +122,7 @@ class Library:
     tolerances: Mapping[str, float] = field(default_factory=dict)
     misfit: float = 1.0
     priors: Mapping[str, float] = field(default_factory=dict)
+    reach: float = 1.0
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
 
@@ -221,7 +223,18 @@ class Library:
                 space = space.with_fixed(name, idle(parameter))
             elif mine is not None and mine.free_shape and name in self.fixed_shapes(mine):
                 space = space.with_bounds(name, parameter.low, parameter.high)
+            elif self.reach > 1.0 and name in space.free_names and name in self.scaled_strengths:
+                space = space.with_bounds(name, self.reach * parameter.low, self.reach * parameter.high)
         return space
+
+    @cached_property
+    def scaled_strengths(self) -> frozenset[str]:
+        """Names of strengths in units of the machine's scales whose range the user did not give."""
+        effects = [(e.name, e) for e in self.declared.effects]
+        effects += [(key.compiled, effect) for key, effect in self.candidates.items()]
+        names = (f"{name}.{p.name}" for name, effect in effects for p in effect.parameters
+                 if p.null == 0.0 and p.fixed is None and powers_of(p.unit))  # fmt: skip
+        return frozenset(names) - {*self.bounds, *self.fixed, *self.overrides}
 
     def reaching_further(self, active: Active, names: Iterable[str]) -> "Library":
         """Return the library with wider ranges of some strengths of effects, itself where no range may be widened.
@@ -247,6 +260,13 @@ class Library:
         """Return the log prior odds of an effect: what the user knows of it, else the default."""
         given = self.priors.get(effect)
         return default if given is None else float(np.log(given / (1.0 - given)))
+
+    def declared_ranges(self, model: Model, key: EffectKey) -> dict[str, tuple[float, float]]:
+        """Return the declared ranges of those strengths of an effect whose box is wider."""
+        if self.reach == 1.0:
+            return {}
+        names = (n for n in self.scaled_strengths if key.owns(n))
+        return {n: (model.parameters[n].low, model.parameters[n].high) for n in names}
 
     def strength_of(self, name: str, parameter: Parameter) -> float:
         """Return the declared size of a strength: from its off value to the farther end of its range."""
@@ -469,15 +489,18 @@ class Activation:
         return {n: self.null[n] + share * (v - self.null[n]) if n in self.null else v for n, v in self.full.items()}
 
 
-def activation_grid(records: WhiteRecords, key: EffectKey) -> tuple[list[Activation], int]:
+def activation_grid(
+    records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]] | None = None
+) -> tuple[list[Activation], int]:
     """Return the grid over strengths and shapes of one effect, and the number of its shapes.
 
     Strengths are the free parameters with a null value: each alone, and all together where there are several.
+    ranges: of parameters whose box is wider than what is tried.
     """
     space, declared = records.space, records.model.parameters
     mine = [n for n in space.free_names if key.owns(n)]
     null = {n: float(v) for n in mine if (v := declared[n].null) is not None}
-    bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine}
+    bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine} | dict(ranges or {})
     shapes = [n for n in mine if n not in null]
     along = [points_within(*bound[n], count) for n, count in zip(shapes, shape_counts(len(shapes)), strict=True)]
     points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*along)]

@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from armid.engine import along
 from armid.estimation.constants import NAMED
 from armid.estimation.least_squares import spread_starts
 from armid.inference.checks import is_significant
@@ -38,7 +39,7 @@ WINDOW = float(np.log(100.0))
 # What is more probable than this to first order, beside a model, is fitted.
 REFITTED = float(np.log(0.02))
 # Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
-N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED = 8, 3, 3, 4
+N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED = 8, 3, 3, 3
 # Best models beside which a signal without a form is fitted.
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
@@ -111,10 +112,10 @@ class Exploration:
 
 def explore(library: Library, most: int = MOST_EXPANDED) -> Exploration:
     """Return the models that the train records ask for, from the declared one on."""
+    declared = declared_fit(library)
+    library = rescaled(library, declared)
+    declared = declared if library.declared.plant is declared.model.plant else declared_fit(library)
     found = Exploration(library, effects.hypotheses(library))
-    posed = library.problem(())
-    starts = spread_starts(posed) if posed.space.free.any() else ()
-    declared = accurate(fit_from(posed, (), starts), library)
     found.constants = constants_of(declared.records, declared.z, library.tolerances)
     found.fits[frozenset()] = with_constants(declared, found.constants)
     found.faults = records.hypotheses(declared.records)
@@ -129,6 +130,34 @@ def explore(library: Library, most: int = MOST_EXPANDED) -> Exploration:
             finish(found)
     finish_all(found)
     return found
+
+
+def declared_fit(library: Library) -> Fit:
+    posed = library.problem(())
+    starts = spread_starts(posed) if posed.space.free.any() else ()
+    return accurate(fit_from(posed, (), starts), library)
+
+
+def rescaled(library: Library, declared: Fit) -> Library:
+    """Return the library with the effort scale of the declared fit, where the plant takes its scales from records.
+
+    The drive's column is no effort where it is in volts or a duty and the gain is a free parameter.
+    """
+    plant, model = library.declared.plant, declared.model
+    if not plant.scales_from_records or "drive_effort" not in plant.quantities:
+        return library
+    largest = 0.0
+    for replay in declared.records.replays:
+        for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
+            effort = along(model, piece.manoeuvre, declared.candidate, calibration.schedule, ["drive_effort"])
+            largest = max(largest, float(np.nanmax(np.abs(effort["drive_effort"]), initial=0.0)))
+    if not np.isfinite(largest) or largest <= 0.0:
+        return library
+    scaled = replace(plant, scales=replace(plant.scales, effort=largest))
+    own = {n: (p.low, p.high) for n, p in library.declared.parameters.items()
+           if p.fixed is None and n not in library.overrides and "." not in n}  # fmt: skip
+    return replace(library, declared=replace(library.declared, plant=scaled), bounds={**own, **library.bounds},
+                   _models={}, _problems={})  # fmt: skip
 
 
 def add_unknown(found: Exploration) -> bool:
@@ -318,7 +347,7 @@ def swapped(
     grid = proposal.refit.args[1]  # type: ignore[attr-defined]
     active = tuple(k for k in fit.active if k != key)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
-    values |= grid[variant].at(float(np.clip(strength, 0.01, 1.0)))
+    values |= grid[variant].at(float(np.clip(strength, 0.01, library.reach)))
     is_free = key.free_shape and bool(library.fixed_shapes(new))
     each = [near(fit, (*active, k), values, library) for k in (new, replace(new, free_shape=True))[: 1 + is_free]]
     return min((f for f in each if f is not None), key=lambda f: f.chi2, default=None)
@@ -359,8 +388,10 @@ def pairs(
         key = model | {one.hypothesis, two.hypothesis}
         if total <= best_single or key in found.fits or len(key) < len(model) + 2:
             continue
-        values_of = dict(about.fit.values) | one.refit.args[1][variants[i]].at(float(np.clip(first, 0.01, 1.0)))  # type: ignore[attr-defined]
-        values_of |= two.refit.args[1][variants[k]].at(float(np.clip(second, 0.01, 1.0)))  # type: ignore[attr-defined]
+        values_of = dict(about.fit.values) | one.refit.args[1][variants[i]].at(
+            float(np.clip(first, 0.01, found.library.reach))
+        )  # type: ignore[attr-defined]
+        values_of |= two.refit.args[1][variants[k]].at(float(np.clip(second, 0.01, found.library.reach)))  # type: ignore[attr-defined]
         active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
         yield key, near(about.fit, active, values_of, found.library)
 

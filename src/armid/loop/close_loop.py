@@ -13,6 +13,7 @@ from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import Estimates, with_fitted_starts
 from armid.estimation.screen import given_twice, screen
+from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.library import (
     CONSTANT,
@@ -199,7 +200,7 @@ def close_loop(
     # Other suspicions rest on the declared model: they are told where nothing better was found.
     at_a_loss = not {UNEXPLAINED, CARRIES_NOT}.isdisjoint(verdicts)
     told_first = dict.fromkeys(s.sentence for s in screened if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
-    said = (*told_first, *next_steps_of(found, suspects))
+    said = (*told_first, *missed_sentences(after.missed), *next_steps_of(found, suspects))
     return ClosedLoop(there, verdicts[0], verdicts[1:], before, after, steps, withdrawn, found.refused,
                       found.rivals, advice, said, together, tuple(suspects), every, library, search, found.missing,
                       found.term)  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from armid.estimation.constants import NAMED
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
+from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import SIGNIFICANCE, Finding, Residuals, time_in_words
 from armid.inference.library import SHOWN_AS
 from armid.inference.missing_signal import Missing
@@ -431,6 +432,9 @@ def carried_sentence(found: ClosedLoop) -> str:
     missed = f"{unseen.data.records[worst].file} is missed by {factors[worst]:.3g} times its noise"
     if not np.isfinite(factors[worst]):
         missed = f"{unseen.data.records[worst].file} makes the simulation diverge"
+    if found.withdrawn is None and judged.diagnosis.significant:
+        named = f"With {' + '.join(found.effects)} the declared model" if found.effects else "The declared model"
+        return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}"
     if found.withdrawn is None:
         return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from armid.estimation.constants import columns_of
 from armid.estimation.identify import JointErrors, errors_by_file, errors_entry, record_errors
 from armid.estimation.information import Information, information_of
 from armid.estimation.least_squares import held_by_bound
+from armid.inference.carry_over import Missed, missed_records
 from armid.inference.checks import Diagnosis, Residuals
 from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
@@ -106,12 +108,19 @@ class Judgement:
     def significant(self) -> bool:
         return self.diagnosis.significant or (self.holdout is not None and self.holdout.diagnosis.significant)
 
+    @cached_property
+    def missed(self) -> list[Missed]:
+        """The held-out records whose error is far larger than that of the train records."""
+        return missed_records(self.fit, self.train, self.holdout)
+
     @property
     def fails_to_carry_over(self) -> bool:
-        """Whether train is noise and held-out records are not, by more than the doubt of the prediction."""
+        """Whether held-out records are missed by more than noise where train is noise, or far more than train."""
         unseen = self.holdout
-        if unseen is None or self.diagnosis.significant or not unseen.diagnosis.significant:
+        if unseen is None or not unseen.diagnosis.significant:
             return False
+        if self.diagnosis.significant:
+            return bool(self.missed)
         # what differences tell of the noise is the least that it can be
         seen = self.train_error.outputs
         least = {n: max(rms, seen[n].rmse if n in seen else 0.0) for n, rms in unseen.noise_of.items()}

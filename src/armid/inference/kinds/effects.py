@@ -58,7 +58,7 @@ def proposals(
 
 def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library) -> Proposal | None:
     records = beside(fit, (*fit.active, key), library)
-    every, _ = activation_grid(records, key)
+    every, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
     grid = [replace(a, share=share) for a in every if a.share == every[0].share for share in SHARES]
     moved = responses(records, fit, grid)
     good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
@@ -99,7 +99,7 @@ def refit(
     """
     posed = beside(fit, (*fit.active, key), library)
     if begun is None:
-        starts = np.array(starts_of(fit, about, ahead, posed, grid))
+        starts = np.array(starts_of(fit, about, ahead, posed, grid, library))
         best = starts[np.argsort(posed.chi2(starts), kind="stable")[:2]]
     else:
         best = begun[np.newaxis]
@@ -116,7 +116,7 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
     """Return where the first steps of a fit from the best start lead: the sum of squares, and the candidate."""
     key, grid = ahead.proposal.refit.args[:2]  # type: ignore[attr-defined]
     posed = beside(fit, (*fit.active, key), library)
-    starts = np.array(starts_of(fit, about, ahead, posed, grid))
+    starts = np.array(starts_of(fit, about, ahead, posed, grid, library))
     chi2 = posed.chi2(starts)
     best = starts[int(np.argmin(chi2))]
     if not np.isfinite(chi2.min()):
@@ -126,12 +126,12 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
 
 
 def starts_of(
-    fit: Fit, about: Expansion, ahead: Forecast, posed: WhiteRecords, grid: list[Activation]
+    fit: Fit, about: Expansion, ahead: Forecast, posed: WhiteRecords, grid: list[Activation], library: Library
 ) -> list[Array]:  # fmt: skip
     """Return extended candidates at expected and tried strengths, with the linear answer of the parameters."""
     starts = []
     for variant, strength in ahead.best(N_STARTS):
-        for share in dict.fromkeys((float(np.clip(strength, 0.01, 1.0)), grid[variant].share)):
+        for share in dict.fromkeys((float(np.clip(strength, 0.01, library.reach)), grid[variant].share)):
             z = np.clip(fit.z - share * ahead.answer[: fit.n_free, variant], 0.01, 0.99)
             values = dict(zip(fit.values, fit.records.values(z), strict=True)) | grid[variant].at(share)
             starts.append(np.clip(posed.shares(free_values(posed, values)), 1e-3, 1.0 - 1e-3))
