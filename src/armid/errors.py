@@ -57,6 +57,8 @@ BRIEF.maxlist = 12
 def quoted(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list) and len(value) > BRIEF.maxlist:
+        return f"a list of {len(value):,}"
     try:
         return BRIEF.repr(value)
     except ValueError:
