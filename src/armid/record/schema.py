@@ -195,8 +195,8 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
     dots = [line.count(b".") for line in content.split(b"\n")]
     if sum(n * n for n in dots) > MOST_SQUARED_DOTS:
         most = max(dots)
-        raise ArmidError(f"{where}, line {dots.index(most) + 1}: {most:,} dots on one line, as of keys that are nested "
-                         "too deeply: shorter lines are expected")  # fmt: skip
+        raise ArmidError(f"{where}, line {dots.index(most) + 1}: {most:,} dots on one line are too many for a "
+                         "parser of TOML, shorter lines are expected")  # fmt: skip
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
