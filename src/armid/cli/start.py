@@ -1,10 +1,22 @@
-"""How a command is asked to end."""
+"""How a command begins, and how it is asked to end."""
 
+import os
 import signal
+import sys
 import threading
 from typing import Any
 
 INTERRUPTED = 130
+
+
+def open_closed_streams() -> None:
+    """Let what is written to a stream that was closed before the start go nowhere.
+
+    Otherwise the next file that is opened takes the number of the stream, and what is written to the stream.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - it stays open to the end
 
 
 def end_on_request() -> None:

@@ -241,7 +241,7 @@ def translate_errors(path: Path) -> Iterator[None]:
 
 def connected(database: str | Path, **options: Any) -> sqlite3.Connection:
     """Return a connection whose queries end by a signal, however long they are: `translate_errors` raises it again."""
-    connection = sqlite3.connect(database, isolation_level=None, **options)
+    connection: sqlite3.Connection = sqlite3.connect(database, isolation_level=None, **options)
     # Python looks for signals when it calls this
     connection.set_progress_handler(lambda: 0, PROGRESS_STEPS)
     return connection
