@@ -109,6 +109,22 @@ def test_a_request_to_end_in_the_first_moments_is_one():
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "armid: interrupted\n")
 
 
+# `python -m` takes an interrupt within the text of an `exec`, as of each dataclass, for its own end.
+WITHIN = """
+import armid.cli.main, os, signal, sys
+
+armid.cli.main.main = lambda: exec("os.kill(os.getpid(), signal.SIGINT)")
+from armid.__main__ import run
+run()
+"""
+
+
+def test_an_interrupt_within_generated_code_is_one(tmp_path):
+    (tmp_path / "within.py").write_text(WITHIN)
+    ran = subprocess.run([sys.executable, "-m", "within"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "armid: interrupted\n")
+
+
 LATE = """
 import os, signal, sys
 
