@@ -23,6 +23,8 @@ REFUSED = [
     ("budget = 40", "budget = true", "key 'budget' is true, a whole number"),
     ("seeds = 2", "seeds = []", "key 'seeds' is []"),
     ("seeds = 2", "seeds = 100000", "1,600,000 runs are asked for"),
+    ("[[cases]]\nname = \"row 1", "[random_cases]\nn = 100001\nseed = 1\nmanoeuvres = [{}]\n[[cases]]\nname = \"row 1",
+     "key 'n' is 100001, a whole number above 0, up to 100,000"),
     ("seeds = 2", "seeds = [1, -1]", "key 'seeds.1' is -1"),
     ("[0.0, 0.3]", "[-0.1]", "key 'noise_deg_s.0' is -0.1, a number of at least 0 in deg/s"),
     ("[bounds]\n", "[bounds]\nk = [1.1, 0.6]\n",
