@@ -20,7 +20,7 @@ def announced(sentence: str) -> Iterator[None]:
         if not ended.wait(SLOW_S):
             LOG.info(sentence)
             while not ended.wait(AGAIN_S):
-                LOG.info("%s, for %.0f s", sentence, monotonic() - began)
+                LOG.info("%s (%.0f s)", sentence, monotonic() - began)
 
     Thread(target=announce, daemon=True).start()
     try:

@@ -159,7 +159,7 @@ def test_long_work_is_announced_again_and_again(caplog, monkeypatch):
     with announced("reading 3 records"):
         while len(caplog.messages) < 3:
             Event().wait(0.01)
-    assert caplog.messages[:2] == ["reading 3 records", "reading 3 records, for 0 s"]
+    assert caplog.messages[:2] == ["reading 3 records", "reading 3 records (0 s)"]
     monkeypatch.setattr("armid.progress.SLOW_S", 60.0)
     caplog.clear()
     with announced("quick"):

@@ -159,6 +159,17 @@ def test_a_store_that_computes_is_refused(store, tmp_path, sql):
             use(tmp_path)
 
 
+def test_what_a_table_asks_of_its_rows_is_not_computed(store, tmp_path):
+    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection, connection:
+        connection.execute("PRAGMA ignore_check_constraints = ON")
+        connection.execute("CREATE TABLE slow (a CHECK (abs(-9223372036854775807 - a)))")
+        connection.execute("INSERT INTO slow VALUES (1)")
+        connection.execute("PRAGMA ignore_check_constraints = OFF")
+        with pytest.raises(sqlite3.OperationalError, match="overflow"):
+            connection.execute("PRAGMA quick_check")
+    assert load_study(tmp_path).study["name"] == "made"
+
+
 def test_a_signal_ends_a_query(tmp_path):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
