@@ -20,8 +20,11 @@ APPLICATION, FORMAT = 0x61726D64, 1
 WAIT_S = 60.0
 # Steps of SQLite between two looks for a signal, a few milliseconds.
 PROGRESS_STEPS = 100_000
-# What SQLite writes into the schema of a table and of an index.
-PLAIN = "sql LIKE 'CREATE TABLE %' OR sql LIKE 'CREATE INDEX %'"
+# What computes when a store is read or written: views, triggers, virtual tables, indices, and generated columns.
+COMPUTING = """
+SELECT name FROM sqlite_schema WHERE sql NOT LIKE 'CREATE TABLE %'
+UNION ALL SELECT s.name FROM sqlite_schema s, pragma_table_xinfo(s.name) c WHERE c.hidden > 0 LIMIT 1
+"""
 # What the description of a study holds in every version of this format.
 WORDS = ("name", "cases")
 
@@ -286,10 +289,9 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
             raise
         raise ArmidError(f"{path} is no store of a study: another file has its name") from error
     if found == [APPLICATION, FORMAT]:
-        # a view, a trigger or a virtual table computes whatever who wrote it wants
-        row = connection.execute(f"SELECT name FROM sqlite_schema WHERE NOT ({PLAIN}) LIMIT 1").fetchone()
+        row = connection.execute(COMPUTING).fetchone()
         if row is not None:
-            raise ArmidError(f"{path} is damaged: {quoted(row[0])} in it is no table, tables alone are expected")
+            raise ArmidError(f"{path} is damaged: {quoted(row[0])} in it computes, plain tables are expected")
         return
     if may_be_new and is_empty:
         return
