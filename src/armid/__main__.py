@@ -36,7 +36,7 @@ def run() -> None:
 
 
 def keep_code(code: list[object]) -> None:
-    """End with 130 after an interrupt: one that came within `exec` makes Python end by SIGINT whatever it is told."""
+    """End with 130 after an interrupt: one that came within `exec` makes Python end by SIGINT, whatever the code."""
     if code == [INTERRUPTED]:
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError):
