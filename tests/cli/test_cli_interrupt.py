@@ -113,7 +113,15 @@ def test_a_request_to_end_in_the_first_moments_is_one():
 WITHIN = """
 import armid.cli.main, os, signal, sys
 
-armid.cli.main.main = lambda: exec("os.kill(os.getpid(), signal.SIGINT)")
+class CutOff:
+    def __init__(self):
+        exec("os.kill(os.getpid(), signal.SIGINT)")
+        self.file = None
+
+    def __del__(self):
+        self.file.close()
+
+armid.cli.main.main = CutOff
 from armid.__main__ import run
 run()
 """
