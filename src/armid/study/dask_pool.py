@@ -55,10 +55,9 @@ class DaskPool:
             self._submit(tuple(runs[first : first + size]), 0)
 
     def wait(self, seconds: float) -> list[Outcome]:
-        with self._reached():
+        with self._reached(), suppress(Empty):
             if self._client.status != "running":
                 raise ConnectionError
-        with suppress(Empty):
             outcomes = self._finished(self._ended.get(timeout=seconds))
             self._size.update(outcomes)
             return outcomes
