@@ -101,7 +101,7 @@ def _connected(address: str) -> tuple[Any, Any]:
     except ImportError as error:
         raise ArmidError("--dask needs the package distributed: pip install 'armid[cluster]'") from error
     # a lost connection ends in one sentence; each task of the library would log a traceback first
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
         client.wait_for_workers(1, timeout=CONNECT_S)
