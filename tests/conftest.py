@@ -57,7 +57,7 @@ def root() -> Path:
 def no_word_of_compiling() -> Iterator[None]:
     """What compiling takes hangs on the cache and the machine: commands in this process do not announce it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("armid.engine.compile.SLOW_S", 1e6)
+        patch.setattr("armid.progress.SLOW_S", 1e6)
         yield
 
 

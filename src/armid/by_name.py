@@ -22,6 +22,7 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import Effect, Manoeuvre, Model, Plant, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
+from armid.progress import announced
 from armid.record import Campaign, read_campaign
 from armid.registry import Registry, load_registry, name_of
 
@@ -115,7 +116,8 @@ def are_numbers(values: Iterable[Any], n: int | None = None) -> bool:
 def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
     """Return a campaign that is read from its folder, or made of tables as if they were its files."""
     if isinstance(given, str | Path):
-        return read_campaign(given, registry.plants, registry.effects)
+        with announced(f"reading campaign {given}"):
+            return read_campaign(given, registry.plants, registry.effects)
     several = given.values() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
     tables: list[Any] = list(several)
     if not tables or not all(hasattr(each, "to_csv") for each in tables):

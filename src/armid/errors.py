@@ -22,9 +22,18 @@ class MachineError(ArmidError):
     """Say that the machine is at fault and not what it was given: disk, memory, a cache that cannot be kept."""
 
 
+def printable(text: str) -> str:
+    r"""Return text on one line that neither steers a terminal nor turns its direction: each such character is escaped.
+
+    >>> printable("a\nb")
+    'a\\nb'
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 def on_a_line(sentence: str) -> str:
-    """Return a sentence of at most 300 letters; line ends and control characters, which names hold, are escapes."""
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in sentence)
+    """Return a sentence of at most 300 letters on one line, see `printable`."""
+    line = printable(sentence)
     return line if len(line) <= LONGEST else f"{line[: LONGEST - END - 5]} ... {line[-END:]}"
 
 
@@ -57,6 +66,8 @@ BRIEF.maxlist = 12
 def quoted(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list) and len(value) > BRIEF.maxlist:
+        return f"a list of {len(value):,}"
     try:
         return BRIEF.repr(value)
     except ValueError:

@@ -1,20 +1,36 @@
 """`armid report` and `armid export ioh` on a small study that was really run."""
 
 import hashlib
+import json
+import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from shutil import copytree
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
+from armid.cli.options import put
+from armid.cli.study import words
 from armid.report import files as write
+from armid.report.style import pyplot
 from armid.study.results import load_study
+from armid.study.runner import Ending
+from armid.study.store import Counts
 from commands import ended
 
 
 @pytest.fixture(scope="module")
 def store(table_study, tmp_path_factory):
     return copytree(table_study, tmp_path_factory.mktemp("reported") / "tiny") / "out"
+
+
+def not_drawn(figure, *paths):
+    pyplot().close(figure)
+    for path in paths:
+        path.write_text("<svg/>")
 
 
 def digest(path: Path) -> str:
@@ -55,13 +71,51 @@ def test_its_numbers_are_those_of_the_store(reported):
 def test_the_main_table_and_the_state_are_printed_and_a_users_analysis_is_a_section(store, run, tmp_path, monkeypatch):
     (tmp_path / "study.sqlite").write_bytes((store / "study.sqlite").read_bytes())
     (tmp_path / "mine.py").write_text("def best(runs):\n    return runs.groupby('identifier')[['value']].min()\n")
-    monkeypatch.setattr(write, "save", lambda figure, *paths: [p.write_text("<svg/>") for p in paths])
-    printed = run("report", tmp_path, "--plugin", f"{tmp_path / 'mine.py'}:best").out
+    monkeypatch.setattr(write, "save", not_drawn)
+    monkeypatch.chdir(tmp_path)
+    printed = run("report", tmp_path, "--plugin", "mine.py:best").out
     for wanted in ("the paper's pso", "random", "noise-free", "Complete: 4 of 4 runs.", "wrote report.md and "):
         assert wanted in printed
     best = pd.read_csv(tmp_path / "own_best.csv").set_index("identifier")["value"]
     assert best.to_dict() == load_study(store).runs.groupby("identifier")["value"].min().to_dict()
     assert "mine.py:best" in (tmp_path / "report.md").read_text()
+
+
+STEERING = "x\nComplete: 4 of 4 runs\x1b[2J\x1b]0;owned\x07\u202egnp.exe"
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_what_a_store_holds_cannot_steer_the_terminal(store, run, tmp_path, monkeypatch):
+    """Nor add a line to what is printed: in sentences, tables, and the error of a run that failed."""
+    shutil.copy(store / "study.sqlite", tmp_path)
+    with closing(sqlite3.connect(tmp_path / "study.sqlite")) as copy, copy:
+        copy.execute("UPDATE runs SET status = 'failed', error = ? WHERE run IN (SELECT run FROM plan LIMIT 1)",
+                     (STEERING,))  # fmt: skip
+        copy.execute("UPDATE plan SET identifier = ? WHERE place > 2", (STEERING,))
+    monkeypatch.setattr(write, "save", not_drawn)
+    counts = Counts(4, 3, 1)
+    said = words(Ending(SimpleNamespace(name="s"), tmp_path, counts, 0, 0, 1.0, False, STEERING, ()))
+    put(*said)
+    printed = run("report", tmp_path).out
+    assert r"x\nComplete: 4 of 4 runs\x1b[2J" in printed
+    assert all(c.isprintable() or c == "\n" for c in printed)
+    assert not any(line.startswith("Complete: 4 of 4 runs\\x1b") for line in printed.splitlines())
+    text = repr(load_study(tmp_path))
+    assert all(c.isprintable() or c == "\n" for c in text)
+
+
+def test_a_plug_in_of_the_study_may_be_named_as_before(store, run, refused, tmp_path, monkeypatch):
+    """With the words of `armid study`, whose store holds the whole path."""
+    (tmp_path / "mine.py").write_text("def best(measured, simulated):\n    return simulated[:, 0]\n")
+    shutil.copy(store / "study.sqlite", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert "is no analysis" in refused("report", ".", "--plugin", "mine.py:best")
+    with closing(sqlite3.connect("study.sqlite")) as copy, copy:
+        (text,) = copy.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
+        changed = json.loads(text) | {"plugins": [f"{tmp_path / 'mine.py'}:best"]}
+        copy.execute("UPDATE study SET value = ? WHERE key = 'description'", (json.dumps(changed),))
+    monkeypatch.setattr(write, "save", not_drawn)
+    assert run("report", ".", "--plugin", "mine.py:best").code == 0
 
 
 def test_a_report_that_fails_leaves_nothing(store, tmp_path, monkeypatch):

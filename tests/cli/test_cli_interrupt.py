@@ -109,6 +109,49 @@ def test_a_request_to_end_in_the_first_moments_is_one():
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "armid: interrupted\n")
 
 
+# `python -m` takes an interrupt within the text of an `exec`, as of each dataclass, for its own end.
+WITHIN = """
+import armid.cli.main, os, signal, sys
+
+class CutOff:
+    def __init__(self):
+        exec("os.kill(os.getpid(), signal.SIGINT)")
+        self.file = None
+
+    def __del__(self):
+        self.file.close()
+
+armid.cli.main.main = CutOff
+from armid.__main__ import run
+run()
+"""
+
+
+def test_an_interrupt_within_generated_code_is_one(tmp_path):
+    (tmp_path / "within.py").write_text(WITHIN)
+    ran = subprocess.run([sys.executable, "-m", "within"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "armid: interrupted\n")
+
+
+LATE = """
+import os, signal, sys
+
+sys.argv[1:] = ["list", "plants", "--quiet"]
+from armid.__main__ import run
+try:
+    run()
+finally:
+    os.kill(os.getpid(), signal.SIG{})
+"""
+
+
+@pytest.mark.parametrize("word", ["INT", "TERM"])
+def test_a_signal_after_the_work_changes_no_exit_code(word):
+    ran = subprocess.run([sys.executable, "-c", LATE.format(word)], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert "driven_axis" in ran.stdout
+
+
 @pytest.mark.usefixtures("keyboard")
 @pytest.mark.parametrize("presses", [1, 2])
 def test_an_interrupted_search_returns_its_best(lowering, arm, arm_space, presses):

@@ -3,12 +3,13 @@
 import json
 import logging
 from shutil import copytree
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 
 from armid.cli.main import show_warning, tell_more
 from armid.cli.options import command
+from armid.progress import announced
 from armid.report import files, html, style
 from armid.report.document import Column, Struck, Table, table
 from armid.report.terminal import print_table
@@ -149,6 +150,21 @@ def test_the_doctor_tells_what_is_wrong(run, monkeypatch, tmp_path):
     ran = run("doctor")
     assert ran.code == 1
     assert "FAIL cache: " in ran.out
+
+
+def test_long_work_is_announced_again_and_again(caplog, monkeypatch):
+    monkeypatch.setattr("armid.progress.SLOW_S", 0.01)
+    monkeypatch.setattr("armid.progress.AGAIN_S", 0.01)
+    caplog.set_level(logging.INFO, "armid")
+    with announced("reading 3 records"):
+        while len(caplog.messages) < 3:
+            Event().wait(0.01)
+    assert caplog.messages[:2] == ["reading 3 records", "reading 3 records (0 s)"]
+    monkeypatch.setattr("armid.progress.SLOW_S", 60.0)
+    caplog.clear()
+    with announced("quick"):
+        pass
+    assert "quick" not in caplog.text
 
 
 def test_options_of_every_identifier_have_a_meaning(run):

@@ -15,7 +15,7 @@ import pytest
 from numba.core import codegen
 
 from armid.engine import cache_folder, compile_model, simulate
-from armid.engine.cache import keep, unusable, write_whole
+from armid.engine.cache import keep, read_whole, unusable, write_whole
 from armid.engine.compile import load_module, module_name
 from armid.engine.generate import kernel_parts
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
@@ -47,7 +47,7 @@ def result(process: subprocess.Popen[str]) -> dict[str, float]:
 
 
 def listing(folder: Path) -> dict[str, tuple[int, int]]:
-    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*")}
+    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*") if p.is_file()}
 
 
 @pytest.mark.slow
@@ -60,8 +60,8 @@ def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     assert any(f["misses"] == 1 for f in first)
     assert (again["hits"], again["misses"]) == (1, 0)
     assert listing(folder) == kept
-    assert len(list(folder.glob("*.py.bin"))) == 1
-    assert not list(folder.glob("*.part"))
+    assert len(list(folder.rglob("*.py.bin"))) == 1
+    assert not list(folder.rglob("*.part"))
     assert {f["last"] for f in first} == {again["last"]}
 
 
@@ -99,7 +99,7 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypa
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path / "a file" / "cache"))
     parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
     monkeypatch.delitem(sys.modules, module_name(parts), raising=False)
-    with pytest.warns(UserWarning, match=r"compiled code is not kept: .*cache cannot be used \(Not a directory\)"):
+    with pytest.warns(UserWarning, match=r"compiled code is not kept: .*cannot be used \(Not a directory\)"):
         assert load_module(parts).simulate
 
 
@@ -115,7 +115,7 @@ def test_ctrl_c_that_numba_loses_ends_all_the_same(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(codegen.CodeLibrary, "_compiled_object", property(lambda _: None, lambda *_: None), False)
     with pytest.raises(KeyboardInterrupt):
         keep(numba.njit(lambda x: x + 1.0), "a name")(1.0)
-    assert not list(tmp_path.iterdir())
+    assert not list(cache_folder().iterdir())
 
 
 def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,9 +124,9 @@ def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.M
     name = module_name(parts)
     monkeypatch.delitem(sys.modules, name, raising=False)
     load_module(parts)
-    file = tmp_path / f"{name}.py.bin"
+    file = cache_folder() / f"{name}.py.bin"
     whole = file.read_bytes()
-    other = tmp_path / "armid_code_other.bin"
+    other = file.with_name("armid_code_other.bin")
     write_whole(other, b"simulate = None")
     for content in (*damaged(whole), other.read_bytes()):
         monkeypatch.delitem(sys.modules, name, raising=False)
@@ -147,29 +147,53 @@ def test_damaged_code_is_compiled_again(tmp_path: Path) -> None:
         assert (then["hits"], then["last"]) == (1, first["last"]), kind
 
 
-def test_a_cache_that_others_may_write_is_closed_or_not_used(
+def test_code_that_another_user_may_have_written_is_not_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:  # fmt: skip
-    ours, mixed = tmp_path / "ours", tmp_path / "mixed"
-    for folder, file in ((ours, "armid_code_x.bin"), (mixed, "letters.txt")):
-        folder.mkdir()
-        folder.chmod(0o777)
-        (folder / file).write_text("")
-    assert unusable(ours) == ""
-    assert ours.stat().st_mode & 0o777 == 0o700
-    assert "it holds more than compiled code" in unusable(mixed)
-    assert mixed.stat().st_mode & 0o777 == 0o777
-    assert unusable(tmp_path / "new") == ""
-    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
+    """Whatever the type of the entry, and whenever it was put there; the own code takes its place."""
+    path, elsewhere = tmp_path / "armid_code_x.bin", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    write_whole(elsewhere / path.name, b"code")
+
+    def link() -> None:
+        path.symlink_to(elsewhere / path.name)
+
+    def open_to_others() -> None:
+        os.link(elsewhere / path.name, path)
+        path.chmod(0o620)
+
+    for plant in (link, lambda: os.mkfifo(path), path.mkdir, open_to_others):
+        plant()
+        assert read_whole(path) is None
+        if path.is_dir():
+            path.rmdir()
+        write_whole(path, b"own")
+        assert read_whole(path) == b"own"
+        path.unlink()
+    write_whole(path, b"code")
     uid = os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: uid + 1)
-    (tmp_path / "theirs").mkdir()
-    assert unusable(tmp_path / "theirs") == "it is somebody else's"
+    assert read_whole(path) is None
+    assert path.exists()
+
+
+def test_the_folder_of_the_cache_is_one_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What ARMID_CACHE names may be /var/tmp: its permissions and its other files stay as they are."""
+    (tmp_path / "letters.txt").write_text("")
+    tmp_path.chmod(0o1777)
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
+    folder = cache_folder()
+    assert unusable(folder) == ""
+    assert [path.stat().st_mode & 0o7777 for path in (tmp_path, folder)] == [0o1777, 0o700]
+    assert sorted(tmp_path.iterdir()) == [folder, tmp_path / "letters.txt"]
+    uid = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: uid + 1)
+    assert unusable(tmp_path) == "it is somebody else's"
 
 
 def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
-    assert cache_folder() == tmp_path
+    assert cache_folder() == tmp_path / f"armid-{os.getuid()}"
     monkeypatch.delenv("ARMID_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     assert cache_folder() == tmp_path / "xdg" / "armid"

@@ -129,7 +129,17 @@ NAMES = (
     "[x](javascript:alert(1))", "swarm [/x]", "swarm [bold]", "![i](http://x/y.png)", "<b>b</b>", "<http://x.y>", "a|b",
     "*stars*", "**b**", "_under_", "~~out~~", "a\\*b*", "$\\frac$", "$x$", "$5 and $6", "&amp;", "\\[x\\](y)", "[x][y]",
     "[x]: javascript:1", "%s {0}", "# head", "* * *", "swarm\\", "nelder_mead+pso_2",
+    "=1+1", "+1 of it", "-x", "@sum",
 )  # fmt: skip
+
+
+def test_no_cell_of_a_file_is_a_formula():
+    """Names that begin like one are text, in the header too; numbers stay numbers."""
+    rows = [("=cmd|' /C calc'!A0", "-0.5", -0.5), ("\t=1", "plain", 2), (None, "@x", float("nan"))]
+    lines = csv(table("x", ["=1+1", "b", "c"], rows)).splitlines()
+    assert lines == ["'=1+1,b,c", "'=cmd|' /C calc'!A0,-0.5,-0.5", "'\t=1,plain,2.0", ",'@x,"]
+
+
 MARKUP = {"html_inline", "html_block", "link_open", "image", "em_open", "strong_open", "s_open", "code_inline"}
 
 
@@ -149,7 +159,8 @@ def test_a_name_is_shown_as_it_is_by_every_renderer(name, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     assert f"{name} b" in printed(document, capsys)
     own = document.tables[0]
-    assert list(read_csv(StringIO(csv(own)))["who"]) == [f"{name} {w}" for w in "bcad"]
+    mark = "'" if name[0] in "=+-@" else ""
+    assert list(read_csv(StringIO(csv(own)))["who"]) == [f"{mark}{name} {w}" for w in "bcad"]
     text = latex(own)
     assert re.sub(r"\\\\|\\[{}&%$#_]", "", text).count("&") == 2 * 5
     figure, (axis,) = panels(1, 1, 3.0, 3.0)
@@ -307,7 +318,9 @@ def test_nothing_that_runs_or_is_fetched_comes_through():
 def test_what_is_no_svg_and_a_bomb_of_entities_are_refused():
     levels = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))
     bomb = f'<!DOCTYPE svg [<!ENTITY l0 "lol">{levels}]><svg><text>&l11;</text></svg>'
-    for text, said in (("", "is no SVG"), ("<svg", "is no SVG"), ("<html/>", "holds <html>"), (bomb, "is no SVG")):
+    nested = f"<svg>{'<g>' * 20_000}{'</g>' * 20_000}</svg>"
+    for text, said in (("", "is no SVG"), ("<svg", "is no SVG"), ("<html/>", "holds <html>"), (bomb, "is no SVG"),
+                       (nested, "is no SVG")):  # fmt: skip
         with pytest.raises(ArmidError, match=f"a.svg {said}"):
             inline(text, "", "", "a.svg")
 

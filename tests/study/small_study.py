@@ -5,7 +5,9 @@ import re
 from armid.study.results import StudyResults
 
 # What a runner says beside its output before it opens anything, and where nothing was compiled before.
-COST = re.compile(r"(?:small: [\d,]+ runs, .+; what is finished already is kept\n|armid: compiling .+\n)+")
+COST = re.compile(
+    r"(?:small: [\d,]+ runs, .+; what is finished already is kept\n|armid: (?:compiling|planning|reading) .+\n)+"
+)
 STUDY = """\
 name = "small"
 question = "Does it run?"

@@ -91,3 +91,24 @@ def test_a_cluster_that_is_not_there(write_study, tmp_path, monkeypatch):
     monkeypatch.setattr("armid.study.dask_pool.CONNECT_S", 0.5)
     with pytest.raises(ArmidError, match=r"the Dask cluster at tcp://127\.0\.0\.1:1 does not answer"):
         run_study(write_study(), dask="tcp://127.0.0.1:1", out=tmp_path / "out")
+
+
+class Gone:
+    """A client whose scheduler has been killed."""
+
+    status = "running"
+
+    def nthreads(self):
+        raise OSError("in <TCP (closed) ConnectionPool.ncores>: ConnectionResetError")
+
+    def cancel(self, futures):
+        raise OSError("closed")
+
+    def close(self):
+        pass
+
+
+def test_a_cluster_that_goes_while_runs_are_made(write_study, tmp_path, monkeypatch):
+    monkeypatch.setattr("armid.study.dask_pool._connected", lambda address: (Gone(), ()))
+    with pytest.raises(ArmidError, match="the Dask cluster at tcp://x:1 has gone: start again to go on"):
+        run_study(write_study(), dask="tcp://x:1", out=tmp_path / "out")

@@ -32,9 +32,19 @@ def replays_of(study, **wanted):
 def test_every_combination_is_there_once_seed_by_seed(write_study):
     planned = list(read_study(write_study(3)).plan())
     assert len({p.run for p in planned}) == len(planned) == 3 * RUNS_A_SEED
+    study = read_study(write_study(3))
+    assert study.n_runs == len(planned)
+    assert study.cost() == f"{len(planned)} runs, {sum(p.budget for p in planned):,} simulations at most in all"
     assert [p.seed for p in planned] == sorted(p.seed for p in planned)
     words = {(p.case, p.identifier, p.fitness, p.noise_deg_s, p.seed) for p in planned}
     assert len(words) == len(planned)
+
+
+def test_without_a_folder_results_go_where_git_ignores_them(write_study, start, tmp_path):
+    process = start(write_study(1), "--only", "row 1/random", "--jobs", "1")
+    assert process.wait() == 0, process.communicate()
+    assert [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.sqlite")] == ["out/small/study.sqlite"]
+    assert "out/" in (STUDIES.parent / ".gitignore").read_text().splitlines()
 
 
 def test_noise_is_paired(write_study):

@@ -31,7 +31,7 @@ from armid.cli.options import (
     value_of,
 )
 from armid.cli.report import show_and_save
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, nearest, printable
 from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_unwritable
 
 
@@ -279,4 +279,4 @@ def status_line() -> Iterator[Callable[[str], None]]:
     columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("identifying the declared model (compiling at first)", total=None)
-        yield lambda sentence: bar.update(task, description=sentence)
+        yield lambda sentence: bar.update(task, description=printable(sentence))

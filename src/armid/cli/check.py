@@ -128,5 +128,5 @@ def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
     sys.path.insert(0, str(studies))
     load_registry(plugins)
     rows = import_module("bench.run").run_bench(quick=quick)
-    say(import_module("bench.measure").bench_table(rows))
+    say(*import_module("bench.measure").bench_table(rows).splitlines())
     give(rows=[vars(row) for row in rows])

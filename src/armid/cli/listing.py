@@ -1,13 +1,12 @@
 """`armid list`: what there is to choose from."""
 
-import sys
 import textwrap
 from collections.abc import Sequence
 from typing import Any
 
 import click
 
-from armid.cli.options import command, examples, give, plugin_option, say, wants, while_read
+from armid.cli.options import command, examples, give, plugin_option, put, say, wants
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Effect, Parameter, Plant, refusal_of
 from armid.model.effects.sensor import sensor_effects
@@ -43,14 +42,13 @@ def list_command(what: str, is_long: bool, plugins: tuple[str, ...]) -> None:
     texts = {"effects": effect_texts, "plants": plant_texts, "fitness": fitness_texts, "identifiers": identifier_texts,
              "analyses": analysis_texts}  # fmt: skip
     if wants("quiet"):
-        with while_read(sys.stdout):
-            print(*getattr(registry, what), sep="\n", flush=True)
+        put(*getattr(registry, what))
     elif wants("json"):
         give(**{what: {name: entry(thing) for name, thing in getattr(registry, what).items()}})
     elif is_long and what == "identifiers":
-        say("\n\n".join(map(long_text, registry.identifiers.values())), "", COMPOSED)
+        say(*"\n\n".join(map(long_text, registry.identifiers.values())).splitlines(), "", COMPOSED)
     else:
-        say("\n\n".join(texts[what](registry)))
+        say(*"\n\n".join(texts[what](registry)).splitlines())
 
 
 def entry(thing: Any) -> dict[str, Any]:

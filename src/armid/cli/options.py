@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, nearest, printable
 
 if TYPE_CHECKING:
     from armid.report.document import Document
@@ -98,8 +98,13 @@ def while_read(stream: TextIO) -> Iterator[None]:
 def say(*lines: str) -> None:
     """Print lines as soon as they are said, unless --json or --quiet was given."""
     if speaks():
-        with while_read(sys.stdout):
-            print(*lines, sep="\n", flush=True)
+        put(*lines)
+
+
+def put(*lines: str) -> None:
+    """Print lines; what names from files and plug-ins hold neither ends a line nor steers the terminal."""
+    with while_read(sys.stdout):
+        print(*map(printable, lines), sep="\n", flush=True)
 
 
 def present(document: "Document") -> None:
@@ -121,7 +126,7 @@ def give(**found: Any) -> None:
 def tell(text: str) -> None:
     """Print a line beside the output, whose first line is the answer."""
     with while_read(sys.stderr):
-        print(text, file=sys.stderr, flush=True)
+        print(printable(text), file=sys.stderr, flush=True)
 
 
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))

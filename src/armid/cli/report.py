@@ -80,12 +80,13 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
 def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
     from armid.study.document import report_of, write_report
     from armid.study.results import load_study
+    from armid.study.runner import absolute
 
     results = load_study(folder)
     named = [word for plugin in plugins for word in ("--plugin", plugin)]
     again = shlex.join(["armid", "report", f"out/{results.study['name']}", *named])
     analyses, place = load_registry(plugins).analyses, results.path.parent
-    for plugin in plugins:
+    for plugin in absolute(plugins):
         if plugin not in results.study["plugins"] and load_plugin(plugin)[0] != "analyses":
             raise ArmidError(f"plug-in '{plugin}' is no analysis: a function with the argument `runs` is expected")
     refuse_unwritable(place, PAGE)

@@ -30,7 +30,7 @@ dask_option = click.option(
 @click.argument("study", type=click.Path(path_type=Path))
 @jobs_option
 @dask_option
-@out_option("Folder of the results. [default: results/NAME]")
+@out_option("Folder of the results. [default: out/NAME]")
 @click.option(
     "--time-limit", type=float, metavar="S", show_default="600",
     help="A run that takes longer is stopped and counts as failed, s.",
@@ -102,7 +102,7 @@ def words(ending: "Ending") -> list[str]:
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of proposals and searches.")
 @jobs_option
 @dask_option
-@out_option("Folder of the tuned study. [default: results/NAME_tuned]")
+@out_option("Folder of the tuned study. [default: out/NAME_tuned]")
 @plugin_option
 def tune_command(
     study: Path, configurations: int, seed: int, jobs: int | None, dask: str | None, out: Path | None,
@@ -117,7 +117,7 @@ def tune_command(
     """
     from armid.errors import ArmidError
     from armid.report.result import NewFiles
-    from armid.study.runner import RESULTS, absolute, progress_bar
+    from armid.study.runner import OUT, absolute, progress_bar
     from armid.study.tasks import Study, read_study
     from armid.study.tune import training, tune, tuned_document, tuned_study
 
@@ -130,7 +130,7 @@ def tune_command(
             whole = replace(first, entries=first.entries * configurations)
             tell(f"{known.name}: {len(first.entries)} identifiers, {configurations} configurations of each on "
                  f"{len(first.cases)} instances: {whole.cost()}; what is finished already is kept")  # fmt: skip
-        folder = RESULTS / f"{known.name}_tuned" if out is None else out
+        folder = OUT / f"{known.name}_tuned" if out is None else out
         found, ending = tune(first, study, folder / "training", configurations, jobs, dask, show_progress)
     answer: list[str] = []
     if found:

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import pickle
+import stat
 import sys
 import tempfile
 import warnings
@@ -20,9 +21,10 @@ from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, sys.version)
-# What stands in a folder of ours, also that of an earlier version: names begin so.
-OURS = ("armid_", "__pycache__", "tmp")
 DIGEST = hashlib.sha256().digest_size
+# A link is not followed, and a pipe without a writer is not waited for; what a system lacks is left out.
+SAFELY = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def kept(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -98,9 +100,12 @@ def stamp_of(of: str) -> str:
 
 
 def read_whole(path: Path) -> bytes | None:
-    """Return what was written into a file, None where it is not there or was damaged, which removes it."""
+    """Return what this user wrote into a file, None where it is not there, foreign or damaged, which removes it."""
     try:
-        content = path.read_bytes()
+        with open(os.open(path, SAFELY), "rb") as file:
+            if not is_private(os.fstat(file.fileno())):
+                return None
+            content = file.read()
     except OSError:
         return None
     if seal(path, content[DIGEST:]) == content[:DIGEST]:
@@ -108,6 +113,12 @@ def read_whole(path: Path) -> bytes | None:
     with suppress(OSError):
         path.unlink()
     return None
+
+
+def is_private(entry: os.stat_result) -> bool:
+    """Tell whether an open file is a plain one that nobody but this user can have written: its code is run."""
+    is_own = not hasattr(os, "getuid") or (entry.st_uid == os.getuid() and not entry.st_mode & OTHERS_MAY_WRITE)
+    return stat.S_ISREG(entry.st_mode) and is_own
 
 
 def seal(path: Path, content: bytes) -> bytes:
@@ -126,10 +137,13 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def cache_folder() -> Path:
-    """Return the folder of compiled code (ARMID_CACHE, else the user's cache folder), whether it can be used or not."""
+    """Return the folder of compiled code, whether it can be used or not.
+
+    It is one of this user inside the folder that ARMID_CACHE names, which may hold other things; else the user's cache.
+    """
     given = os.environ.get("ARMID_CACHE")
     if given:
-        return Path(given)
+        return Path(given) / (f"armid-{os.getuid()}" if hasattr(os, "getuid") else "armid")
     base = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
     try:
         return (Path(base) if base else Path.home() / ".cache") / "armid"
@@ -156,24 +170,14 @@ def tell(sentence: str) -> None:
 def unusable(folder: Path) -> str:
     """Return why a folder cannot keep compiled code, "" where it can.
 
-    Who writes there runs code in our name: one of our own that others may write is closed to them, and what they have
-    put there goes; one of somebody else is not used.
+    Its permissions stay as they are: `is_private` judges each file, and others cannot write a file that it accepts.
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if hasattr(os, "getuid"):
-            found = folder.stat()
-            if found.st_uid != os.getuid():
-                return "it is somebody else's"
-            if found.st_mode & 0o022:
-                entries = list(folder.iterdir())
-                if not all(entry.name.startswith(OURS) for entry in entries):
-                    return "others may write there, and it holds more than compiled code"
-                folder.chmod(0o700)
-                for entry in entries:
-                    if entry.is_file() and entry.lstat().st_uid != os.getuid():
-                        entry.unlink()
-        with tempfile.TemporaryFile(dir=folder):
-            return ""
+        # the second of a link is the folder that it leads to
+        if hasattr(os, "getuid") and {folder.lstat().st_uid, folder.stat().st_uid} != {os.getuid()}:
+            return "it is somebody else's"
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            return "" if is_private(os.fstat(probe.fileno())) else "others may write into its files"
     except OSError as error:
         return error.strerror or str(error)

@@ -3,13 +3,12 @@
 import gc
 import hashlib
 import linecache
-import logging
 import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import RLock, Timer
+from threading import RLock
 from types import ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -21,6 +20,7 @@ from armid.engine.cache import VERSIONS, keep, kept_in, read_whole, write_whole
 from armid.engine.generate import KernelParts, kernel_parts
 from armid.errors import ArmidError
 from armid.model import Model
+from armid.progress import announced
 
 UNCOMPILABLE = (NumbaError, UnsupportedBytecodeError)
 # One register of AVX-512, two of AVX2. Measured on the arm: 16 lanes are slower, because their values no longer fit.
@@ -31,8 +31,7 @@ MADE_FROM = [generate.TEMPLATE, *(Path(str(module.__file__)) for module in (gene
 KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
 # Threads that ask for the same model at once share one kernel, which numba then compiles once.
 LOCK = RLock()
-LOG = logging.getLogger("armid")
-SLOW_S, MOST_NAMED = 2.0, 3
+MOST_NAMED = 3
 
 
 def compile_model(model: Model) -> tuple[Kernel, int]:
@@ -46,7 +45,7 @@ def compile_model(model: Model) -> tuple[Kernel, int]:
 
 @contextmanager
 def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
-    """Stand around the first call of a kernel, which compiles it: tell so where that takes more than 2 s.
+    """Stand around the first call of a kernel, which compiles it, and announce that.
 
     Python's garbage collector is kept still meanwhile: the compiler makes millions of objects that live to its end.
     """
@@ -56,15 +55,12 @@ def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
     name = " + ".join([model.plant.name, *(e.name for e in model.effects[:MOST_NAMED])])
     more = f" and {len(model.effects) - MOST_NAMED} effects more" if len(model.effects) > MOST_NAMED else ""
     kept = "; it is kept for the next time" if kept_in() else ""
-    timer = Timer(SLOW_S, LOG.info, (f"compiling {name}{more}{kept}",))
-    timer.daemon = True
-    timer.start()
     collecting = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with announced(f"compiling {name}{more}{kept}"):
+            yield
     finally:
-        timer.cancel()
         if collecting:
             gc.enable()
 

@@ -41,7 +41,10 @@ def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
     if len(parts) > 1:
         return chain_of([identifier_of(part, known) for part in parts])
     if name.startswith(PREFIX):
-        return multistart_of(identifier_of(name.removeprefix(PREFIX), known))
+        local = name.removeprefix(PREFIX)
+        if local.startswith(PREFIX):
+            raise ArmidError(f"identifier '{local}' is global, {PREFIX} expects a local one")
+        return multistart_of(identifier_of(local, known))
     raise ArmidError(f"identifier '{name}' is not known: {nearest(name, known)}")
 
 

@@ -90,14 +90,20 @@ def key(kind: Kind, expected: str) -> dict[str, Any]:
     return {"kind": kind, "expected": expected}
 
 
-LARGEST_TOML = 10_000_000
+# Bytes of a file: tables that are nested 8 deep take 350 times as much memory.
+LARGEST_TOML = 2_000_000
+# The parser takes memory with the square of the parts of a dotted key, which stands on one line: so large is the sum of
+# the squared numbers of dots over all lines at most. A list of 3,000 names of files on one line stays below it.
+MOST_SQUARED_DOTS = 10_000_000
+# Records are held in memory, one by one.
+MOST_RECORDS = 10_000
 HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'")
 CONSTANTS = key(table_of(number), "a finite number in SI")
 TOLERANCES = key(table_of(share), "a share from 0 to below 1")
 INPUTS = key(table_of(text), "the name of a column")
 BOUND = key(number, "a finite number in SI")
 WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds")
-RECORDS = key(list_of(any_table, 1), "at least one table headed [[records]]")
+RECORDS = key(list_of(any_table, 1, MOST_RECORDS), f"1 to {MOST_RECORDS:,} tables headed [[records]]")
 PARAMETERS = key(table_of(any_table), "a table of low, high, fixed")
 
 
@@ -186,6 +192,11 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
         content = path.read_bytes()
     except OSError as error:
         raise ArmidError(f"{where} cannot be read: {error.strerror or error}") from error
+    dots = [line.count(b".") for line in content.split(b"\n")]
+    if sum(n * n for n in dots) > MOST_SQUARED_DOTS:
+        most = max(dots)
+        raise ArmidError(f"{where}, line {dots.index(most) + 1}: {most:,} dots on one line are too many for a "
+                         "parser of TOML, shorter lines are expected")  # fmt: skip
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:

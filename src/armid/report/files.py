@@ -2,13 +2,16 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from armid.report.document import Document, Table
 from armid.report.style import save
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+# What a cell begins with that a spreadsheet computes.
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
@@ -29,7 +32,28 @@ def csv(table: Table) -> str:
     frame = table.frame
     if not isinstance(frame, DataFrame):
         frame = DataFrame([list(row) for row in frame], columns=[c.key for c in table.columns])
-    return str(frame.to_csv(index=False, lineterminator="\n"))
+    return csv_text(frame)
+
+
+def csv_text(frame: "DataFrame") -> str:
+    """Return a frame as CSV in which a spreadsheet finds no formula: names that look like one get an apostrophe."""
+    from pandas.api.types import is_numeric_dtype
+
+    safe = frame.rename(columns=no_formula)
+    for i, kind in enumerate(frame.dtypes):
+        if not is_numeric_dtype(kind):
+            safe.isetitem(i, frame.iloc[:, i].map(no_formula).array)
+    return str(safe.to_csv(index=False, lineterminator="\n"))
+
+
+def no_formula(value: Any) -> Any:
+    if not isinstance(value, str) or not value.startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value
 
 
 def frame_of(table: Table) -> "DataFrame":

@@ -82,18 +82,17 @@ def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Marku
     """
     try:
         root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+        if local(root.tag) != "svg":
+            raise ArmidError(f"{where} holds <{local(root.tag)}>, an SVG is expected")
+        made = cleaned(root, prefix, referenced(root))
+        made.attrib.pop("height", None)
+        width = re.fullmatch(r"([\d.]+)pt", made.get("width", ""))
+        made.attrib |= {"width": "100%", "role": "img", "aria-label": label}
+        if width:
+            made.attrib["width"] = f"{float(width.group(1)) / POINTS_PER_PIXEL:.0f}"
+        return Markup(ElementTree.tostring(made, encoding="unicode"))
+    except (ElementTree.ParseError, RecursionError) as error:
         raise ArmidError(f"{where} is no SVG, it was damaged: a file that armid wrote is expected") from error
-    if local(root.tag) != "svg":
-        raise ArmidError(f"{where} holds <{local(root.tag)}>, an SVG is expected")
-    used = referenced(root)
-    made = cleaned(root, prefix, used)
-    made.attrib.pop("height", None)
-    width = re.fullmatch(r"([\d.]+)pt", made.get("width", ""))
-    made.attrib |= {"width": "100%", "role": "img", "aria-label": label}
-    if width:
-        made.attrib["width"] = f"{float(width.group(1)) / POINTS_PER_PIXEL:.0f}"
-    return Markup(ElementTree.tostring(made, encoding="unicode"))
 
 
 def local(name: str) -> str:

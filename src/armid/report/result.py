@@ -14,7 +14,7 @@ from shutil import disk_usage, rmtree
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from armid.errors import ArmidError
+from armid.errors import ArmidError, printable
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -92,7 +92,7 @@ class Shown:
         return frame_of(self.document().main_tables[0])
 
     def __repr__(self) -> str:
-        text = "\n".join(self.document().said)
+        text = "\n".join(map(printable, self.document().said))
         return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]} ..."
 
     def _repr_html_(self) -> str:

@@ -7,6 +7,7 @@ from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from armid.errors import printable
 from armid.report.document import Cell, Column, Document, Sentences, Table, Text
 
 if TYPE_CHECKING:
@@ -52,19 +53,20 @@ def show(document: Document) -> None:
 
 def print_table(table: Table, console: "Console") -> None:
     """Print the columns of a table that fit, the first ones first, and name the others below."""
-    rows, columns = table.cells(), list(table.columns)
+    rows = [[replace(c, text=type(c.text)(printable(c.text))) for c in row] for row in table.cells()]
+    columns = [replace(c, header=printable(c.header)) for c in table.columns]
     if not console.is_terminal:
         # nothing can be struck through in a pipe
         rows = [[replace(c, text=f"~{c.text}~") if c.is_struck else c for c in row] for row in rows]
     skip = int(table.grouped and len(columns) > 1)
     widths = fitted(columns[skip:], [row[skip:] for row in rows], console.width)
-    names = [printable(c.header or c.key) for c in columns[skip + len(widths) :] if c.header or table.name]
+    names = [c.header or printable(c.key) for c in columns[skip + len(widths) :] if c.header or table.name]
     kept = columns[skip : skip + len(widths)]
     say = partial(console.print, markup=False, emoji=False, highlight=False, soft_wrap=True)
     say(printable(table.title), style="italic")
     for i, (group, own) in enumerate(groupby(rows, lambda row: row[0].text if skip else "")):
         if skip and group:
-            say(f"{printable(columns[0].header)}: {printable(group)}", style="bold")
+            say(f"{columns[0].header}: {group}", style="bold")
         console.print(drawn(kept, [row[skip:] for row in own], widths, not i))
     if names:
         place = f"in {table.name}.csv" if table.name else "on the page, and on a wider terminal"
@@ -101,7 +103,7 @@ def folded_to(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: i
 
 def words(header: str) -> str:
     """Return a heading with each of its words on a line of its own, so that it is no wider than its numbers."""
-    return printable(header).replace(" ", "\n")
+    return header.replace(" ", "\n")
 
 
 def drawn(
@@ -112,15 +114,10 @@ def drawn(
 
     made = RichTable(show_header=headed)
     for column, width in zip(columns, widths, strict=False):
-        header = printable(column.header)
         # as Text: a name is no markup
-        shown = RichText(header if len(header) <= width else words(column.header))
+        shown = RichText(column.header if len(column.header) <= width else words(column.header))
         made.add_column(shown, width=width, overflow="fold", justify="right" if column.digits else "left")
     for row in rows:
-        made.add_row(*(RichText(printable(cell.text), style="strike" if cell.is_struck else "")
+        made.add_row(*(RichText(cell.text, style="strike" if cell.is_struck else "")
                        for cell, _ in zip(row, widths, strict=False)))  # fmt: skip
     return made
-
-
-def printable(text: str) -> str:
-    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)

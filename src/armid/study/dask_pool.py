@@ -1,8 +1,9 @@
 """A Dask cluster that performs runs in place of own worker processes."""
 
+import logging
 import threading
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -44,7 +45,8 @@ class DaskPool:
         return sum(len(runs) for runs, _ in self._batches.values())
 
     def wanted(self) -> int:
-        batches = AHEAD * max(1, sum(self._client.nthreads().values()))
+        with self._reached():
+            batches = AHEAD * max(1, sum(self._client.nthreads().values()))
         return int(max(0, batches - len(self._batches)) * self._size.n_runs)
 
     def give(self, runs: Sequence[ClaimedRun]) -> None:
@@ -53,17 +55,26 @@ class DaskPool:
             self._submit(tuple(runs[first : first + size]), 0)
 
     def wait(self, seconds: float) -> list[Outcome]:
-        if self._client.status != "running":
-            raise ArmidError(f"the Dask cluster at {self.address} has gone: start again to go on")
-        with suppress(Empty):
+        with self._reached(), suppress(Empty):
+            if self._client.status != "running":
+                raise ConnectionError
             outcomes = self._finished(self._ended.get(timeout=seconds))
             self._size.update(outcomes)
             return outcomes
         return []
 
     def close(self) -> None:
-        self._client.cancel(list(self._batches))
+        # a scheduler that has gone has nothing to cancel
+        with suppress(OSError):
+            self._client.cancel(list(self._batches))
         self._client.close()
+
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise ArmidError(f"the Dask cluster at {self.address} has gone: start again to go on") from error
 
     def _submit(self, runs: tuple[ClaimedRun, ...], losses: int) -> None:
         future = self._client.submit(perform_batch, runs, self.setup, pure=False)
@@ -89,6 +100,8 @@ def _connected(address: str) -> tuple[Any, Any]:
         distributed: Any = import_module("distributed")
     except ImportError as error:
         raise ArmidError("--dask needs the package distributed: pip install 'armid[cluster]'") from error
+    # a lost connection ends in one sentence; each task of the library would log a traceback first
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
         client.wait_for_workers(1, timeout=CONNECT_S)

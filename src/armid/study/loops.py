@@ -57,6 +57,10 @@ class LoopStudy:
         candidates = tuple(n for n in spec.candidates or registry.effects if n not in spec.without)
         return cls(spec, text, folder, _campaigns(spec, folder, where), candidates, registry)
 
+    @property
+    def n_runs(self) -> int:
+        return len(self.cases)
+
     def check(self, _: object) -> None:
         """Nothing is to be checked: a campaign that cannot be read fails alone."""
 

@@ -22,6 +22,7 @@ from armid.study.store import (
     WAIT_S,
     check_content,
     check_format,
+    connected,
     corruption_guard,
     description_of,
     translate_errors,
@@ -113,7 +114,7 @@ class StudyResults(Shown):
     def loops(self) -> pd.DataFrame:
         """One row a campaign that was closed: run, case, verdict, seconds, cpu_seconds, report (a dict)."""
         with _reading(self.path) as connection:
-            found = pd.read_sql_query(LOOPS, connection)
+            found = frame_of(connection, LOOPS)
         with corruption_guard(self.path, "the report of a campaign"):
             return found.assign(report=[json.loads(text) for text in found["report"]])
 
@@ -195,15 +196,22 @@ def load_study(path: str | Path) -> StudyResults:
             return StudyResults(file, study, _runs(connection), _parameters(connection, study))
 
 
+def frame_of(connection: sqlite3.Connection, query: str) -> pd.DataFrame:
+    """Return the rows of a query; errors are those of SQLite, which pandas would wrap."""
+    cursor = connection.execute(query)
+    names = [column[0] for column in cursor.description]
+    return pd.DataFrame.from_records(cursor.fetchall(), columns=names, coerce_float=True)
+
+
 def _runs(connection: sqlite3.Connection) -> pd.DataFrame:
-    runs = pd.read_sql_query(RUNS, connection)
+    runs = frame_of(connection, RUNS)
     runs[list(NUMBERS)] = runs[list(NUMBERS)].astype(np.float64)
     runs[list(COUNTED)] = runs[list(COUNTED)].fillna(0).astype(np.int64)
     return runs.fillna({"stopped": ""})
 
 
 def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:
-    found = pd.read_sql_query(PARAMETERS, connection)
+    found = frame_of(connection, PARAMETERS)
     truths = {(case["name"], name): v for case in study["cases"] for name, v in case["truth"].items()}
     keys = zip(found.pop("case"), found["parameter"], strict=True)
     truth = np.array([truths.get(key, np.nan) for key in keys], dtype=np.float64)
@@ -233,7 +241,7 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
     """
     with translate_errors(path), ExitStack() as stack:
         uri = f"{path.resolve().as_uri()}?mode=ro"
-        connection = stack.enter_context(closing(sqlite3.connect(uri, uri=True, timeout=WAIT_S, isolation_level=None)))
+        connection = stack.enter_context(closing(connected(uri, uri=True, timeout=WAIT_S)))
         try:
             check_format(connection, path)
         except sqlite3.OperationalError as error:
@@ -242,7 +250,6 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
             beside = stack.enter_context(TemporaryDirectory(prefix="armid-"))
             for file in path.parent.glob(f"{path.name}*"):
                 shutil.copy(file, beside)
-            copied = sqlite3.connect(Path(beside) / path.name, isolation_level=None)
-            connection = stack.enter_context(closing(copied))
+            connection = stack.enter_context(closing(connected(Path(beside) / path.name)))
             check_format(connection, path)
         yield connection

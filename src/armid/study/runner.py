@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from armid.errors import ArmidError, nearest
 from armid.estimation.identify import ctrl_c_waits
+from armid.progress import announced
 from armid.report.result import refuse_unwritable
 from armid.study.outcome import Outcome
 from armid.study.pool import LocalPool, WorkerSetup, performed_apart
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 
 
 TIME_LIMIT_S = 600.0
-RESULTS = Path("results")
+# Where results go without another word: what git ignores.
+OUT = Path("out")
 # How long to listen for finished runs before Ctrl-C is looked for [s].
 LISTEN_S = 0.25
 Progress = Callable[[Counts, Outcome | None], None]
@@ -67,7 +69,7 @@ def run_study(
     dask
         Address of a scheduler, in place of worker processes.
     out
-        Folder of the store; None: results/NAME.
+        Folder of the store; None: out/NAME.
     plugins
         `FILE.py:attribute` of your own things, whose code is run.
     time_limit
@@ -124,7 +126,7 @@ def run(
         raise ArmidError(f"the time limit is {time_limit:g}, a number of seconds above 0 is expected")
     setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
     study.check(partial(performed_apart, setup))
-    folder, named = RESULTS / study.name if out is None else Path(out), Path(file)
+    folder, named = OUT / study.name if out is None else Path(out), Path(file)
     # a whole path says something on this machine alone
     told = named.name if named.is_absolute() else named.as_posix()
     description = study.description(folder) | {"file": told}
@@ -132,28 +134,30 @@ def run(
     is_new = not (folder / FILE_NAME).exists()
     if is_new:
         refuse_unwritable(folder, FILE_NAME)
-    with Store(folder, chosen) as store, ctrl_c_waits() as interrupted:
-        store.plan(description, study.plan())
+    with Store(folder, chosen) as store:
+        with announced(f"planning {study.n_runs:,} runs"):
+            store.plan(description, study.plan())
         if retry:
             store.forget_failed()
-        counts = store.counts()
-        progress(counts, None)
-        finished = simulations = 0
-        if counts.missing and not is_new:
-            # a study that is complete needs no room
-            refuse_unwritable(folder, FILE_NAME)
-        if counts.missing:
-            pool = _pool(jobs, dask, setup, counts.missing)
-            try:
-                for outcome in _performed(store, pool, interrupted):
-                    finished, simulations = finished + 1, simulations + outcome.used
-                    progress(counts, outcome)
-            finally:
-                pool.close()
-        return Ending(
-            study, folder, store.counts(), finished, simulations, time.monotonic() - began, interrupted(),
-            store.first_error(), tuple(store.others()),
-        )  # fmt: skip
+        with ctrl_c_waits() as interrupted:
+            counts = store.counts()
+            progress(counts, None)
+            finished = simulations = 0
+            if counts.missing and not is_new:
+                # a study that is complete needs no room
+                refuse_unwritable(folder, FILE_NAME)
+            if counts.missing:
+                pool = _pool(jobs, dask, setup, counts.missing)
+                try:
+                    for outcome in _performed(store, pool, interrupted):
+                        finished, simulations = finished + 1, simulations + outcome.used
+                        progress(counts, outcome)
+                finally:
+                    pool.close()
+            return Ending(
+                study, folder, store.counts(), finished, simulations, time.monotonic() - began, interrupted(),
+                store.first_error(), tuple(store.others()),
+            )  # fmt: skip
 
 
 def _performed(store: Store, pool: "LocalPool | DaskPool", interrupted: Callable[[], bool]) -> Iterable[Outcome]:

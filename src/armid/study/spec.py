@@ -39,8 +39,8 @@ MODELS = ("plants", "effects")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 # Neither key nor number of a study may be larger: what it asks for has to fit into memory and a lifetime.
 LARGEST_COUNT = 10**9
-# Seeds and cases are held in memory, one by one.
-MOST_HELD = 10**6
+# Seeds and cases are held in memory, one by one, a case with its model.
+MOST_SEEDS, MOST_CASES = 10**6, 10**5
 
 
 # Kinds of values, see `armid.record.schema`: each returns a value as it is wanted, or raises KindError.
@@ -56,15 +56,13 @@ def whole_number(value: object, least: int = 0, most: int = LARGEST_COUNT) -> in
 plain_name = tested(text, lambda name: bool(PLAIN_NAME.fullmatch(name)) and not name.endswith("."))
 line_of_text = tested(text, lambda line: line.isprintable() and line == line.strip())
 count = partial(whole_number, least=1)
-# A number of things that are all held in memory.
-held_count = partial(whole_number, least=1, most=MOST_HELD)
 
 
 def seeds(value: object) -> tuple[int, ...]:
     """Return seeds: n stands for 1 to n."""
     if isinstance(value, list):
         return tuple(list_of(whole_number, 1)(value))
-    return tuple(range(1, held_count(value) + 1))
+    return tuple(range(1, whole_number(value, 1, MOST_SEEDS) + 1))
 
 
 def one_or_more(kind: Kind) -> Kind:
@@ -148,7 +146,7 @@ class CaseSpec:
 class RandomCasesSpec:
     """Declare [random_cases]: truths spread over the bounds."""
 
-    n: int = field(metadata=key(held_count, "a whole number above 0, up to 1,000,000"))
+    n: int = field(metadata=key(partial(count, most=MOST_CASES), "a whole number above 0, up to 100,000"))
     seed: int = field(metadata=SEED)
     manoeuvres: tuple[dict[str, Any], ...] = field(metadata=TABLES)
     margin: float = field(default=0.0, metadata=key(at_least_zero, "a share of the range from 0 to below 0.5"))

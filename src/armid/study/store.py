@@ -18,6 +18,13 @@ FILE_NAME = "study.sqlite"
 # "armd" in ASCII: a file of another program is recognised before anything is written to it.
 APPLICATION, FORMAT = 0x61726D64, 1
 WAIT_S = 60.0
+# Steps of SQLite between two looks for a signal, a few milliseconds.
+PROGRESS_STEPS = 100_000
+# What computes when a store is read or written: views, triggers, virtual tables, indices, and generated columns.
+COMPUTING = """
+SELECT name FROM sqlite_schema WHERE sql NOT LIKE 'CREATE TABLE %'
+UNION ALL SELECT s.name FROM sqlite_schema s, pragma_table_xinfo(s.name) c WHERE c.hidden > 0 LIMIT 1
+"""
 # What the description of a study holds in every version of this format.
 WORDS = ("name", "cases")
 
@@ -225,12 +232,26 @@ def translate_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
+        if getattr(error, "sqlite_errorname", "") == "SQLITE_INTERRUPT":
+            raise KeyboardInterrupt from error
         raise ArmidError(f"{path} cannot be used: {str(error)[:120]}; what was finished before is kept") from error
     except UnicodeDecodeError as error:
         # SQLite quotes what is damaged in its message
         raise ArmidError(f"{path} is damaged: what SQLite says of it cannot be read as text") from error
     except OSError as error:
         raise ArmidError(f"{error.filename or path} cannot be used: {error.strerror or error}") from error
+
+
+def connected(database: str | Path, **options: Any) -> sqlite3.Connection:
+    """Return a connection whose queries end by a signal, however long they are: `translate_errors` raises it again.
+
+    Conditions that a table sets on its rows are not computed: armid sets none.
+    """
+    connection: sqlite3.Connection = sqlite3.connect(database, isolation_level=None, **options)
+    connection.execute("PRAGMA ignore_check_constraints = ON")
+    # Python looks for signals when it calls this
+    connection.set_progress_handler(lambda: 0, PROGRESS_STEPS)
+    return connection
 
 
 def opened(path: Path) -> sqlite3.Connection:
@@ -240,7 +261,7 @@ def opened(path: Path) -> sqlite3.Connection:
     """
     with translate_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
+        connection = connected(path, timeout=WAIT_S)
         try:
             check_format(connection, path, may_be_new=True)
             connection.execute("PRAGMA journal_mode = WAL")
@@ -267,7 +288,12 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
         if error.sqlite_errorname != "SQLITE_NOTADB":
             raise
         raise ArmidError(f"{path} is no store of a study: another file has its name") from error
-    if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
+    if found == [APPLICATION, FORMAT]:
+        row = connection.execute(COMPUTING).fetchone()
+        if row is not None:
+            raise ArmidError(f"{path} is damaged: {quoted(row[0])} in it computes, plain tables are expected")
+        return
+    if may_be_new and is_empty:
         return
     if found[0] != APPLICATION:
         raise ArmidError(f"{path} is no store of a study: another program's data, or nothing, is in it")

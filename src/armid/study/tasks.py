@@ -1,7 +1,7 @@
 """What a study can be: a task that plans its runs and performs one of them.
 
 There are two: `Study` identifies parameters, here below, and `LoopStudy` (see loops) closes the loop on campaigns. Both
-have name, kind, folder of their file, registry, case_names (what they are tried on) and labels (who tries), and
+have name, kind, folder of their file, registry, case_names (what they are tried on), labels (who tries), n_runs, and
 
 - check(performed): refuse what cannot be run, before anything is written
 - description(out): what a report needs to know, as JSON can hold it; out: folder of the store
@@ -12,11 +12,10 @@ have name, kind, folder of their file, registry, case_names (what they are tried
 import errno
 import json
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, cached_property
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
@@ -33,6 +32,7 @@ from armid.problem.meter import Meter
 from armid.problem.problem import IdentificationProblem, Replay
 from armid.problem.space import Space
 from armid.problem.suite import SuiteProblem, first_of
+from armid.progress import announced
 from armid.record.schema import load_toml, unknown_name, validated
 from armid.registry import place_in_plugin
 from armid.study.cases import Case, cases_of, clean_records
@@ -57,6 +57,8 @@ Task: TypeAlias = "Study | LoopStudy"
 Performer: TypeAlias = Callable[[ClaimedRun], Outcome]
 SUFFIX = ".toml"
 LONGEST_ERROR = 2000
+# Each run is a row of some kB in the store.
+MOST_RUNS = 1_000_000
 PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 # What the system says when disk, memory or open files run out, or a disk fails.
 MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
@@ -93,7 +95,8 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
     if kind not in KIND_NAMES:
         raise unknown_name("kind", kind, KIND_NAMES, file.name)
     text = file.read_text(encoding="utf-8-sig")
-    return task_type(kind).read(table, text, file.resolve().parent, file.name, study_registry(plugins))
+    with announced(f"reading study {file.name}"):
+        return task_type(kind).read(table, text, file.resolve().parent, file.name, study_registry(plugins))
 
 
 def task_type(kind: str) -> "type[Task]":
@@ -206,7 +209,11 @@ class Study:
         cases = cases_of(spec, model, registry, folder, where)
         for entry in entries:
             _check_noise(entry, cases, registry, where)
-        return cls(spec, text, folder, cases, entries, registry)
+        found = cls(spec, text, folder, cases, entries, registry)
+        if found.n_runs > MOST_RUNS:
+            raise ArmidError(f"{where}: {found.n_runs:,} runs are asked for (cases, identifiers, seeds, windows, "
+                             f"noises, fitnesses and budgets), at most {MOST_RUNS:,} are expected")  # fmt: skip
+        return found
 
     def check(self, performed: Performer) -> None:
         """Simulate each case's truth once: the model is compiled and the machine moves; build identifiers of the user.
@@ -236,15 +243,12 @@ class Study:
 
     def cost(self) -> str:
         """Return in words what all runs need: simulations, and on a suite the time of the engine, measured here."""
-        problem_of, budgets = {case.name: case.suite for case in self.cases}, Counter[str]()
-        n_runs = 0
-        for run in self.plan():
-            n_runs += 1
-            budgets[run.case] += run.budget
-        total = f"{n_runs:,} runs, {budgets.total():,} simulations at most in all"
-        if not all(problem_of.values()):
+        budgets = {case: sum(len(set(entry.seeds)) * sum(budget for *_, budget in self._choices(case, entry))
+                             for entry in self.entries) for case in self.cases}  # fmt: skip
+        total = f"{self.n_runs:,} runs, {sum(budgets.values()):,} simulations at most in all"
+        if not all(case.suite for case in self.cases):
             return total
-        seconds = sum(n * first_of(p.problem_name).cost_s for case, n in budgets.items() if (p := problem_of[case]))
+        seconds = sum(n * first_of(p.problem_name).cost_s for case, n in budgets.items() if (p := case.suite))
         return (f"{total}; they take the engine about {seconds / 60.0:.3g} min of one processor, to which comes what "
                 "the identifiers themselves need")  # fmt: skip
 
@@ -286,11 +290,20 @@ class Study:
                     if seed in own:
                         yield from self._runs(case, shared[case.name], entry, seed)
 
-    def _runs(self, case: Case, shared: dict[str, Any], entry: Entry, seed: int) -> Iterator[Planned]:
+    @cached_property
+    def n_runs(self) -> int:
+        """Number of the runs, before any is planned."""
+        seeds = {id(entry): len(set(entry.seeds)) for entry in self.entries}
+        return sum(seeds[id(e)] * len(self._choices(case, e)) for case in self.cases for e in self.entries)
+
+    def _choices(self, case: Case, entry: Entry) -> list[tuple[Any, ...]]:
+        """Return window, noise, fitness and budget of the runs of one seed."""
         noises = entry.noise_deg_s if case.strokes else (None,)
         fitnesses = entry.fitness if case.suite is None else (case.suite.definition.fitness,)
-        choices = product(self.spec.windows_s, noises, fitnesses, entry.budgets(len(case.bounds)))
-        for window, noise, fitness, budget in choices:
+        return list(product(self.spec.windows_s, noises, fitnesses, entry.budgets(len(case.bounds))))
+
+    def _runs(self, case: Case, shared: dict[str, Any], entry: Entry, seed: int) -> Iterator[Planned]:
+        for window, noise, fitness, budget in self._choices(case, entry):
             own = self.registry.digests_of("fitness", fitness) | self.registry.digests_of("identifiers", entry.name)
             settings = shared | {
                 "identifier": entry.name, "options": dict(entry.options), "budget": budget, "fitness": fitness,
