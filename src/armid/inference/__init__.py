@@ -2,11 +2,20 @@
 
 In reading order:
 
+infer         the whole way: campaign -> probabilities and intervals
 whitening     train records with their noise -> residuals whose noise is white
 library       the candidate effects, compiled together and ready to be tried
-model         a model at its estimate
-score_test    what each candidate would change, to first order
-refit         a model fitted again with an effect more, less or other
-checks        whether a residual is more than noise, and where
-kinds         the kinds of hypotheses: effects, faults of records, drifts, a signal without a form
+hypothesis    what may be true of the machine or its records beside the declared model
+kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form
+model         a model at its estimate; `unknowns`: constants, faults and drifts, fitted with their priors
+evidence      how probable the records are in a model, and what a hypothesis more would do to that
+search        which models are fitted
+posterior     probabilities of hypotheses and sets; intervals that count what may be missing
+checks        whether a residual is more than noise, and where; `carry_over`: on records held out
+
+Beside them: score_test and refit (starts of fits), missing_signal (gains of a signal at a port).
 """
+
+from armid.inference.infer import Inference, infer
+
+__all__ = ["Inference", "infer"]

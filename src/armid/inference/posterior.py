@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
+from armid.inference.checks import is_significant
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses
 from armid.inference.search import Exploration
@@ -50,11 +51,14 @@ class Posterior:
             found[atom.names] = found.get(atom.names, 0.0) + float(weight)
         return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
-    def probability(self, kind: str, name: str | None = None) -> float:
-        """Return the probability of a hypothesis, or of any of a kind; a name counts in sets without `unknown`."""
+    def probability(self, kind: str, name: str | None = None, beside_unknown: bool = False) -> float:
+        """Return the probability of a hypothesis, or of any of a kind.
+
+        The name of an effect counts in sets without `unknown` alone, unless beside_unknown.
+        """
         total = 0.0
         for names, weight in self.sets.items():
-            if kind == "effect" and name is not None and any(k == "unknown" for k, _ in names):
+            if kind == "effect" and name is not None and not beside_unknown and any(k == "unknown" for k, _ in names):
                 continue
             total += weight * any(k == kind and name in (None, n) for k, n in names)
         return total
@@ -63,10 +67,11 @@ class Posterior:
     def nothing(self) -> float:
         return self.sets.get(frozenset(), 0.0)
 
-    def of_kind(self, kind: str) -> dict[str, float]:
+    def of_kind(self, kind: str, beside_unknown: bool = False) -> dict[str, float]:
         """Return the probabilities of the hypotheses of a kind, the most probable first."""
         names = {n for s in self.sets for k, n in s if k == kind}
-        return dict(sorted(((n, self.probability(kind, n)) for n in names), key=lambda pair: -pair[1]))
+        each = ((n, self.probability(kind, n, beside_unknown)) for n in names)
+        return dict(sorted(each, key=lambda pair: -pair[1]))
 
     def quantile(self, parameter: str, share: float) -> float:
         """Return the value below which a share of the mixture lies."""
@@ -84,6 +89,26 @@ class Posterior:
         """Return the interval that holds 95 % of the mixture."""
         return self.quantile(parameter, 0.025), self.quantile(parameter, 0.975)
 
+    def causes(self, parameter: str, noise: float) -> list[tuple[str, float]]:
+        """Return what makes the interval of a parameter wide, with shares of the variance, the largest first.
+
+        noise: deviation by noise alone, SI. What a model has beyond the most probable one counts for it.
+        """
+        i = self.parameters.index(parameter)
+        best = max(self.atoms, key=lambda a: a.log_weight)
+        means, deviations = (np.array([getattr(a, what)[i] for a in self.atoms]) for what in ("mean", "deviation"))
+        centre = float(self.weights @ means)
+        total = float(self.weights @ (deviations**2 + (means - centre) ** 2))
+        if total <= 0.0:
+            return []
+        found = {"noise": noise**2 / total, "constants within tolerances": (best.deviation[i] ** 2 - noise**2) / total}
+        for atom, weight in zip(self.atoms, self.weights, strict=True):
+            names = sorted(name for _, name in atom.names ^ best.names)
+            more = weight * ((atom.mean[i] - best.mean[i]) ** 2 + atom.deviation[i] ** 2 - best.deviation[i] ** 2)
+            for name in names:
+                found[name] = found.get(name, 0.0) + float(more) / len(names) / total
+        return sorted(((n, share) for n, share in found.items() if share > 0.0), key=lambda pair: -pair[1])
+
 
 def posterior(found: Exploration) -> Posterior:
     """Return the mixture of all models that were fitted, and of what may stand beside those that were expanded."""
@@ -91,14 +116,16 @@ def posterior(found: Exploration) -> Posterior:
     own = tuple(n for n in found.declared.values if library.owner(n) is None)
     ranked, atoms = found.ranked(), []
     top = ranked[0][1]
+    # What the best model leaves beyond noise has a covariance of its own: nobody knows what it is.
+    left = frozenset({("unknown", "output")} if is_significant(found.fits[ranked[0][0]]) else ())
     for model, value in ranked:
         if value < top + NEGLIGIBLE:
             continue
         about = expansion_of(found.fits[model], scale, library)
         mean, covariance = of_parameters(about, own)
-        names = frozenset(h.public for h in model)
+        names = frozenset(h.public for h in model) | left
         atoms.append(Atom(value, names, mean, np.sqrt(np.diag(covariance))))
-        atoms += beside(found, model, value, about, own, mean, covariance, top)
+        atoms += beside(found, model, value, about, own, mean, covariance, top, left)
     return Posterior(tuple(atoms), own)
 
 
@@ -113,13 +140,13 @@ def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
 
 def beside(
     found: Exploration, model: Hypotheses, value: float, about: Expansion, own: Sequence[str], mean: Array,
-    covariance: Array, top: float,
+    covariance: Array, top: float, left: frozenset[tuple[str, str]],
 ) -> list[Atom]:  # fmt: skip
     """Return the atoms of what was not fitted beside a model that was expanded, to first order."""
     fit = about.fit
     places = [list(fit.values).index(n) for n in own]
     span, atoms = fit.records.span[places], []
-    names = frozenset(h.public for h in model)
+    names = frozenset(h.public for h in model) | left
     for ahead in found.forecasts.get(model, ()):
         hypothesis = ahead.proposal.hypothesis
         if model | {hypothesis} in found.fits:

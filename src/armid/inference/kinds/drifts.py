@@ -12,6 +12,7 @@ from armid.inference.kinds.faults import simulated_file, with_measured
 from armid.inference.library import Library
 from armid.inference.model import Fit
 from armid.inference.refit import unless_diverged
+from armid.inference.score_test import free_values
 from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
@@ -30,9 +31,10 @@ class OfParameter:
     name: str
     product: Product | None = None
 
-    def moved(self, at: Array, names: tuple[str, ...], records: WhiteRecords, value: float) -> WhiteRecords:
-        """Return records as they would be in the middle of the campaign; at: free parameters about which, shares."""
+    def moved(self, values: dict[str, float], records: WhiteRecords, value: float) -> WhiteRecords:
+        """Return records as they would be in the middle of the campaign; values: of the parameters, about which, SI."""
         files, found = list(dict.fromkeys(r.file for r in records.data.records)), records
+        at, names = records.shares(free_values(records, values)), records.space.free_names
         for place, file in enumerate(files):
             index = next(i for i, r in enumerate(records.data.records) if r.file == file)
             share, there, z = value * LARGEST * (place / (len(files) - 1.0) - 0.5), records, at
@@ -80,7 +82,7 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
     base, what, again = fit.base or fit.records, hypothesis.means, fit
     for _ in range(2):
-        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again.z, tuple(again.values)),
+        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again.values),
                           column=partial(what.column, again))  # fmt: skip
         others = [f.unknown for f in fit.others if f.unknown.name != unknown.name]
         tried = unless_diverged(lambda: freed(again, base, [*others, unknown], limit, rough=True))  # noqa: B023

@@ -1,0 +1,124 @@
+"""The evidence against exact formulas of linear models, and the mixture against samples of it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from armid.inference.evidence import Expansion, Scale, forecast
+from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.posterior import Atom, Posterior, truncated
+from armid.inference.whitening import Cover
+
+N, RNG = 60, np.random.default_rng(11)
+JACOBIAN, OTHERS = RNG.normal(size=(N, 2)), RNG.normal(size=(N, 1))
+
+
+def stub(residual):
+    """A fit of two parameters, of which an expansion asks no more than this."""
+    space = SimpleNamespace(low=np.zeros(2), high=np.ones(2), free=np.ones(2, dtype=bool))
+    parameters = dict.fromkeys("ab", SimpleNamespace(null=None))
+    return SimpleNamespace(
+        n_free=2, jacobian=JACOBIAN, columns=OTHERS, residual=residual, chi2=float(residual @ residual),
+        values={"a": 0.5, "b": 0.5}, records=SimpleNamespace(space=space), model=SimpleNamespace(parameters=parameters),
+    )  # fmt: skip
+
+
+def expansion(residual, scale=None):
+    library = SimpleNamespace(owner=lambda _: None)
+    return Expansion(stub(residual), scale or Scale(N, 1.0, 1e9), library, np.empty((N, 0)))
+
+
+def proposal(columns, scales, **more):
+    return Proposal(
+        Hypothesis("effect", "x"), columns, np.array(scales), np.zeros(len(columns)), lambda *_: None, **more
+    )
+
+
+def exact(residual, columns, deviation):
+    """The exact log Bayes factor of columns with normal strengths, the unknowns of the stub with their priors."""
+    prior = np.array([2.0 * np.pi, 2.0 * np.pi, 1.0])
+    unknowns = np.hstack([JACOBIAN, OTHERS])
+    noise = np.eye(N) + unknowns / prior @ unknowns.T
+    more = noise + deviation**2 * columns.T @ columns
+    return multivariate_normal.logpdf(residual, cov=more) - multivariate_normal.logpdf(residual, cov=noise)
+
+
+@pytest.mark.parametrize("deviation", [0.01, 1.0, 30.0])
+def test_a_forecast_is_the_bayes_factor_of_a_linear_model(deviation):
+    column, residual = RNG.normal(size=(1, N)), RNG.normal(size=N)
+    residual = residual + 0.5 * column[0]
+    found = forecast(expansion(residual), proposal(column, [deviation]))
+    assert found.total == pytest.approx(exact(residual, column, deviation), abs=1e-5)
+
+
+def test_columns_that_act_together_have_the_bayes_factor_of_their_sum():
+    columns, residual = RNG.normal(size=(4, N)), RNG.normal(size=N)
+    found = forecast(expansion(residual), proposal(columns, [0.7], joint=True))
+    assert found.total == pytest.approx(exact(residual, columns, 0.7), abs=1e-5)
+
+
+def test_the_sides_of_a_strength_share_its_probability():
+    """A strength of either sign is as probable as its two one-sided halves together."""
+    column, residual = RNG.normal(size=(1, N)), RNG.normal(size=N)
+    either = forecast(expansion(residual), proposal(column, [2.0]))
+    halves = [forecast(expansion(residual), proposal(side * column, [2.0], one_sided=True)) for side in (1.0, -1.0)]
+    assert np.logaddexp(*(h.total for h in halves)) - np.log(2.0) == pytest.approx(either.total, abs=1e-6)
+
+
+def test_what_the_unknowns_can_do_says_nothing():
+    column = (JACOBIAN @ np.array([0.1, -0.2]))[np.newaxis]
+    found = forecast(expansion(RNG.normal(size=N)), proposal(column, [1.0]))
+    assert found.total == pytest.approx(0.0, abs=0.3)
+
+
+def test_a_tempered_scale_weighs_less_and_a_short_rest_still_less():
+    column = RNG.normal(size=(1, N))
+    residual = RNG.normal(size=N) + 3.0 * column[0]
+    totals = [forecast(expansion(residual, scale), proposal(column, [3.0])).total
+              for scale in (Scale(N, 1.0, 1e9), Scale(N, 1.0, 20.0), Scale(6.0, 0.01, 0.1))]  # fmt: skip
+    assert totals[0] > totals[1] > totals[2] > 0.0
+
+
+def test_a_sum_of_squares_is_found_again_from_its_log_likelihood():
+    scale = Scale(40.0, 0.3, 12.0)
+    assert scale.reach(scale.log_likelihood(321.0)) == pytest.approx(321.0)
+
+
+def test_unknowns_that_are_projected_out_are_those_of_a_joint_fit():
+    """min over z of the projected problem is min over z and v of |r - C v|^2 + |v|^2."""
+    columns, residual = RNG.normal(size=(N, 3)), RNG.normal(size=N)
+    white = Cover.of(columns).white(residual)
+    best = np.linalg.solve(np.eye(3) + columns.T @ columns, columns.T @ residual)
+    left = residual - columns @ best
+    assert white @ white == pytest.approx(left @ left + best @ best)
+
+
+def test_prior_odds_are_shared_out():
+    assert np.exp(expected(0.7, 36)) == pytest.approx((0.7 / 36) / (1 - 0.7 / 36))
+
+
+def test_the_mixture_has_the_quantiles_of_its_samples():
+    atoms = tuple(Atom(np.log(w), frozenset({("effect", n)}), np.array([m]), np.array([s]))
+                  for w, n, m, s in ((6.0, "a", 0.0, 1.0), (3.0, "b", 5.0, 0.5), (1.0, "c", -8.0, 2.0)))  # fmt: skip
+    found = Posterior(atoms, ("p",))
+    drawn = np.concatenate([RNG.normal(m, s, n) for n, m, s in ((600_000, 0, 1), (300_000, 5, 0.5), (100_000, -8, 2))])
+    assert found.interval("p") == pytest.approx(np.quantile(drawn, [0.025, 0.975]), abs=0.03)
+    assert found.of_kind("effect") == pytest.approx({"a": 0.6, "b": 0.3, "c": 0.1})
+    causes = dict(found.causes("p", 1.0))
+    assert sum(causes.values()) == pytest.approx(1.0, abs=0.15)
+
+
+def test_names_count_only_in_sets_without_an_unknown_signal():
+    plain, beside = frozenset({("effect", "a")}), frozenset({("effect", "a"), ("unknown", "torque")})
+    found = Posterior(tuple(Atom(0.0, names, np.zeros(1), np.ones(1)) for names in (plain, beside)), ("p",))
+    assert found.probability("effect", "a") == pytest.approx(0.5)
+    assert found.probability("unknown") == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("at", [-8.0, -2.0, 0.0, 3.0])
+def test_a_half_normal_has_the_mean_and_deviation_of_its_samples(at):
+    drawn = RNG.normal(at, 1.0, 8_000_000)
+    kept = drawn[drawn > 0.0] if at > -5.0 else RNG.exponential(1.0 / 8.0, 100_000)
+    assert truncated(at, 1.0) == pytest.approx((kept.mean(), kept.std()), rel=0.03)
