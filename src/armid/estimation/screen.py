@@ -70,6 +70,7 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
     """
+    campaign = replace(campaign, records=tuple(r.filled for r in campaign.records))
     seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
     seen += list(given_twice(campaign.records))
     noise = {s.record for s in seen if s.kind == "noise"}

@@ -133,7 +133,7 @@ class Residuals:
             for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
                 found = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
                 for n in names:
-                    parts[n].append(found[n][piece.window])
+                    parts[n].append(found[n][piece.samples])
         return {n: np.concatenate(p) for n, p in parts.items()}
 
     @cached_property
@@ -142,7 +142,7 @@ class Residuals:
         found: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
             runs = (zip(r.pieces, r.runs(self.candidate[np.newaxis]), strict=True) for r in self.replays)
-            after = np.concatenate([piece.manoeuvre.times()[piece.window] >= run.switch_times[name][0]
+            after = np.concatenate([piece.manoeuvre.times()[piece.samples] >= run.switch_times[name][0]
                                     for piece, run in chain.from_iterable(runs)])  # fmt: skip
             found |= {f"before '{name}'": ~after, f"after '{name}'": after}
         return {n: samples for n, samples in found.items() if samples.any()}

@@ -32,7 +32,6 @@ from armid.inference.whitening import WhiteRecords
 from armid.loop.fit import FAMILYWISE
 from armid.model import Array, Plant
 from armid.record import Record
-from armid.record.broken import broken_samples
 from armid.units import shown
 
 FREED, LEFT_OUT, REPORTED = "freed", "left_out", "reported"
@@ -260,7 +259,7 @@ def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
     """Return the samples that are no data, which were left out."""
     return [
         Suspect(record.file, record.role, b.kind, LEFT_OUT, float(b.count), "samples", None, None, b.from_s, b.to_s)
-        for record in (one for r in records for one in r.each) for b in broken_samples(record)
+        for record in (one for r in records for one in r.each) for b in record.broken
     ]  # fmt: skip
 
 
