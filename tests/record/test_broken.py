@@ -16,8 +16,8 @@ def signal(seed=3):
     return 2.0 * np.sin(4.0 * TIMES) + NOISE * np.random.default_rng(seed).standard_normal(N)
 
 
-def found(values, noise=NOISE, sensor=FINE, sudden=NEVER):
-    kinds = {**repeated_samples(values, noise, sensor, sudden), "spikes": wild_samples(values, noise) & ~sudden}
+def found(values, noise=NOISE, sensor=FINE, sudden=NEVER, known=False):
+    kinds = {**repeated_samples(values, noise, known, sensor, sudden), "spikes": wild_samples(values, noise) & ~sudden}
     return {kind: np.flatnonzero(mask) for kind, mask in kinds.items() if mask.any()}
 
 
@@ -25,9 +25,9 @@ def test_a_sensor_that_froze_and_one_at_its_limit_are_found_where_they_are():
     stuck = signal()
     stuck[300:340] = stuck[300]
     assert {k: v.tolist() for k, v in found(stuck).items()} == {"stuck": list(range(300, 340))}
-    for limit in (1.2, 1.5, 1.8):
+    for limit, known in ((1.2, False), (1.5, False), (1.8, True)):
         clipped = np.minimum(signal(), limit)
-        assert {k: v.tolist() for k, v in found(clipped).items()} == {
+        assert {k: v.tolist() for k, v in found(clipped, known=known).items()} == {
             "clipped": np.flatnonzero(signal() > limit).tolist()
         }
 

@@ -23,7 +23,7 @@ SUDDEN, SUDDEN_SHARE, AFTER_SUDDEN = 6.0, 0.05, 4
 LEAP = 2.0
 # A signal that runs into the limit of its sensor gets there at no less than this share of its usual rate, over so many
 # samples, and leaves it so: a machine that comes to rest or to an even speed slows down before.
-ABRUPT, RUN_UP = 0.3, 4
+ABRUPT, RUN_UP = 0.2, 4
 
 
 @dataclass(frozen=True)
@@ -41,30 +41,46 @@ class Broken:
     line: int = 0
 
 
-def repeated_samples(values: Array, noise: float, sensor: Sensor, sudden: Mask) -> dict[str, Mask]:
+def repeated_samples(values: Array, noise: float, known: bool, sensor: Sensor, sudden: Mask) -> dict[str, Mask]:
     """Return which values are at the limit of the sensor, and which a frozen one repeats, kind -> (n_rows,).
 
-    Equal values are natural for a sensor whose step hides its noise, and where friction holds the machine: those at a
-    limit are reached abruptly, those of a frozen sensor are left by a leap.
-    values: those that are new, (n_rows,). noise: rms [their unit]. sudden: where an input has just jumped, (n_rows,).
+    Equal values are natural for a sensor whose step hides its noise. A rest shows whether it does; where none was
+    recorded, motion may pass for noise, and friction or an even speed for a fault. Then values at a limit are those
+    that are reached abruptly, and values of a frozen sensor those that are left by a leap.
+    values: those that are new, (n_rows,). noise: rms [their unit]; known: from a rest. sudden: where an input has just
+    jumped, (n_rows,).
     """
     clipped, stuck = np.zeros((2, values.size), dtype=np.bool_)
     if noise <= 0.5 * sensor.step or values.size <= RUN_UP:
         return {"clipped": clipped, "stuck": stuck}
     usual = float(np.sqrt(np.mean((values[RUN_UP:] - values[:-RUN_UP]) ** 2)))
     leap = max(ABOVE_NOISE * noise, LEAP * float(np.quantile(np.abs(np.diff(values)), USUAL)))
-    ends = (float(values.max()), float(values.min()))
+    for limit in (float(values.max()), float(values.min())):
+        stretches = visits(values, limit) if abs(limit) > sensor.step else []
+        long = any(np.all(values[begin:end] == limit) for begin, end in runs(values))
+        if long and any(known or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in stretches):
+            clipped |= values == limit
     for begin, end in runs(values):
-        value, last = float(values[begin]), min(end, values.size - 1)
-        sides = [values[at] for at in (begin - RUN_UP, end - 1 + RUN_UP) if 0 <= at < values.size]
-        # a machine that stands still may start at once
-        if abs(value) <= sensor.step:
-            continue
-        if value in ends and min(abs(side - value) for side in sides) >= ABRUPT * usual:
-            clipped |= values == value
-        elif abs(float(values[last]) - value) > leap and not sudden[last]:
-            stuck[begin:end] = True
+        last = min(end, values.size - 1)
+        away = abs(float(values[last] - values[begin]))
+        left_behind = known or (away > leap and not sudden[last])
+        # many sensors show a standstill without noise, and a machine may start at once
+        stuck[begin:end] = abs(values[begin]) > sensor.step and left_behind
     return {"clipped": clipped, "stuck": stuck & ~clipped}
+
+
+def visits(values: Array, limit: float) -> list[tuple[int, int]]:
+    """Return first row and end of the stretches at a limit; noise may leave it for some samples near the ends."""
+    at = np.flatnonzero(values == limit)
+    parts = np.split(at, np.flatnonzero(np.diff(at) > RUN_UP) + 1)
+    return [(int(part[0]), int(part[-1]) + 1) for part in parts if part.size >= REPEATED]
+
+
+def is_abrupt(values: Array, begin: int, end: int, least: float) -> bool:
+    """Tell whether a signal reaches and leaves a stretch of equal values by so much within a few samples."""
+    sides = (values[max(begin - RUN_UP, 0) : begin], values[end : end + RUN_UP])
+    away = [float(np.mean(np.abs(side - values[begin]))) for side in sides if side.size == RUN_UP]
+    return bool(away) and min(away) >= least
 
 
 def runs(values: Array) -> list[tuple[int, int]]:

@@ -76,7 +76,9 @@ def signal_of(
     new = New(values, rows, times, timing)
     rest, noise = rest_and_noise(new, inputs, is_speed)
     moves = not is_constant(new.motion)
-    repeated = repeated_samples(new.values, noise.rms, sensor, new.since(jumps)) if moves else {}
+    repeated = (
+        repeated_samples(new.values, noise.rms, noise.source == "rest", sensor, new.since(jumps)) if moves else {}
+    )
     for kind, broken in repeated.items():
         found[kind] = np.zeros(rows.size, dtype=np.bool_)
         found[kind][new.at[broken]] = True
