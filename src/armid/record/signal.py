@@ -59,7 +59,7 @@ def signal_of(
     raw = table.numbers(header, gaps=True)
     present = np.isfinite(raw)
     check_empty(table, header, present)
-    values = without_turns(table, header, raw, present, unwrap) * table.factor(header, factor)
+    values = without_turns(table, header, raw, unwrap) * table.factor(header, factor)
     sensor = sensor_of(values[present])
     rows = present.copy()
     rows[present] = renewed(values[present], sensor.hold)
@@ -171,30 +171,37 @@ def gaps(times: Array, timing: Timing) -> list[Broken]:
     return [Broken("gap", at.size, float(at[0]), float(at[-1]))] if at.size else []
 
 
-def without_turns(table: CsvTable, header: str, raw: Array, present: Mask, unwrap: bool) -> Array:
-    """Return an angle without its jumps by a whole turn where that is asked for, else say that it has some."""
+def wraps_at(values: Array, header: str) -> float:
+    """Return the turn by which an angle jumps where it leaves the range of one turn, 0 where it does not."""
+    known = values[np.isfinite(values)]
+    change = np.diff(known)
     unit = next((u for u in WRAPS if header.endswith(f"_{u}")), "")
-    values = raw[present]
     for turn in WRAPS.get(unit, ()):
-        change = np.diff(values)
-        jumps = np.abs(change) > 0.5 * turn
-        turns = np.rint(change / turn)
-        left = np.abs(change - turn * turns)[jumps]
-        if not jumps.any() or np.ptp(values) > turn * (1.0 + ROUNDING) or float(np.median(left)) > 0.25 * turn:
-            continue
-        rows = np.flatnonzero(present)[1:]
-        line = table.line_of(int(rows[jumps][0]))
-        if not unwrap:
-            warn(table, f"{header} wraps at {turn:.6g}, {int(jumps.sum())} times, the first on line {line}: "
-                        "unwrap = true in campaign.toml takes the turns out")  # fmt: skip
-            return raw
-        steps = change - turn * turns
-        fast = np.flatnonzero(np.abs(np.diff(steps)) > 0.5 * turn)
-        if fast.size:
-            line = table.line_of(int(rows[fast[0] + 1]))
-            raise ArmidError(f"{table.file}, line {line}: {header} moves by half a turn or more from one row to the "
-                             "next, so that its turns cannot be counted: faster sampling is expected")  # fmt: skip
-        whole = raw.copy()
-        whole[present] = values - turn * np.append(0.0, np.cumsum(turns))
-        return whole
-    return raw
+        left = np.abs(change - turn * np.rint(change / turn))[np.abs(change) > 0.5 * turn]
+        if left.size and np.ptp(known) <= turn * (1.0 + ROUNDING) and float(np.median(left)) <= 0.25 * turn:
+            return turn
+    return 0.0
+
+
+def without_turns(table: CsvTable, header: str, raw: Array, unwrap: bool) -> Array:
+    """Return an angle without its jumps by a whole turn where that is asked for, else say that it has some."""
+    turn = wraps_at(raw, header)
+    if turn == 0.0:
+        return raw
+    present = np.isfinite(raw)
+    rows, change = np.flatnonzero(present)[1:], np.diff(raw[present])
+    turns = np.rint(change / turn)
+    if not unwrap:
+        line = table.line_of(int(rows[turns != 0.0][0]))
+        warn(table, f"{header} wraps at {turn:.6g}, {int(np.sum(turns != 0.0))} times, the first on line {line}: "
+                    "unwrap = true in campaign.toml takes the turns out")  # fmt: skip
+        return raw
+    # of a motion the steps change little from row to row, but where they pass half a turn
+    fast = np.flatnonzero(np.abs(np.diff(change - turn * turns)) > 0.5 * turn)
+    if fast.size:
+        line = table.line_of(int(rows[fast[0] + 1]))
+        raise ArmidError(f"{table.file}, line {line}: {header} moves by half a turn or more from row to row, so that "
+                         "its turns cannot be counted: faster sampling is expected")  # fmt: skip
+    whole = raw.copy()
+    whole[present] = raw[present] - turn * np.append(0.0, np.cumsum(turns))
+    return whole

@@ -171,9 +171,30 @@ def time_column(table: CsvTable) -> Array:
     if wrong.size:
         before, row = float(times[wrong[0]]), int(wrong[0]) + 1
         found = "is there twice" if times[row] == before else f"comes after {before:.12g}"
-        raise ArmidError(f"{table.file}, line {table.line_of(row)}: time_s {float(times[row]):.12g} {found}, "
-                         "increasing times are expected")  # fmt: skip
+        raise ArmidError(f"{table.file}, line {table.line_of(row)}: time_s {float(times[row]):.12g} {found}"
+                         f"{why_back(table, times, row)}, increasing times are expected")  # fmt: skip
     return times
+
+
+# Units of counters of time [s], and their bits.
+TICKS, BITS = (1e-9, 1e-6, 1e-3, 1.0), (16, 32)
+
+
+def why_back(table: CsvTable, times: Array, row: int) -> str:
+    """Return the likely cause of a time that is no later than the one before, in words."""
+    rows = np.array(list(table.columns.values()))
+    step = float(times[row] - times[row - 1])
+    usual = float(np.median(np.diff(times)))
+    if step == 0.0:
+        if np.array_equal(rows[:, row], rows[:, row - 1], equal_nan=True):
+            n = int(np.sum(np.all(rows[:, 1:] == rows[:, :-1], axis=0)))
+            return f" with all its row ({n} such rows, which drop_duplicates of pandas removes)"
+        return " with other values (a clock too coarse for the sampling, or two files merged)"
+    for bits in BITS:
+        for tick in TICKS:
+            if usual > 0.0 and abs(step + 2.0**bits * tick - usual) < 0.5 * usual + tick:
+                return f" (a counter of {bits} bits that wraps, {2.0**bits * tick:.6g} s: add that from there on)"
+    return " (the clock was set back, or a second recording begins there)"
 
 
 def output_columns(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, str]]:
