@@ -194,7 +194,7 @@ def has_decimal_comma(rows: Sequence[Sequence[str]], separator: str, lines: Sequ
         number, cell = marked[0]
         arguments = f"sep={separator!r}, decimal={sign!r}".replace("'", '"')
         raise ArmidError(f"{file}, line {number}: {quoted(cell)} may be {cell.replace(sign, '')} or "
-                         f"{cell.replace(sign, '.')}, as no other number of the file tells: write it anew with "
+                         f"{cell.replace(sign, '.')}, as no other number decides: one meaning is expected, by "
                          f"{pandas_line(arguments)}")  # fmt: skip
     return sign == ","
 

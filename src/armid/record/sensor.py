@@ -10,6 +10,8 @@ from armid.model import Array
 Mask = NDArray[np.bool_]
 # A step that is a smaller share of the largest value is the rounding of printed numbers.
 FINEST_STEP = 1e-6
+# Share of the values that are sound in any record.
+NEARLY_ALL = 0.98
 # How far from a multiple of the step a value may lie, in steps: printed numbers are rounded once more.
 OFF_STEP = 0.05
 # Steps that the closest two values may be apart, and the gaps between values that make a finer step no chance.
@@ -38,8 +40,7 @@ class Sensor:
 
 def sensor_of(values: Array) -> Sensor:
     """Return the sensor of the values of one output as they were read, (n_rows,)."""
-    step = step_of(values)
-    return Sensor(step, hold_of(values, step))
+    return Sensor(step_of(values), hold_of(values))
 
 
 def step_of(values: Array) -> float:
@@ -48,11 +49,12 @@ def step_of(values: Array) -> float:
     The gaps between neighbouring levels count a few steps each, so that their sum over their counts is the step to
     the last digit, however the numbers were printed.
     """
-    levels = np.unique(values)
-    size = float(np.max(np.abs(values), initial=0.0))
-    gaps = np.diff(levels)
-    gaps = gaps[gaps > FINEST_STEP * size]
-    if not gaps.size or float(np.sum(gaps)) < (1.0 - 1e-3) * float(np.ptp(levels)):
+    gaps = np.diff(np.unique(values))
+    # some wild values are on no grid, far from all others
+    gaps = gaps[gaps <= np.quantile(gaps, NEARLY_ALL, method="higher")] if gaps.size else gaps
+    is_rounding = gaps <= FINEST_STEP * float(np.quantile(np.abs(values), NEARLY_ALL))
+    rounding, gaps = gaps[is_rounding], gaps[~is_rounding]
+    if not gaps.size or float(np.sum(rounding)) > 1e-3 * float(np.sum(gaps)):
         return 0.0
     # among few values the closest two may be two or three steps apart
     for parts in range(1, MOST_PARTS + 1 if gaps.size >= FEWEST_GAPS else 2):
@@ -63,7 +65,7 @@ def step_of(values: Array) -> float:
     return 0.0
 
 
-def hold_of(values: Array, step: float) -> int:
+def hold_of(values: Array) -> int:
     """Return after how many samples the sensor renews its value, 1 where each sample is new.
 
     A sensor that holds its value changes it after multiples of one time alone, whatever the motion. A coarse sensor of
@@ -82,7 +84,8 @@ def hold_of(values: Array, step: float) -> int:
     on_time = np.abs(short / hold - np.maximum(np.rint(short / hold), 1.0)) < QUARTER
     if float(np.mean(on_time)) < ON_TIME or 2 * short.size < apart.size:
         return 1
-    onward = (np.abs(changes[1:]) <= 1.5 * step) & (np.sign(changes[1:]) == np.sign(changes[:-1]))
+    single = 1.5 * float(np.min(np.abs(changes)))
+    onward = (np.abs(changes[1:]) <= single) & (np.sign(changes[1:]) == np.sign(changes[:-1]))
     return round(hold) if float(np.mean(~onward)) >= UNLIKE_SLOW_MOTION else 1
 
 

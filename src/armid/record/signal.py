@@ -24,6 +24,8 @@ MOST_EMPTY = 0.5
 MOST_LOST = 0.05
 WORDS = {"clipped": "are at the limit of the sensor", "stuck": "are repeated while the signal leaps",
          "spikes": "are far from their neighbours"}  # fmt: skip
+# Share of a turn that an angle which wraps spans at least.
+SPANNED = 0.75
 # End of the header of an angle -> values at which it wraps to 0.
 WRAPS = {"rad": (2.0 * np.pi,), "deg": (360.0,), "turns": (1.0,), "counts": (2.0**16, 2.0**32)}
 
@@ -174,13 +176,10 @@ def gaps(times: Array, timing: Timing) -> list[Broken]:
 def wraps_at(values: Array, header: str) -> float:
     """Return the turn by which an angle jumps where it leaves the range of one turn, 0 where it does not."""
     known = values[np.isfinite(values)]
-    change = np.diff(known)
+    largest, span = float(np.max(np.abs(np.diff(known)), initial=0.0)), float(np.ptp(known)) if known.size else 0.0
     unit = next((u for u in WRAPS if header.endswith(f"_{u}")), "")
-    for turn in WRAPS.get(unit, ()):
-        left = np.abs(change - turn * np.rint(change / turn))[np.abs(change) > 0.5 * turn]
-        if left.size and np.ptp(known) <= turn * (1.0 + ROUNDING) and float(np.median(left)) <= 0.25 * turn:
-            return turn
-    return 0.0
+    fits = (t for t in WRAPS.get(unit, ()) if largest > 0.5 * t and SPANNED * t < span <= t * (1.0 + ROUNDING))
+    return next(fits, 0.0)
 
 
 def without_turns(table: CsvTable, header: str, raw: Array, unwrap: bool) -> Array:

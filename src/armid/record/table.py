@@ -17,7 +17,7 @@ import numpy as np
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Output, Plant
 from armid.model.plant import SPEEDS
-from armid.record.dialect import cells_of, check_names, columns_of, text_of
+from armid.record.dialect import COMMENTS, cells_of, check_names, columns_of, text_of
 from armid.record.record import RecordWarning
 from armid.units import DEGREE, TURN
 
@@ -142,7 +142,7 @@ def plain_columns(text: str) -> tuple[list[str], Array] | None:
     """Return names and numbers, (n_rows, n_columns), of a file with commas, points and one header; None of another."""
     header, _, below = text.partition("\n")
     names = [name.strip().strip('"').strip() for name in header.split(",")]
-    if len(names) == 1 and any(separator in names[0] for separator in ";\t"):
+    if header.startswith(COMMENTS) or (len(names) == 1 and any(separator in names[0] for separator in ";\t")):
         return None
     try:
         with warnings.catch_warnings():
