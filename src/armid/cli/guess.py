@@ -101,11 +101,12 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
         roles.setdefault(quantity_of(column), column)
     roles.pop("", None)
     if "time" not in roles:
-        rising = [c for c in columns if np.all(np.diff(table.columns[c.header]) > 0.0)]
+        unknown = [c for c in columns if c not in roles.values()]
+        rising = [c for c in unknown if np.all(np.diff(table.columns[c.header]) > 0.0)]
         if not rising:
             raise ArmidError(f"{table.where}: no column of {quoted(list(table.columns))} rises as a time does, a time "
                              "in each row is expected")  # fmt: skip
-        roles = {q: c for q, c in roles.items() if c != rising[0]} | {"time": rising[0]}
+        roles["time"] = rising[0]
     if not {"speed", "position"} & roles.keys() or "drive" not in roles:
         what = "an input (drive, voltage, torque)" if "drive" not in roles else "a speed or an angle"
         raise ArmidError(f"{table.where}: no name among {quoted(list(table.columns))} is that of {what}, such as "

@@ -243,7 +243,7 @@ def fitness_of(
     """Return the joined fitness of the signals of each record, (n_candidates,); sizes: see `output_sizes`."""
     table = []
     for replay, x, signal, size in zip(replays, measured, signals, sizes, strict=True):
-        interval, noise = replay.pieces[0].manoeuvre.interval, replay.record.noise.rms
+        interval, noise = replay.record.spacing, replay.record.noise.rms
         pair = (x, signal) if size == 1.0 else (x / size, signal / size)
         table.append(fitness(pair[0], pair[1], interval, noise / size))
     return joined(fitness, np.array(table), weights)

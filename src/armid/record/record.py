@@ -192,6 +192,13 @@ class Record:
         return self.manoeuvre.times()
 
     @property
+    def spacing(self) -> float:
+        """Time from one measured sample to the next [s]: the interval of the grid, or a multiple of it."""
+        if self.data is None:
+            return self.manoeuvre.interval
+        return self.manoeuvre.interval * float(np.median(np.diff(np.flatnonzero(self.data))))
+
+    @property
     def constants(self) -> Mapping[str, float]:
         """Constants of the record's manoeuvre, SI."""
         return self.manoeuvre.constants

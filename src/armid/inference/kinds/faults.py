@@ -197,9 +197,10 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
     """
     found = []
     for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
-        replay, step = base.replays[i], base.data.records[i].manoeuvre.interval
+        replay, record = base.replays[i], base.data.records[i]
+        step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.measured.size)[p.samples] for p in replay.pieces])
-        found.append(-np.gradient(simulated, step) * (1.0 if fault.kind == "late" else step * samples))
+        found.append(-np.gradient(simulated, record.spacing) * (1.0 if fault.kind == "late" else step * samples))
     return found
 
 
