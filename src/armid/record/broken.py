@@ -57,8 +57,10 @@ def repeated_samples(values: Array, noise: float, known: bool, sensor: Sensor, s
     leap = max(ABOVE_NOISE * noise, LEAP * float(np.quantile(np.abs(np.diff(values)), USUAL)))
     for limit in (float(values.max()), float(values.min())):
         stretches = visits(values, limit) if abs(limit) > sensor.step else []
-        long = any(np.all(values[begin:end] == limit) for begin, end in runs(values))
-        if long and any(known or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in stretches):
+        longest = max((end - begin for begin, end in runs(values) if values[begin] == limit), default=0)
+        # noise leaves a limit for some samples where the signal reaches it; a frozen sensor has one run
+        in_noise = known and int(np.sum(values == limit)) > longest
+        if longest and any(in_noise or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in stretches):
             clipped |= values == limit
     for begin, end in runs(values):
         last = min(end, values.size - 1)

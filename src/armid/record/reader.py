@@ -13,7 +13,7 @@ from armid.model.plant import unit_ends
 from armid.record.record import Piece, Record
 from armid.record.resample import Timing, is_constant, onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
-from armid.record.signal import MOST_LOST, Signal, signal_of
+from armid.record.signal import Signal, signal_of
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
     LARGEST,
@@ -51,7 +51,7 @@ def read_record(
     driven = [table.numbers(header) for header in sources.values()]
 
     def signal(header: str, factor: float, unit: str) -> Signal:
-        most_lost = MOST_LOST if sheet.most_lost is None else sheet.most_lost
+        most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
         return signal_of(table, header, factor, times, timing, driven, unit in ("rad/s", "m/s"), campaign.unwrap,
                          most_lost)  # fmt: skip
 

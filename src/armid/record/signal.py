@@ -20,8 +20,6 @@ ROUNDING = 1e-6
 BRIDGED = 2
 # An output without a number in more than this share of the rows is no measurement of the record.
 MOST_EMPTY = 0.5
-# Share of the samples of an output that may be left out as no data; more are refused, unless a record says otherwise.
-MOST_LOST = 0.05
 WORDS = {"clipped": "are at the limit of the sensor", "stuck": "are repeated while the signal leaps",
          "spikes": "are far from their neighbours"}  # fmt: skip
 # Share of a turn that an angle which wraps spans at least.
@@ -50,7 +48,7 @@ class Signal:
 
 def signal_of(
     table: CsvTable, header: str, factor: float, times: Array, timing: Timing, inputs: Sequence[Array] = (),
-    is_speed: bool = False, unwrap: bool = False, most_lost: float = MOST_LOST,
+    is_speed: bool = False, unwrap: bool = False, most_lost: float = 0.05,
 ) -> Signal:  # fmt: skip
     """Return a column as a signal, and warn of what of it is no data.
 
