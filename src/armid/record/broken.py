@@ -16,6 +16,9 @@ REPEATED = 8
 # A sample that is so many times the noise away from the median of its four neighbours, this many times what nearly all
 # samples of the record are, and so many times what the closest three of the neighbours span: a step spans them.
 ABOVE_NOISE, ABOVE_OTHERS, USUAL, ABOVE_SPAN = 10.0, 6.0, 0.95, 3.0
+# Of the first and last samples, which have neighbours on one side, so much of the range of the signal as well: filters
+# leave small errors there.
+AT_ENDS = 0.1
 # An input that changes in one sample by so many times what it usually does, and by so much of its range, makes a signal
 # jump too (a current, say); so many samples from there on are no wild ones.
 SUDDEN, SUDDEN_SHARE, AFTER_SUDDEN = 6.0, 0.05, 4
@@ -102,7 +105,9 @@ def wild_samples(values: Array, noise: float) -> Mask:
     sides = np.sort(neighbours(values), axis=0)
     away = np.abs(values - 0.5 * (sides[1] + sides[2]))
     span = np.minimum(sides[2] - sides[0], sides[3] - sides[1])
-    usual = max(ABOVE_NOISE * noise, ABOVE_OTHERS * float(np.quantile(away, USUAL)))
+    usual = np.full(values.size, max(ABOVE_NOISE * noise, ABOVE_OTHERS * float(np.quantile(away, USUAL))))
+    ends = [0, 1, -2, -1]
+    usual[ends] = np.maximum(usual[ends], AT_ENDS * float(np.ptp(np.quantile(values, [1.0 - USUAL, USUAL]))))
     return np.asarray(away > np.maximum(usual, ABOVE_SPAN * span))
 
 

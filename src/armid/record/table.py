@@ -25,6 +25,7 @@ LARGEST = 1e30
 LONGEST_HEADER = 1 << 16
 TIME = "time_s"
 QUANTITIES = ("angular_velocity", "velocity", "time", "drive", "angle", "position")
+FURTHER = ("_rpm", "_turns", "_turns_s", "_counts", "_counts_s")
 # header of a position -> unit of the speed that it belongs to, factor; counts: see `CsvTable.factor`
 POSITIONS = {"position_m": ("m/s", 1.0), "angle_rad": ("rad/s", 1.0), "angle_deg": ("rad/s", DEGREE)}
 POSITIONS |= {"angle_turns": ("rad/s", TURN), "angle_counts": ("rad/s", np.nan)}
@@ -259,6 +260,8 @@ def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
         return next((q for q in QUANTITIES if header == q or header.startswith(f"{q}_")), header)
 
     quantities = {quantity_of(name) for name in expected}
+    # the other units of a turn make the list too long to read
+    expected = [name for name in expected if not name.endswith(FURTHER)] or expected
     alike = [name for name in table.headers if quantity_of(name) in quantities]
     wanted = " or ".join(expected) or "a name under [records.inputs]"
     if alike:
