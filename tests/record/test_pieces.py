@@ -107,10 +107,8 @@ def test_refused_windows(write, begin, end, found):
 
 def test_a_window_without_motion_or_without_a_piece_is_refused(write, write_axis, arm_columns):
     speed = np.where(arm_columns["time_s"] > 1.0, 3.0, arm_columns["angular_velocity_deg_s"])
-    folder = write(
-        f'name = "c00"\nplant = "shell_transfer_arm"\nmost_lost = 0.5\n\n{LOWERING}',
-        lower={**arm_columns, "angular_velocity_deg_s": speed},
-    )
+    toml = f'name = "c00"\nplant = "shell_transfer_arm"\nmost_lost = 0.5\n\n{LOWERING}'
+    folder = write(toml, lower={**arm_columns, "angular_velocity_deg_s": speed})
     with pytest.raises(ArmidError, match=r"lower\.csv is constant in the window"):
         read_campaign(folder).with_window(1.1, 1.2)
     with pytest.raises(ArmidError, match=r"no piece of move\.csv"):

@@ -117,7 +117,8 @@ def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[A
     changes = sum((np.append(0, np.cumsum(np.diff(x) != 0.0)) for x in inputs), np.zeros(inputs[0].size))
     still = ~new.since(changes)[new.n_rest :]
     rest = rest_between(new.motion, still, is_speed)
-    if not rest.size:
+    # equal values tell the step of the sensor alone, which the motion tells as well
+    if not rest.size or np.ptp(rest) == 0.0:
         return new.rest, noise
     noise = noise_of(rest, new.motion, new.interval, new.uneven)
     return (rest - np.mean(rest), noise) if noise.source == "rest" else (new.rest, noise)
