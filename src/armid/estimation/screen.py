@@ -263,7 +263,12 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
         return [] if best is None else [best[2].suspicion(best[1], before, best[0])]
     first = min(found, key=lambda f: f[0])[1]
     told = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in found]
-    return chosen(first, before, told)
+    suspicions = chosen(first, before, told)
+    if len(train) > 2:
+        return suspicions
+    # two records outvote each other: undone in the other one the mistake explains as much
+    doubt = f" {train[0].file} and {train[1].file} disagree: one of the two is wrong, and no third record tells which."
+    return [s if s.kind == "exchanged" else replace(s, sentence=f"{s.sentence}{doubt}") for s in suspicions]
 
 
 def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Mend]]:
