@@ -174,7 +174,8 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
     yield ContractPoint("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")
     for record in campaign.records:
         noise, n = record.noise, record.measured.size
-        text = f"{n} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
+        own = f"{n}" if record.data is None else f"{int(record.data.sum())} of {n}"
+        text = f"{own} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
         yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})")
     try:
         model = campaign.model(effects)

@@ -240,8 +240,12 @@ def disagreeing_record(fits: Sequence[Fit]) -> Suspect | None:
         if len(found) == 1:
             index, again = found[0]
             record, parts = base.data.records[index], base.data.by_record(residual_of(base, index, again.z))
-            times = base.replays[index].times
-            first, last = stretch_of(np.sum([parts[i] ** 2 for i in of_file(base, index)], axis=0))
+            # the outputs of a file may have other samples each
+            own = of_file(base, index)
+            times = np.concatenate([base.replays[i].times for i in own])
+            order = np.argsort(times, kind="stable")
+            times = times[order]
+            first, last = stretch_of(np.concatenate([parts[i] ** 2 for i in own])[order])
             kind = "push" if last - first < PUSHED * len(times) else "label"
             ends = (float(times[first]), float(times[last])) if kind == "push" else (None, None)
             return Suspect(record.file, record.role, kind, LEFT_OUT, from_s=ends[0], to_s=ends[1])
