@@ -1,7 +1,9 @@
 """Records as sensors make them: held, coarse, at several rates, with wild samples, turns, and clocks that wrap."""
 
+import os
 import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,9 @@ from armid.model import Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import RecordWarning, read_campaign
+from armid.record.resample import timing_of
+from armid.record.signal import signal_of
+from armid.record.table import read_table, time_column
 
 WHEEL = 'name = "wheel"\nplant = "{}"\nhold = "zero"\n{}\n[[records]]\nfile = "a.csv"\nrole = "train"\n'
 N, INTERVAL = 3000, 0.002
@@ -204,3 +209,29 @@ def test_what_holds_for_several_records_is_one_sentence(write):
     with pytest.warns(RecordWarning) as caught:
         read_campaign(write(toml, a=columns, b=columns))
     assert [str(w.message).partition(": ")[0] for w in caught] == ["campaign/a.csv, b.csv"]
+
+
+MEASURED = os.environ.get("ARMID_MEASURED", "")
+SETS = {
+    "cluj_bldc": (["angular_velocity_rad_s"], range(9, 13)),
+    "bam_xl330/camp": (["angular_velocity_rad_s", "angle_rad"], [1]),
+}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_of_measured_records_nothing_is_left_out(name):
+    headers, holds = SETS[name]
+    folder = Path(MEASURED) / name
+    if not MEASURED or not folder.is_dir():
+        pytest.skip("the measured files are no part of the repository: ARMID_MEASURED names the folder that holds them")
+    for file in sorted(folder.glob("*.csv")):
+        table = read_table(file, file.name)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RecordWarning)
+            times = time_column(table)
+            timing = timing_of(times, False, file.name)
+            signals = [
+                signal_of(table, header, 1.0, times, timing, is_speed="velocity" in header) for header in headers
+            ]
+        assert all(signal.broken == () for signal in signals), file.name
+        assert signals[0].sensor.hold in holds
