@@ -84,8 +84,8 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
     roles = roles_of(tables[0])
     linear = any(roles[q].end in LINEAR for q in roles if q != "time")
     if linear and "speed" not in roles:
-        raise ArmidError(f"{tables[0].where}: a position of a linear axis is there and no speed, of which no plant of "
-                         "armid tells: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
+        raise ArmidError(f"{tables[0].where}: a position of a linear axis is there and no speed, which armid has no "
+                         "plant for: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
     notes: list[str] = []
     renamed = {roles[quantity].header: header for quantity, header in new_headers(roles, linear, notes).items()}
     second = seconds_of(roles["time"], tables[0], notes)

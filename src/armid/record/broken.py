@@ -58,14 +58,15 @@ def repeated_samples(values: Array, noise: float, known: bool, sensor: Sensor, s
         return {"clipped": clipped, "stuck": stuck}
     usual = float(np.sqrt(np.mean((values[RUN_UP:] - values[:-RUN_UP]) ** 2)))
     leap = max(ABOVE_NOISE * noise, LEAP * float(np.quantile(np.abs(np.diff(values)), USUAL)))
+    repeated = runs(values)
     for limit in (float(values.max()), float(values.min())):
         stretches = visits(values, limit) if abs(limit) > sensor.step else []
-        longest = max((end - begin for begin, end in runs(values) if values[begin] == limit), default=0)
+        longest = max((end - begin for begin, end in repeated if values[begin] == limit), default=0)
         # noise leaves a limit for some samples where the signal reaches it; a frozen sensor has one run
         in_noise = known and int(np.sum(values == limit)) > longest
         if longest and any(in_noise or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in stretches):
             clipped |= values == limit
-    for begin, end in runs(values):
+    for begin, end in repeated:
         last = min(end, values.size - 1)
         away = abs(float(values[last] - values[begin]))
         left_behind = known or (away > leap and not sudden[last])
@@ -90,9 +91,9 @@ def is_abrupt(values: Array, begin: int, end: int, least: float) -> bool:
 
 def runs(values: Array) -> list[tuple[int, int]]:
     """Return first row and end of the runs of equal values that are too long for a chance."""
-    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
-    each = zip([0, *edges.tolist()], [*edges.tolist(), values.size], strict=True)
-    return [(begin, end) for begin, end in each if end - begin >= REPEATED]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [values.size]])
+    long = np.flatnonzero(np.diff(edges) >= REPEATED)
+    return list(zip(edges[long].tolist(), edges[long + 1].tolist(), strict=True))
 
 
 def wild_samples(values: Array, noise: float) -> Mask:

@@ -161,7 +161,7 @@ def read_campaign(
     entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
     places = [f"{where}, record {quoted(entry.file)}" for entry in entries]
     paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
-    with told_once():
+    with warned_once():
         records = [read_record(path, folder, entry, sheet, declared, at)
                    for path, entry, at in zip(paths, entries, places, strict=True)]  # fmt: skip
     for record in records if declared.records_one_speed else ():
@@ -241,7 +241,7 @@ def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Map
 
 
 @contextmanager
-def told_once() -> Iterator[None]:
+def warned_once() -> Iterator[None]:
     """Warn of what holds for several records once, with their names; numbers are those of the first."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RecordWarning)

@@ -30,7 +30,7 @@ UNLIKE_SLOW_MOTION = 0.2
 class Sensor:
     """Hold what the values of one output tell of its sensor.
 
-    step: of which all values are multiples [unit of the output], 0 for a fine one. hold: samples from one renewal of
+    step: all values are multiples of it [unit of the output], 0 for a fine one. hold: samples from one renewal of
     the value to the next, 1 where each sample is new.
     """
 
@@ -44,7 +44,7 @@ def sensor_of(values: Array) -> Sensor:
 
 
 def step_of(values: Array) -> float:
-    """Return the step [unit] of which all differences of values are multiples, 0 for a fine sensor.
+    """Return the step [unit] that all differences of values are multiples of, 0 for a fine sensor.
 
     The gaps between neighbouring levels count a few steps each, so that their sum over their counts is the step to
     the last digit, however the numbers were printed.
