@@ -55,9 +55,11 @@ def cells_of(text: str, wide: bool, file: str) -> Cells:
     """Return the cells of a file with what had to be assumed. Raises ArmidError where two ways to read it are left."""
     numbered = [(number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip()]
     comments = [(number, line) for number, line in numbered if line.lstrip().startswith(COMMENTS)]
-    kept = [pair for pair in numbered if pair not in set(comments)] if comments else numbered
+    kept = [(number, line) for number, line in numbered if not line.lstrip().startswith(COMMENTS)]
+    if not kept:
+        check_names([], 1, file)
     assumed = ["UTF-16"] if wide else []
-    separator = separator_of(kept, comments, file)
+    separator = separator_of(kept, file)
     split = [(number, cells_in(line, separator, f"{file}, line {number}")) for number, line in kept]
     header_line, names = split[0]
     body = split[1:]
@@ -120,10 +122,8 @@ def pandas_line(arguments: str = 'sep=";", decimal=","') -> str:
     return f"pandas.read_csv(FILE, {arguments}).to_csv(FILE, index=False)"
 
 
-def separator_of(kept: Sequence[tuple[int, str]], comments: Sequence[tuple[int, str]], file: str) -> str:
+def separator_of(kept: Sequence[tuple[int, str]], file: str) -> str:
     """Return what separates the columns: what cuts the header, and every row into as many cells."""
-    if not kept:
-        return ","
     number, header = kept[0]
     present = [s for s in SEPARATORS if s in header]
     fitting = [s for s in present if fits(kept, s)]
