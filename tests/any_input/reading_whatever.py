@@ -12,7 +12,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from armid.errors import LONGEST, ArmidError
-from armid.record import Campaign, IrregularSamplingWarning, read_campaign
+from armid.record import Campaign, RecordWarning, read_campaign
 from input_texts import LOWERING
 
 ARM_TOML = f"""name = "c00"
@@ -73,10 +73,10 @@ def outcome(work):
 
 
 def read_whatever(toml, csv):
-    """Read a campaign of these bytes; every warning but of irregular sampling and of values far outside is an error."""
+    """Read a campaign of these bytes; every warning but of records and of values far outside is an error."""
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.simplefilter("ignore", IrregularSamplingWarning)
+        warnings.simplefilter("ignore", RecordWarning)
         warnings.filterwarnings("ignore", ".*far outside the declared range")
         (Path(name) / "campaign.toml").write_bytes(toml)
         (Path(name) / "lower.csv").write_bytes(csv)

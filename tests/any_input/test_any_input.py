@@ -74,6 +74,9 @@ def test_any_increasing_times(steps, unit, size):
 
 @many(120)
 @given(st.binary(max_size=300), st.binary(max_size=300))
+@example(b"", b"#")
+@example(b"", b"\xff\xfe")
+@example(b"", b"\xff\xfea")
 def test_any_bytes(toml, csv):
     read_whatever(toml, ARM_CSV.encode())
     read_whatever(ARM_TOML.encode(), csv)

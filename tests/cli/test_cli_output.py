@@ -185,5 +185,5 @@ def test_a_warning_of_no_record_is_told_once_and_not_as_that_of_a_file(capsys):
     tell_more(seen)
     assert capsys.readouterr().err.splitlines() == [
         "armid: warning: tables are in pieces", "armid: warning: c/a.csv: late by 1 ms",
-        "armid: warning: as of c/a.csv, so of c/b.csv",
+        "armid: warning: what holds for c/a.csv holds for c/b.csv too",
     ]  # fmt: skip

@@ -62,11 +62,14 @@ def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path) -> None:
     columns = dict(read_table(folder / "b.csv", "b.csv").columns)
     columns["load_angle_deg"][60:260] = columns["load_angle_deg"][60]
     write_table(folder / "b.csv", columns)
+    toml = folder / "campaign.toml"
+    toml.write_text(f"most_lost = 0.5\n{toml.read_text()}")
     read = read_campaign(folder, {"two_inertias": two_inertias})
     model = Model(read.plant)
     found = with_starts(replays(read.train, model, space_of(model)), WHOLE)[3]
     assert found.pieces[0].manoeuvre.constants["start_load"] == pytest.approx(0.25, abs=0.03)
-    residual = (found.measured - found.signal(WHOLE[np.newaxis])[0])[260:]
+    assert len(found.measured) == len(columns["load_angle_deg"]) - 200
+    residual = (found.measured - found.signal(WHOLE[np.newaxis])[0])[60:]
     assert np.sqrt(np.mean(residual**2)) == pytest.approx(NOISE_ANGLE, rel=0.1)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from armid.record.noise import difference_rms, noise_of, quantisation_step, smallest_step
+from armid.record.noise import difference_rms, noise_of, rest_between
 
 INTERVAL = 0.001
 MOTION = np.sin(3 * np.arange(2000) * INTERVAL) * 2.5
@@ -52,10 +52,12 @@ def test_coloured_rest(rng, time_constant):
     assert noise.effective_fraction == pytest.approx((1 - phi) / (1 + phi), rel=0.1)
 
 
-def test_a_silent_rest_is_noise_free_but_for_the_steps_of_a_coarse_signal():
+def test_a_silent_rest_has_the_noise_of_the_steps_of_the_signal():
     for level in (0.0, 0.1):
         noise = noise_of(np.full(100, level), MOTION, INTERVAL)
-        assert (noise.rms, noise.correlation_time_s, noise.effective_fraction) == (0.0, 0.0, 1.0)
+        assert (noise.correlation_time_s, noise.effective_fraction) == (0.0, 1.0)
+        # the rounding of the largest value is left
+        assert 0.0 < noise.rms < 1e-15
         assert noise.mean == pytest.approx(level)
     noise = noise_of(np.zeros(100), np.round(MOTION, 2), INTERVAL)
     assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
@@ -87,8 +89,20 @@ def test_differences_of_a_smooth_motion_vanish_and_of_a_coarse_one_are_its_steps
     assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
 
 
-def test_steps(rng):
-    assert quantisation_step(np.round(MOTION, 2)) == pytest.approx(0.01)
-    assert quantisation_step(MOTION) == 0.0
-    assert quantisation_step(rng.normal(size=500)) == 0.0
-    assert quantisation_step(np.ones(10)) == smallest_step(np.ones(10)) == 0.0
+def test_a_rest_between_motions_tells_the_noise_where_the_input_is_still_too(rng):
+    still = np.zeros(3000, dtype=bool)
+    still[1000:1800] = True
+    speed = np.where(still, 0.0, 3.0 * np.sin(np.arange(3000) / 40.0))
+    # the machine runs down first
+    speed[1000:1200] = 2.0 * np.exp(-np.arange(200) / 20.0)
+    measured = speed + rng.normal(0.02, 0.005, 3000)
+    rest = rest_between(measured, still, True)
+    assert rest.size >= 200
+    assert np.std(rest) == pytest.approx(0.005, rel=0.2)
+    noise = noise_of(rest, measured, INTERVAL)
+    assert (noise.source, noise.mean) == ("rest", pytest.approx(0.02, abs=2e-3))
+    # under drive a stick is no rest, an even speed is no standstill, and a still input does not hold a machine
+    assert rest_between(measured, np.zeros(3000, dtype=bool), True).size == 0
+    assert rest_between(measured + 1.0, still, True).size == 0
+    assert rest_between(3.0 * np.sin(np.arange(3000) / 40.0), still, True).size == 0
+    assert rest_between(measured + 1.0, still, False).size >= 200

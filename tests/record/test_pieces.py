@@ -6,6 +6,7 @@ import pytest
 from armid.errors import ArmidError
 from armid.record import read_campaign
 from armid.record.start import Track, smoothed, state_at
+from input_texts import LOWERING
 
 TIMES = np.arange(1500) / 500
 MOTION = 3.0 * np.sin(8.0 * TIMES) + 0.5 * np.sin(25.0 * TIMES)
@@ -106,7 +107,8 @@ def test_refused_windows(write, begin, end, found):
 
 def test_a_window_without_motion_or_without_a_piece_is_refused(write, write_axis, arm_columns):
     speed = np.where(arm_columns["time_s"] > 1.0, 3.0, arm_columns["angular_velocity_deg_s"])
-    folder = write(lower={**arm_columns, "angular_velocity_deg_s": speed})
+    toml = f'name = "c00"\nplant = "shell_transfer_arm"\nmost_lost = 0.5\n\n{LOWERING}'
+    folder = write(toml, lower={**arm_columns, "angular_velocity_deg_s": speed})
     with pytest.raises(ArmidError, match=r"lower\.csv is constant in the window"):
         read_campaign(folder).with_window(1.1, 1.2)
     with pytest.raises(ArmidError, match=r"no piece of move\.csv"):

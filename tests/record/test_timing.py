@@ -116,10 +116,12 @@ def test_noise_stays_white_on_the_grid():
     with pytest.warns(IrregularSamplingWarning):
         timing = timing_of(times, False, "x.csv")
     assert timing.n_samples == times.size
-    noise = moved_onto_grid(rng.normal(size=times.size), times, timing)
+    every = np.ones(times.size, dtype=bool)
+    noise, data = moved_onto_grid(rng.normal(size=times.size), times, timing, every)
+    assert data.all()
     assert np.std(noise) == pytest.approx(1.0, abs=0.02)
     assert abs(np.mean(noise[1:] * noise[:-1])) < 0.03
-    moved = moved_onto_grid(np.sin(9.0 * times), times, timing)
+    moved, _ = moved_onto_grid(np.sin(9.0 * times), times, timing, every)
     grid = timing.start + timing.interval * np.arange(timing.n_samples)
     # a line between two rows is off by 9^2 0.005^2 / 8
     np.testing.assert_allclose(moved, np.sin(9.0 * grid), atol=1.3e-4)

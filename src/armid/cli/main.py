@@ -89,7 +89,7 @@ def tell_more(seen: dict[str, list[str]]) -> None:
     for first, *others in seen.values():
         if others:
             more = f", and {len(others) - MOST_MORE} more" if len(others) > MOST_MORE else ""
-            tell(f"armid: warning: as of {first}, so of {', '.join(others[:MOST_MORE])}{more}")
+            tell(f"armid: warning: what holds for {first} holds for {', '.join(others[:MOST_MORE])}{more} too")
 
 
 def main(arguments: list[str] | None = None) -> None:

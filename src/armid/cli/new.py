@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.cli.options import command, examples, give, say
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, nearest, quoted
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
 from armid.registry import load_registry
@@ -49,15 +49,21 @@ DIGITS = 6
     help="Of an identifier: function, for any optimiser that is no algorithm of pymoo (scipy, nevergrad).",
 )  # fmt: skip
 @click.option(
+    "--from", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+    help="Of a campaign: a CSV file of yours, as often as there are; what its columns are is guessed.",
+)  # fmt: skip
+@click.option(
     "--out", default=".", show_default="this folder", type=click.Path(path_type=Path), metavar="FOLDER",
     help="Folder to write to.",
 )  # fmt: skip
-def new_command(kind: str, name: str, style: str, out: Path) -> None:
+@click.argument("more", nargs=-1, type=click.Path(path_type=Path), metavar="[FILE]...")
+def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: Path, more: tuple[Path, ...]) -> None:
     """Write a commented starting file of your own that passes `armid check`.
 
     An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
     NAME. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
-    say so. Nothing that exists is overwritten.
+    say so; with --from FILE... it has copies of your records, and a comment at each guess. Nothing that exists is
+    overwritten.
     """
     from armid.record import write_campaign
 
@@ -65,6 +71,11 @@ def new_command(kind: str, name: str, style: str, out: Path) -> None:
         raise ArmidError(f"kind '{kind}' is not known: {nearest(kind, KINDS)}")
     if style and (kind, style) not in STYLES:
         raise ArmidError(f"--style '{style}' of kind '{kind}': an identifier has the style 'function'")
+    if (files or more) and kind != CAMPAIGN:
+        raise ArmidError(f"--from of kind '{kind}': records are expected of a campaign alone")
+    if more and not files:
+        raise ArmidError(f"{quoted(str(more[0]))} stands behind the name: --from before the files of a campaign is "
+                         "expected")  # fmt: skip
     template = STYLES.get((kind, style), kind)
     taken = set(getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else ())
     if kind == "analysis":
@@ -76,7 +87,11 @@ def new_command(kind: str, name: str, style: str, out: Path) -> None:
     if os.path.lexists(target):
         raise ArmidError(f"{target} exists already: another name, or another folder by --out, is expected")
     if kind == CAMPAIGN:
-        write_campaign(target, campaign_text(name), synthetic_records())
+        from armid.cli.guess import guessed_campaign
+
+        records = [*files, *more]
+        text, tables = guessed_campaign(name, records) if records else (campaign_text(name), synthetic_records())
+        write_campaign(target, text, tables)
     else:
         with NewFiles(out) as new_files:
             new_files.path(target.name).write_text(python_file(template, name), encoding="utf-8")

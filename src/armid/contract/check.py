@@ -174,7 +174,8 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
     yield ContractPoint("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")
     for record in campaign.records:
         noise, n = record.noise, record.measured.size
-        text = f"{n} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
+        own = f"{n}" if record.data is None else f"{int(record.data.sum())} of {n}"
+        text = f"{own} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
         yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})")
     try:
         model = campaign.model(effects)
@@ -205,7 +206,13 @@ def replay_at(candidate: Array, record: Record, model: Model) -> Replay:
 
 
 def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:
-    wrong = [ContractPoint(f"plausible ({s.kind})", s.kind == "unjudged", s.sentence) for s in found]
+    alike: dict[tuple[str, str], list[str]] = {}
+    for s in found:
+        # what holds for several records is one sentence with their names
+        of_record, said = s.sentence.startswith(f"{s.record}: "), s.sentence.removeprefix(f"{s.record}: ")
+        alike.setdefault((s.kind, said), []).extend([s.record] if of_record else [])
+    wrong = [ContractPoint(f"plausible ({kind})", kind == "unjudged", f"{', '.join(files)}: {said}" if files else said)
+             for (kind, said), files in alike.items()]  # fmt: skip
     right = "no sign, unit, clock or manoeuvre of a record looks wrong, as far as the declared model can tell"
     return wrong or [ContractPoint("plausible", True, right)]
 

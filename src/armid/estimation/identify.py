@@ -236,7 +236,7 @@ def versions_of(packages: Sequence[str]) -> dict[str, str]:
 def record_errors(replay: Replay, candidate: Array) -> Errors:
     measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])
     square = float(mean_square(measured, simulated)[0])
-    noise, interval = replay.record.noise.rms, replay.pieces[0].manoeuvre.interval
+    noise, interval = replay.record.noise.rms, replay.record.spacing
     s, s1, s2 = (float(v[0]) for v in similarity(measured, simulated, interval, noise=noise))
     chi2 = float(chi_square(measured, simulated, noise)[0]) / len(measured) if noise > 0.0 else None
     if s2 < SHAPE_FALLS and s1 > NUMBERS_AGREE and chi2 is not None and chi2 < MISFIT:

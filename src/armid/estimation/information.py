@@ -175,22 +175,23 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
     """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,)."""
     candidate = records.whole(z[np.newaxis])
     for outputs in by_file(records.replays):
-        replay, row = outputs[0], 0
+        replay, rows = outputs[0], dict.fromkeys(outputs, 0)
         # a speed held for a second is the size of a position
         move = 1e-4 * replay.model.plant.scales.speed
-        for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
+        for index, (piece, calibration) in enumerate(zip(replay.pieces, replay.calibrations, strict=True)):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
                 start = piece.manoeuvre.constants.get(name, 0.0)
                 either = (with_constants(piece, {name: start + side}).manoeuvre for side in (move, -move))
                 above, below = (simulate(replay.model, m, candidate, calibration.schedule).outputs[:, 0]
                                 for m in either)  # fmt: skip
                 changes = [np.zeros(r.record.n_samples) for r in records.replays]
-                slopes = (above - below)[:, piece.window] / (2.0 * move)
+                slopes = (above - below) / (2.0 * move)
                 for change, r in zip(changes, records.replays, strict=True):
                     if r in outputs:
-                        change[row : row + piece.n_samples] = deviation * slopes[r.place]
+                        own = r.pieces[index]
+                        change[rows[r] : rows[r] + own.n_samples] = deviation * slopes[r.place, own.samples]
                 yield records.weighted(changes)
-            row += piece.n_samples
+            rows = {r: row + r.pieces[index].n_samples for r, row in rows.items()}
 
 
 def inverse(matrix: Array) -> Array:

@@ -46,6 +46,8 @@ N_LIKELY, N_HARD, N_BEST = 5, 512, 8
 MOST_VALUES, MOST_APART = 2**24, 6
 # What fits nearly as well is looked for at so many candidates each within these shares of the ranges.
 N_NEAR, NEAR = 64, (0.001, 0.003, 0.01)
+# Kinds of suspicion that name both records, or that the model has against one whatever the other says.
+SURE = ("exchanged", "unlike", "unjudged")
 # Train records up to so many are few; samples that two of them must have in common to be exchanged.
 FEW, FEWEST_COMMON = 3, 100
 # Share of a signal by which a simulation may change when samples of a long record are left out.
@@ -70,6 +72,7 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
     """
+    campaign = replace(campaign, records=tuple(r.filled for r in campaign.records))
     seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
     seen += list(given_twice(campaign.records))
     noise = {s.record for s in seen if s.kind == "noise"}
@@ -80,6 +83,7 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
     trial = Trial(model, space).scaled(train)
     train = [trial.thinned(r, len(train)) for r in train]
     found, z = mistakes(trial, train)
+    found = of_two(found, train)
     errors = trial.errors(train, z)[0]
     if not found:
         n = len(campaign.holdout)
@@ -263,6 +267,14 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
     first = min(found, key=lambda f: f[0])[1]
     told = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in found]
     return chosen(first, before, told)
+
+
+def of_two(found: Sequence[Suspicion], train: Sequence[Record]) -> list[Suspicion]:
+    """Return suspicions, where those against one of two train records say that it may as well be the other."""
+    if len(train) != 2:
+        return list(found)
+    doubt = f" {train[0].file} and {train[1].file} disagree: one of the two is wrong, and no third record tells which."
+    return [replace(s, sentence=f"{s.sentence}{doubt}") if s.record and s.kind not in SURE else s for s in found]
 
 
 def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Mend]]:

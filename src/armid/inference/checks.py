@@ -133,7 +133,7 @@ class Residuals:
             for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
                 found = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
                 for n in names:
-                    parts[n].append(found[n][piece.window])
+                    parts[n].append(found[n][piece.samples])
         return {n: np.concatenate(p) for n, p in parts.items()}
 
     @cached_property
@@ -142,7 +142,7 @@ class Residuals:
         found: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
             runs = (zip(r.pieces, r.runs(self.candidate[np.newaxis]), strict=True) for r in self.replays)
-            after = np.concatenate([piece.manoeuvre.times()[piece.window] >= run.switch_times[name][0]
+            after = np.concatenate([piece.manoeuvre.times()[piece.samples] >= run.switch_times[name][0]
                                     for piece, run in chain.from_iterable(runs)])  # fmt: skip
             found |= {f"before '{name}'": ~after, f"after '{name}'": after}
         return {n: samples for n, samples in found.items() if samples.any()}
@@ -327,7 +327,7 @@ def time_tests(seen: Residuals) -> Iterator[Finding]:
         return
     parts, hum = seen.renewed, [sum(ends) / 2.0 for ends in mains_hum(seen)]
     if hum:
-        parts = [without_lines(p, hum, r.manoeuvre.interval) for p, r in zip(parts, seen.data.records, strict=True)]
+        parts = [without_lines(p, hum, r.spacing) for p, r in zip(parts, seen.data.records, strict=True)]
     lags = min(LAGS, *(len(p) // 4 for p in parts))
     total = 0.0
     for deviations in (p - np.mean(p) for p in parts):
@@ -415,7 +415,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
 
 def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
     """Return the stretches of frequency, (low, high) [Hz], in which the rests show the mains or a harmonic of it."""
-    rests = [(r.rest - np.mean(r.rest), r.manoeuvre.interval) for r in seen.data.records if r.noise.source == "rest"]
+    rests = [(r.rest - np.mean(r.rest), r.spacing) for r in seen.data.records if r.noise.source == "rest"]
     if not rests:
         return []
     width = BESIDE / min(len(x) * step for x, step in rests)
@@ -449,7 +449,7 @@ def spectra(
     for record, level, signal in zip(seen.data.records, seen.data.levels, signals, strict=True):
         taper = np.hanning(len(signal) + 2)[1:-1]
         power = np.abs(np.fft.rfft(signal * taper)[1:-1]) ** 2 / float(taper @ taper) / level.rms**2
-        frequency = np.fft.rfftfreq(len(signal), record.manoeuvre.interval)[1:-1]
+        frequency = np.fft.rfftfreq(len(signal), record.spacing)[1:-1]
         kept = ~np.any([(low < frequency) & (frequency < high) for low, high in without] or [frequency < 0.0], axis=0)
         bands = np.searchsorted(BANDS_HZ, frequency[kept], side="right") - 1
         for band, value in zip(bands, power[kept], strict=True):

@@ -218,7 +218,7 @@ class Probe:
         run = self.run(segment, size, segment.knots, float(segment.knots[1] - segment.knots[0]))
         pairs, correction = zip(segment.replays, segment.levels, strict=True), segment.piece.correction
         outputs = run.outputs if correction is None else correction.corrected(run.outputs)
-        seen = ((outputs[r.place][:, r.pieces[segment.index].window], level) for r, level in pairs)
+        seen = ((outputs[r.place][:, r.pieces[segment.index].samples], level) for r, level in pairs)
         return np.concatenate([(output[1:] - output[0]).T / size / level for output, level in seen])
 
 

@@ -20,7 +20,6 @@ from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.model import Array, Plant
 from armid.problem.problem import Replay, signals_of
 from armid.record import Record
-from armid.record.broken import sound_samples
 from armid.record.noise import correlation_sum, new_share
 
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
@@ -319,12 +318,17 @@ def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] =
 
 
 def soundness(record: Record, reach: int) -> Array:
-    """Return 0 for each sample in the windows of a record that is no data, and for as many behind it, else 1."""
-    broken = ~sound_samples(record)
-    for _ in range(reach):
-        broken[1:] |= broken[:-1]
-    places = [np.arange(p.window.start, p.window.stop) + p.start_index for p in record.pieces]
-    return np.where(broken[np.concatenate(places)], 0.0, 1.0)
+    """Return 0 for the samples of a record behind some that are no data, as far as the filter of the noise reaches."""
+    sound = []
+    for piece in record.pieces:
+        apart = np.diff(np.arange(piece.measured.size)[piece.samples])
+        # of a sensor that holds its value, or comes rarely, the usual distance is no gap
+        near = np.append(True, apart <= 1.5 * np.median(apart)) if apart.size else np.ones(piece.n_samples, np.bool_)
+        unsound = ~near
+        for _ in range(reach - 1):
+            unsound[1:] |= unsound[:-1]
+        sound.append(np.where(unsound & (reach > 0), 0.0, 1.0))
+    return np.concatenate(sound)
 
 
 def with_samples(replay: Replay, values: Array) -> Replay:
@@ -332,7 +336,7 @@ def with_samples(replay: Replay, values: Array) -> Replay:
     pieces, first = [], 0
     for piece in replay.pieces:
         measured = piece.measured.copy()
-        measured[piece.window] = values[first : first + piece.n_samples]
+        measured[piece.samples] = values[first : first + piece.n_samples]
         pieces.append(replace(piece, measured=measured))
         first += piece.n_samples
     return replace(replay, pieces=tuple(pieces))

@@ -200,7 +200,7 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]])
 
 def autocorrelation_figure(found: ClosedLoop) -> Any:
     figure, axis = pyplot().subplots(figsize=(6.8, 3.6), layout="constrained")
-    interval = found.campaign.train[0].manoeuvre.interval
+    interval = found.campaign.train[0].spacing
     for judged, (name, colour, _) in zip((found.before, found.after), LOOKS, strict=True):
         values = correlation(judged.train)
         axis.plot(1e3 * interval * np.arange(len(values)), values, color=colour, lw=1.6, label=name)

@@ -32,7 +32,6 @@ from armid.inference.whitening import WhiteRecords
 from armid.loop.fit import FAMILYWISE
 from armid.model import Array, Plant
 from armid.record import Record
-from armid.record.broken import broken_samples
 from armid.units import shown
 
 FREED, LEFT_OUT, REPORTED = "freed", "left_out", "reported"
@@ -241,8 +240,12 @@ def disagreeing_record(fits: Sequence[Fit]) -> Suspect | None:
         if len(found) == 1:
             index, again = found[0]
             record, parts = base.data.records[index], base.data.by_record(residual_of(base, index, again.z))
-            times = base.replays[index].times
-            first, last = stretch_of(np.sum([parts[i] ** 2 for i in of_file(base, index)], axis=0))
+            # the outputs of a file may have other samples each
+            own = of_file(base, index)
+            times = np.concatenate([base.replays[i].times for i in own])
+            order = np.argsort(times, kind="stable")
+            times = times[order]
+            first, last = stretch_of(np.concatenate([parts[i] ** 2 for i in own])[order])
             kind = "push" if last - first < PUSHED * len(times) else "label"
             ends = (float(times[first]), float(times[last])) if kind == "push" else (None, None)
             return Suspect(record.file, record.role, kind, LEFT_OUT, from_s=ends[0], to_s=ends[1])
@@ -260,7 +263,7 @@ def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
     """Return the samples that are no data, which were left out."""
     return [
         Suspect(record.file, record.role, b.kind, LEFT_OUT, float(b.count), "samples", None, None, b.from_s, b.to_s)
-        for record in (one for r in records for one in r.each) for b in broken_samples(record)
+        for record in (one for r in records for one in r.each) for b in record.broken
     ]  # fmt: skip
 
 

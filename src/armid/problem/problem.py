@@ -33,8 +33,9 @@ class Replay:
         return [run if c is None else replace(run, outputs=c.corrected(run.outputs)) for run, c in pairs]
 
     def seen(self, runs: Sequence[Simulation]) -> Array:
-        pairs = ((piece.window, run.outputs[self.place]) for piece, run in zip(self.pieces, runs, strict=True))
-        parts = [signal[:, window] if window.start else signal for window, signal in pairs]
+        pairs = ((piece, run.outputs[self.place]) for piece, run in zip(self.pieces, runs, strict=True))
+        parts = [signal if piece.data is None and not piece.window.start else signal[:, piece.samples]
+                 for piece, signal in pairs]  # fmt: skip
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def signal(self, candidates: Array) -> Array:
@@ -74,11 +75,11 @@ class Replay:
 
     @property
     def measured(self) -> Array:
-        return np.concatenate([p.measured[p.window] for p in self.pieces])
+        return np.concatenate([p.measured[p.samples] for p in self.pieces])
 
     @property
     def times(self) -> Array:
-        return np.concatenate([p.manoeuvre.times()[p.window] for p in self.pieces])
+        return np.concatenate([p.manoeuvre.times()[p.samples] for p in self.pieces])
 
     @property
     def engine_error(self) -> float:
@@ -242,7 +243,7 @@ def fitness_of(
     """Return the joined fitness of the signals of each record, (n_candidates,); sizes: see `output_sizes`."""
     table = []
     for replay, x, signal, size in zip(replays, measured, signals, sizes, strict=True):
-        interval, noise = replay.pieces[0].manoeuvre.interval, replay.record.noise.rms
+        interval, noise = replay.record.spacing, replay.record.noise.rms
         pair = (x, signal) if size == 1.0 else (x / size, signal / size)
         table.append(fitness(pair[0], pair[1], interval, noise / size))
     return joined(fitness, np.array(table), weights)

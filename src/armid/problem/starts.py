@@ -18,7 +18,6 @@ from armid.model import Array
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Piece
-from armid.record.broken import sound_samples
 from armid.record.noise import correlation_sum
 from armid.record.record import StartCorrection
 
@@ -103,16 +102,14 @@ class Start:
 
     @cached_property
     def weights(self) -> Array:
-        """1/noise of each sample in the windows, the outputs one behind the other, (n_seen,); 0 where it is no data."""
+        """1/noise of each sample that is seen, the outputs one behind the other, (n_seen,)."""
         sizes = self.outputs[0].model.plant.sizes
         noise = [max(r.record.noise.rms, LEAST_NOISE * sizes[r.place]) for r in self.outputs]
-        windows = [np.arange(p.window.start, p.window.stop) + p.start_index for p in self.pieces]
-        sound = np.concatenate([sound_samples(r.record)[w] for r, w in zip(self.outputs, windows, strict=True)])
-        return np.where(sound, np.repeat(1.0 / np.array(noise), [len(w) for w in windows]), 0.0)
+        return np.repeat(1.0 / np.array(noise), [p.n_samples for p in self.pieces])
 
     @cached_property
     def measured(self) -> Array:
-        return np.concatenate([p.measured[p.window] for p in self.pieces])
+        return np.concatenate([p.measured[p.samples] for p in self.pieces])
 
     def signals(self, starts: Array, population: Array) -> Array:
         """Return the outputs of the file, each candidate from its own start, (n_outputs, n_candidates, n_samples)."""
@@ -125,7 +122,7 @@ class Start:
     def seen(self, signals: Array) -> Array:
         """Return what is seen in the windows over the noise, the outputs one behind the other, (n_candidates, n)."""
         pairs = zip(signals, self.pieces, strict=True)
-        return np.asarray(self.weights * np.concatenate([signal[:, piece.window] for signal, piece in pairs], axis=1))
+        return np.asarray(self.weights * np.concatenate([signal[:, piece.samples] for signal, piece in pairs], axis=1))
 
     def residual(self, signals: Array) -> Array:
         return np.asarray(self.weights * self.measured - self.seen(signals))
@@ -158,7 +155,7 @@ class Start:
         What a model lacks is alike in neighbours: these are one witness against the reader's start, and not many.
         """
         rest = self.beyond(residual, slopes)
-        square = float(np.sum(rest**2)) / max(int(np.count_nonzero(self.weights)), 1)
+        square = float(np.sum(rest**2)) / max(rest.size, 1)
         return max(square, 1.0) * (1.0 + 2.0 * correlation_sum(rest))
 
     def answer(self, constants: Array, slopes: Array, misfit: float) -> tuple[Array, Array]:
@@ -194,8 +191,8 @@ class Start:
         if not np.isfinite(slopes).all():
             return pieces
         gain, offset = self.answer(constants, self.seen_slopes(slopes)[:, 0], misfit)
-        places, window = tuple(r.place for r in self.outputs), pieces[0].window
-        correction = StartCorrection(places, slopes[:, :, 0], gain * self.weights, offset, self.measured, window)
+        places, samples = tuple(r.place for r in self.outputs), tuple(p.samples for p in pieces)
+        correction = StartCorrection(places, slopes[:, :, 0], gain * self.weights, offset, self.measured, samples)
         start = dict(zip(self.names, map(float, constants), strict=True))
         manoeuvre = replace(pieces[0].manoeuvre, constants={**pieces[0].manoeuvre.constants, **start})
         return [replace(piece, manoeuvre=manoeuvre, correction=correction) for piece in pieces]

@@ -8,18 +8,21 @@ table     CSV files of numbers, and what their headers mean
 resample  even time grids out of the times of a file; which samples count
 start     the state from which a record or a piece of it is simulated
 noise     the noise of a sensor, from rest or from the motion itself
-broken    samples that are no data: gaps, clipped and repeated ones, spikes
+dialect   CSV files with other separators, decimals, comments, units, encodings
+sensor    step and hold of a sensor, from the values as they were read
+signal    one measured column: which rows are data, its noise, its turns
+broken    samples that are no data: clipped and repeated ones, wild ones
 record    Record (one output of one file), Piece, Noise, Irregularity: what all of that is put into
 importers public measured sets as campaigns: EMPS, and DFKI's pendulum
 """
 
 from armid.record.campaign import Campaign, read_campaign, write_campaign
-from armid.record.record import Irregularity, Noise, Piece, Record
+from armid.record.record import Irregularity, Noise, Piece, Record, RecordWarning
 from armid.record.resample import IrregularSamplingWarning
 from armid.record.schema import Override
 from armid.record.table import write_table
 
 __all__ = [
-    "Campaign", "IrregularSamplingWarning", "Irregularity", "Noise", "Override", "Piece", "Record", "read_campaign",
-    "write_campaign", "write_table",
+    "Campaign", "IrregularSamplingWarning", "Irregularity", "Noise", "Override", "Piece", "Record", "RecordWarning",
+    "read_campaign", "write_campaign", "write_table",
 ]  # fmt: skip

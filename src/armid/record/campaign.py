@@ -1,8 +1,10 @@
 """The records of one machine, each to train on or to hold out."""
 
 import os.path
+import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,8 +17,8 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
-from armid.record.reader import NAME, campaign_path, gravity_of, read_record, record_path
-from armid.record.record import Record
+from armid.record.reader import NAME, SUFFIX, campaign_path, gravity_of, read_record, record_path
+from armid.record.record import Record, RecordWarning
 from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Override, RecordSheet, load_toml, unknown_name, validated
 from armid.record.table import write_table
@@ -132,8 +134,9 @@ def read_campaign(
 
     Warns
     -----
-    IrregularSamplingWarning
-        For a record that is resampled for its uneven times.
+    RecordWarning
+        Of what was assumed to read a file, and of samples that are no data. IrregularSamplingWarning, one of its kind:
+        for a record that is resampled for its uneven times.
 
     Raises
     ------
@@ -158,8 +161,9 @@ def read_campaign(
     entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
     places = [f"{where}, record {quoted(entry.file)}" for entry in entries]
     paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
-    records = [read_record(path, folder, entry, sheet, declared, at)
-               for path, entry, at in zip(paths, entries, places, strict=True)]  # fmt: skip
+    with warned_once():
+        records = [read_record(path, folder, entry, sheet, declared, at)
+                   for path, entry, at in zip(paths, entries, places, strict=True)]  # fmt: skip
     for record in records if declared.records_one_speed else ():
         if record.unit != records[0].unit:
             raise ArmidError(f"{folder}{record.file}: the speed is in {record.unit}, {records[0].unit} is expected "
@@ -234,6 +238,27 @@ def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Map
     except OSError as error:
         raise ArmidError(f"{quoted(str(out))} cannot be written: {error.strerror or error}") from error
     return folder
+
+
+@contextmanager
+def warned_once() -> Iterator[None]:
+    """Warn of what holds for several records once, with their names; numbers are those of the first."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RecordWarning)
+        yield
+    alike: dict[str, list[tuple[str, str, type[Warning]]]] = {}
+    for warning in caught:
+        file, _, said = str(warning.message).partition(f"{SUFFIX}: ")
+        key = re.sub(r"\d[\d.e+-]*", "", said)
+        alike.setdefault(key, []).append((f"{file}{SUFFIX}", said, warning.category))
+    for (first, said, category), *others in alike.values():
+        names = [file.rpartition("/")[2] for file, _, _ in others]
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        if all(also == said for _, also, _ in others):
+            sentence = f"{', '.join([first, *names[:MOST_NAMED]])}{more}: {said}"
+        else:
+            sentence = f"{first}: {said}; the same with other numbers: {', '.join(names[:MOST_NAMED])}{more}"
+        warnings.warn(sentence, category, stacklevel=4)
 
 
 def record_entries(tables: Sequence[Mapping[str, Any]], keys: Sequence[str], where: str) -> list[RecordSheet]:

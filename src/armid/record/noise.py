@@ -8,16 +8,22 @@ import numpy as np
 from armid.model import Array
 from armid.record.broken import REPEATED, in_runs
 from armid.record.record import Noise
+from armid.record.sensor import Mask, step_of
 
 FEWEST_REST_SAMPLES = 50
-FINEST_STEP = 1e-6
 # A rest of equal values is that of a sensor that does not show its noise there, where the motion holds noise of more
 # than this share of its largest value.
 SHOWN_IN_MOTION = 1e-4
+# A rest between motions: a speed is this small against its largest value, and the mean moves by so many standard
+# deviations of a mean at most from one half to the other. Of a longer pause the later parts are tried, as a machine
+# runs down.
+AT_REST, STANDS, HALVINGS = 0.01, 3.0, 3
 ORDERS = range(3, 9)
 # Neighbours may correlate as the noise of a filtered sensor does: up to the longest memory, from so many standard
 # errors (about 2/sqrt(n)) on.
 MEMORIES, DISTINCT, LONGEST_MEMORY = np.linspace(-0.5, 0.95, 146), 3.0, 0.8
+# Independent samples of a rest that tell its noise.
+FEWEST_INDEPENDENT = 12.0
 # Values farther out than this many standard deviations are no noise.
 OUTLYING = 4.0
 
@@ -25,15 +31,16 @@ OUTLYING = 4.0
 def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = None) -> Noise:
     """Return the noise of a record.
 
-    rest: samples before the motion; with fewer than 50 of them, or equal ones, the differences of `motion` are used.
-    times: of the motion [s] where they are irregular. A signal that moves in coarse steps has at least the noise
-    step/sqrt(12).
+    rest: samples at rest; with fewer than 50 of them, or equal ones, the differences of `motion` are used. times: of
+    the motion [s] where they are irregular. The noise is at least that of the sensor's step, step/sqrt(12), of a fine
+    one that of the rounding of its largest value, so that it is never 0.
     """
-    floor = quantisation_step(motion) / np.sqrt(12.0)
+    size = float(np.max(np.abs(motion), initial=0.0))
+    floor = max(step_of(motion), float(np.spacing(size))) / np.sqrt(12.0)
     is_short = rest.size < FEWEST_REST_SAMPLES
     if is_short or np.ptp(rest) == 0.0:
         apart = difference_rms(motion, times)
-        if is_short or apart > max(2.0 * floor, SHOWN_IN_MOTION * float(np.max(np.abs(motion), initial=0.0))):
+        if is_short or apart > max(2.0 * floor, SHOWN_IN_MOTION * size):
             return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
@@ -43,6 +50,34 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     # an exponential correlation rho_k = phi^k sums to phi/(1 - phi) = total, and phi = exp(-interval/time constant)
     time_constant = interval / log1p(1 / total) if total > 0 else 0.0
     return Noise(max(rms, floor), mean, time_constant, 1 / (1 + 2 * total), rest.size, "rest")
+
+
+def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:
+    """Return the longest rest between motions, empty without one of 50 samples.
+
+    A stick of friction under drive is no rest: the inputs are still, too. values: (n_rows,). still: where no input
+    changes, (n_rows,). is_speed: whether a value of 0 tells a standstill, else any that stays does.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
+    longest = np.empty(0)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        for part in range(HALVINGS):
+            rest = values[end - (end - begin) // 2**part : end]
+            if rest.size < max(FEWEST_REST_SAMPLES, longest.size + 1):
+                break
+            if stands_still(rest, float(np.max(np.abs(values))), is_speed):
+                longest = rest
+    return longest
+
+
+def stands_still(rest: Array, size: float, is_speed: bool) -> bool:
+    if is_speed and abs(float(np.mean(rest))) > AT_REST * size:
+        return False
+    deviations = rest - np.mean(rest)
+    independent = rest.size / (1.0 + 2.0 * correlation_sum(deviations))
+    half = rest.size // 2
+    drift = abs(float(np.mean(rest[:half]) - np.mean(rest[half:])))
+    return drift <= STANDS * 2.0 * float(np.std(rest)) / np.sqrt(rest.size) and independent >= FEWEST_INDEPENDENT
 
 
 def correlation_sum(deviations: Array) -> float:
@@ -95,10 +130,10 @@ def difference_rms(motion: Array, times: Array | None = None) -> float:
     is stuck tells nothing of its noise.
     times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
     """
-    moved = ~in_runs(np.append(np.diff(motion) == 0.0, False), REPEATED - 1, 0)
+    moved = ~in_runs(np.append(np.diff(motion) == 0.0, False), REPEATED - 1)
     if FEWEST_REST_SAMPLES <= moved.sum() < motion.size:
         apart = difference_rms(motion[moved], None if times is None else times[moved])
-        if apart > smallest_step(motion):
+        if apart > step_of(motion):
             return apart
     estimates = []
     for order in ORDERS:
@@ -128,18 +163,3 @@ def divided_differences(values: Array, times: Array, order: int) -> Array:
         total += weight * values[j : j + n]
         squares += weight**2
     return total / np.sqrt(squares)
-
-
-def quantisation_step(motion: Array) -> float:
-    """Return the step [unit] of which all values are multiples, 0 for a signal without a coarse one."""
-    step = smallest_step(motion)
-    if step <= FINEST_STEP * float(np.max(np.abs(motion))):
-        return 0.0
-    steps = (motion - motion[0]) / step
-    return step if np.all(np.abs(steps - np.rint(steps)) < 0.02) else 0.0
-
-
-def smallest_step(motion: Array) -> float:
-    changes = np.abs(np.diff(motion))
-    changes = changes[changes > 0]
-    return float(np.min(changes)) if changes.size else 0.0

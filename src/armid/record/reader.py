@@ -1,18 +1,19 @@
 """One record out of its CSV file and its entry in the campaign."""
 
 import os.path
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Array, Manoeuvre, ManoeuvreKey, Output, Plant
-from armid.record.noise import noise_of, smallest_step
+from armid.model import Manoeuvre, ManoeuvreKey, Output, Plant
+from armid.model.plant import unit_ends
 from armid.record.record import Piece, Record
-from armid.record.resample import Timing, is_constant, moved_onto_grid, onto_grid, piece_length, timing_of, with_window
+from armid.record.resample import Timing, is_constant, onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
+from armid.record.signal import Signal, signal_of
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
     LARGEST,
@@ -25,7 +26,7 @@ from armid.record.table import (
     read_table,
     time_column,
 )
-from armid.units import DEGREE
+from armid.units import COUNTS, DEGREE
 
 NAME, SUFFIX = "campaign.toml", ".csv"
 POSITION, SPEED = "start_position", "start_speed"
@@ -39,28 +40,35 @@ def read_record(
     """Read the record of one [[records]] entry: of the first output in the file, with those of the others.
 
     folder: what messages put before the name of the file. plant: the one that the campaign names; its sibling for the
-    record's unit is taken. Warns with IrregularSamplingWarning where the file is resampled for its uneven times.
+    record's unit is taken. Warns with RecordWarning of what had to be assumed and of what is no data, of uneven times
+    with IrregularSamplingWarning.
     """
-    table = read_table(path, f"{folder}{sheet.file}")
+    table = read_table(path, f"{folder}{sheet.file}", campaign.counts_per_turn)
     times = time_column(table)
     plant, found = output_columns(table, plant)
     timing = timing_of(times, plant.from_rest, table.file)
-    signals = {output: table.columns[header] * output.factors[header] for output, header in found.items()}
+    sources = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where)
+    driven = [table.numbers(header) for header in sources.values()]
+
+    def signal(header: str, factor: float, unit: str) -> Signal:
+        most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
+        return signal_of(table, header, factor, times, timing, driven, unit in ("rad/s", "m/s"), campaign.unwrap,
+                         most_lost)  # fmt: skip
+
+    signals = {output: signal(header, output.factors[header], output.unit) for output, header in found.items()}
     check_signals(signals, timing, campaign.gyro_range_deg_s, table)
-    rest_interval = float(np.median(np.diff(times[: timing.first]))) if timing.first > 1 else timing.interval
-    irregular = times[timing.first :] if timing.irregularity else None
     others = {name: values for name, values in table.columns.items() if name not in (TIME, *found.values())}
-    columns = {name: onto_grid(values, times, timing) for name, values in others.items()}
-    manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, where=where)
+    columns = {name: onto_grid(values, times, timing) for name, values in others.items() if np.isfinite(values).all()}
+    manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, sources, where=where)
     first, *further = (
         Record(
             file=sheet.file,
             role=sheet.role,
             unit=output.unit,
             manoeuvre=manoeuvre,
-            measured=moved_onto_grid(signal, times, timing),
-            rest=signal[: timing.first],
-            noise=noise_of(signal[: timing.first], signal[timing.first :], rest_interval, irregular),
+            measured=signal.measured,
+            rest=signal.rest,
+            noise=signal.noise,
             pieces=(),
             whole_pieces=(),
             earliest=timing.earliest,
@@ -69,40 +77,52 @@ def read_record(
             restart_s=sheet.restart_s,
             irregularity=timing.irregularity,
             output=output.name,
+            data=None if signal.data.all() else signal.data,
+            sensor=signal.sensor,
+            broken=signal.broken,
         )
         for output, signal in signals.items()
     )
-    tracks = {} if plant.from_rest else tracks_of(first, plant, table, signals, timing)
+    tracks = {} if plant.from_rest else tracks_of(first, plant, table, signals, signal)
     return with_window(started(replace(first, others=tuple(further)), plant, tracks, where), sheet.window_s, where)
 
 
 def manoeuvre_of(
-    plant: Plant, campaign: CampaignSheet, sheet: RecordSheet, table: CsvTable, timing: Timing, *, where: str
-) -> Manoeuvre:
-    """Return the manoeuvre of a whole record, still without the measured state at its start."""
+    plant: Plant, campaign: CampaignSheet, sheet: RecordSheet, table: CsvTable, timing: Timing,
+    sources: Mapping[str, str], *, where: str,
+) -> Manoeuvre:  # fmt: skip
+    """Return the manoeuvre of a whole record, still without the measured state at its start.
+
+    sources: input -> header of its column.
+    """
     constants = record_constants(plant, campaign.constants, sheet, where)
     hold = sheet.hold or campaign.hold
-    sources = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where)
     inputs = {}
     for driven in plant.inputs:
         header = sources.get(driven.name)
         if header is None:
             inputs[driven.name] = np.full(timing.n_samples, driven.default)
         else:
-            # what is no angle is taken as it is
-            values = table.columns[header] * (DEGREE if header.endswith(("_deg", "_deg_s")) else 1.0)
+            values = table.numbers(header) * input_factor(header, driven.unit, table)
             inputs[driven.name] = onto_grid(values, table.columns[TIME], timing, driven.hold or hold)
     return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
 
 
-def check_signals(signals: Mapping[Output, Array], timing: Timing, range_deg_s: float | None, table: CsvTable) -> None:
+def input_factor(header: str, unit: str, table: CsvTable) -> float:
+    """Return what turns the column of an input into SI: what is no angle and no turning speed is taken as it is."""
+    if header.endswith(("_deg", "_deg_s")):
+        return DEGREE
+    ends = unit_ends(unit) if unit in COUNTS else {}
+    return table.factor(header, next((factor for end, factor in ends.items() if header.endswith(f"_{end}")), 1.0))
+
+
+def check_signals(signals: Mapping[Output, Signal], timing: Timing, range_deg_s: float | None, table: CsvTable) -> None:
     """Refuse a signal that shows no motion, and a speed that is cut off by the range of the gyro.
 
-    Saturated are 5 samples in a row within one quantisation step of the range; the step is the smallest change between
-    neighbours, but at most a hundredth of the range.
+    Saturated are 5 samples in a row within one step of the sensor of the range, but at most a hundredth of it.
     """
     for output, signal in signals.items():
-        if is_constant(signal[timing.first :]):
+        if is_constant(signal.values[timing.first :][signal.rows[timing.first :]]):
             what = "speed" if output.unit in ("rad/s", "m/s") else output.name
             raise ArmidError(f"{table.file}: the measured {what} is constant after the start, a motion is expected")
     if range_deg_s is None:
@@ -113,9 +133,9 @@ def check_signals(signals: Mapping[Output, Array], timing: Timing, range_deg_s: 
         raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {unit}: a speed in deg/s or "
                          "rad/s is expected")  # fmt: skip
     gyro_range = range_deg_s * DEGREE
-    step = min(smallest_step(speed), gyro_range / 100)
+    step = min(speed.sensor.step, gyro_range / 100)
     # the slack keeps a value that is one step below the range inside, whatever its last binary digit
-    near = np.abs(speed) >= gyro_range - step * (1 + 1e-6)
+    near = np.abs(speed.values) >= gyro_range - step * (1 + 1e-6)
     runs = np.convolve(near, np.ones(SATURATED_SAMPLES), mode="valid")
     saturated = np.flatnonzero(runs > SATURATED_SAMPLES - 0.5)
     if saturated.size:
@@ -156,8 +176,11 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
             state = ({}, {})
         cut = manoeuvre.part(start, length, state[0])
         for one, found in zip(record.each, pieces, strict=True):
-            measured, shown_start = one.measured[start : start + length], state[0] if fitted and trained else {}
-            found.append(Piece(cut, measured, slice(0, length), start, state[1], spent, shown_start))
+            own, shown_start = slice(start, start + length), state[0] if fitted and trained else {}
+            data = None if one.data is None else one.data[own]
+            found.append(
+                Piece(cut, one.measured[own], slice(0, length), start, state[1], spent, shown_start, data=data)
+            )
     # the first piece starts where the record does
     from_there = replace(manoeuvre, constants=pieces[0][0].manoeuvre.constants)
     first_one, *further = (replace(one, manoeuvre=from_there, whole_pieces=tuple(found))
@@ -166,22 +189,26 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
 
 
 def tracks_of(
-    record: Record, plant: Plant, table: CsvTable, signals: Mapping[Output, Array], timing: Timing
-) -> dict[str, Track]:
-    """Return the signals from which a start is taken: of a plant that records one speed by constant, else by output."""
-    times = table.columns[TIME]
+    record: Record, plant: Plant, table: CsvTable, signals: Mapping[Output, Signal],
+    read: Callable[[str, float, str], Signal],
+) -> dict[str, Track]:  # fmt: skip
+    """Return the signals from which a start is taken: of a plant that records one speed by constant, else by output.
+
+    read: what reads a column: header, factor, unit -> signal.
+    """
     if not plant.records_one_speed:
-        return {output.name: track_of(signal, times, timing) for output, signal in signals.items()}
+        return {output.name: track_of(signal) for output, signal in signals.items()}
     (speed,) = signals.values()
     declared = {c.name for c in plant.constants}
-    position = position_of(table, record.unit)
-    tracks = {SPEED: track_of(speed, times, timing)} if SPEED in declared else {}
-    if POSITION in declared and position is not None:
-        tracks[POSITION] = track_of(position, times, timing)
+    header = position_of(table, record.unit)
+    tracks = {SPEED: track_of(speed)} if SPEED in declared else {}
+    if POSITION in declared and header is not None:
+        unit = "rad" if record.unit == "rad/s" else "m"
+        tracks[POSITION] = track_of(read(header, POSITIONS[header][1], unit))
     elif POSITION in declared and ("gravity_moment" not in declared or gravity_of(plant, record.constants) != 0):
         why = "gravity_moment is not 0" if "gravity_moment" in declared else f"plant '{plant.name}' declares it"
         headers = " or ".join(name for name, (unit, _) in POSITIONS.items() if unit == record.unit)
-        raise ArmidError(f"{table.file}, line 1: the start needs a position, as {why}: a column {headers} is expected")
+        raise ArmidError(f"{table.where}: the start needs a position, as {why}: a column {headers} is expected")
     return tracks
 
 

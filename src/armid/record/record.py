@@ -4,10 +4,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.model import Array, Manoeuvre
+from armid.record.broken import Broken
+from armid.record.sensor import Mask, Sensor
 
 NOISE_FREE = 1e-6
+# Which samples of a piece: those of a window, or these of it that were measured.
+Samples = slice | NDArray[np.intp]
+
+
+class RecordWarning(UserWarning):
+    """Say what had to be assumed to read a record, or what of it is no data."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +56,8 @@ class StartCorrection:
     Beside a candidate's signals y the start moves by d = gain (x - y) + offset, x what was measured: the d that brings
     x - y - slopes d down, of all outputs of the file together, and does not leave the start that the reader saw.
     slopes: d signal / d start constant, SI, (n_constants, n_outputs, n_samples). gain: (n_constants, n_seen); offset:
-    (n_constants,). measured: samples in the window, the outputs one behind the other, (n_seen,).
+    (n_constants,). samples: of each output, those that are seen; measured: their values, the outputs one behind the
+    other, (n_seen,).
     """
 
     places: tuple[int, ...]
@@ -55,11 +65,12 @@ class StartCorrection:
     gain: Array
     offset: Array
     measured: Array
-    window: slice
+    samples: tuple[Samples, ...]
 
     def corrected(self, outputs: Array) -> Array:
         """Return signals from each candidate's own best start; outputs: of the plant, (n_outputs, n, n_samples)."""
-        seen = np.concatenate([outputs[place][:, self.window] for place in self.places], axis=1)
+        pairs = zip(self.places, self.samples, strict=True)
+        seen = np.concatenate([outputs[place][:, samples] for place, samples in pairs], axis=1)
         # no matrix product: its rounding of one candidate may depend on how many others there are
         lacking = np.einsum("cn,sn->cs", self.measured - seen, self.gain) + self.offset
         found = outputs.copy()
@@ -76,7 +87,8 @@ class Piece:
     start_deviation: constant (`start_position`, `start_speed`) -> standard deviation of its measured value, SI; empty
     for a machine that starts from its declared state. n_spent: first samples that told the start of a record that is
     held out, so that they judge nothing. shown_start: constant -> its measured value, SI, where a fit estimates these
-    constants beside the parameters; correction: what does so, None before.
+    constants beside the parameters; correction: what does so, None before. data: which of its samples were measured,
+    (n_samples,), None: all; the others hold a straight line between these, which no fit and no error sees.
     """
 
     manoeuvre: Manoeuvre
@@ -87,20 +99,32 @@ class Piece:
     n_spent: int = 0
     shown_start: Mapping[str, float] = field(default_factory=dict)
     correction: StartCorrection | None = None
+    data: Mask | None = None
+
+    @property
+    def samples(self) -> Samples:
+        """The samples that fitness and errors see: those of the window that were measured."""
+        if self.data is None:
+            return self.window
+        return np.asarray(np.flatnonzero(self.data[self.window]) + self.window.start)
 
     @property
     def n_samples(self) -> int:
-        return int(self.window.stop - self.window.start)
+        """How many samples fitness and errors see."""
+        if self.data is None:
+            return int(self.window.stop - self.window.start)
+        return int(self.data[self.window].sum())
 
     @property
     def duration(self) -> float:
         """Length of the window [s], from its first to its last sample."""
-        return (self.n_samples - 1) * self.manoeuvre.interval
+        return float((self.window.stop - self.window.start - 1) * self.manoeuvre.interval)
 
     def until_window_end(self) -> "Piece":
         """Return the piece without the samples after its window: what an identification has to simulate."""
         stop = int(self.window.stop)
-        return replace(self, manoeuvre=self.manoeuvre.shortened(stop), measured=self.measured[:stop])
+        data = None if self.data is None else self.data[:stop]
+        return replace(self, manoeuvre=self.manoeuvre.shortened(stop), measured=self.measured[:stop], data=data)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,7 +138,8 @@ class Record:
     earliest: first sample that may be in a window. columns: header -> the file's other columns on the grid, in the
     unit of the header. repeat_of: file of the record whose manoeuvre this one repeats, or "".
     irregularity: None where the file's times were even. output: name of the output, "" for a plant's only one.
-    others: records of the file's other outputs, with the same manoeuvres.
+    others: records of the file's other outputs, with the same manoeuvres. data: which samples were measured,
+    (n_samples,), None: all. sensor: what the values tell of it. broken: samples that are no data by what is wrong.
     """
 
     file: str
@@ -133,10 +158,23 @@ class Record:
     irregularity: Irregularity | None = None
     output: str = ""
     others: tuple["Record", ...] = ()
+    data: Mask | None = None
+    sensor: Sensor = field(default_factory=Sensor)
+    broken: tuple[Broken, ...] = ()
 
     def __repr__(self) -> str:
         return (f"<Record {self.file} ({self.role}): {len(self.measured)} samples of {self.manoeuvre.interval:g} s, "
                 f"noise {self.noise.rms:.3g} {self.unit}>")  # fmt: skip
+
+    @property
+    def filled(self) -> "Record":
+        """The record with the straight lines between its samples taken as measured."""
+
+        def whole(pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
+            return tuple(replace(p, data=None) for p in pieces)
+
+        others = tuple(other.filled for other in self.others)
+        return replace(self, data=None, pieces=whole(self.pieces), whole_pieces=whole(self.whole_pieces), others=others)
 
     @property
     def each(self) -> tuple["Record", ...]:
@@ -154,13 +192,20 @@ class Record:
         return self.manoeuvre.times()
 
     @property
+    def spacing(self) -> float:
+        """Time from one measured sample to the next [s]: the interval of the grid, or a multiple of it."""
+        if self.data is None:
+            return self.manoeuvre.interval
+        return self.manoeuvre.interval * float(np.median(np.diff(np.flatnonzero(self.data))))
+
+    @property
     def constants(self) -> Mapping[str, float]:
         """Constants of the record's manoeuvre, SI."""
         return self.manoeuvre.constants
 
     @property
     def n_samples(self) -> int:
-        """Number of samples in the windows of all pieces."""
+        """Number of samples in the windows of all pieces that were measured."""
         return sum(p.n_samples for p in self.pieces)
 
     @property

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.model import Array
-from armid.record.record import Irregularity, Record
+from armid.record.record import Irregularity, Record, RecordWarning
+from armid.record.sensor import Mask
 
 FEWEST_SAMPLES = 20
 SHORTEST_INTERVAL = 1e-9
@@ -22,7 +23,7 @@ NEAR = 0.75
 NEIGHBOURS = 7
 
 
-class IrregularSamplingWarning(UserWarning):
+class IrregularSamplingWarning(RecordWarning):
     """Say how irregular the times of a record are that was resampled."""
 
 
@@ -160,22 +161,40 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
     return np.where(changes[first] == changes[last], values[first], np.diff(at_edges) / timing.interval)
 
 
-def moved_onto_grid(values: Array, times: Array, timing: Timing) -> Array:
-    """Return a noisy column on the even grid, (n_samples,), from values and times, both (n_rows,).
+def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> tuple[Array, Mask]:
+    """Return a noisy column on the even grid and which of its samples were measured, both (n_samples,).
 
     Each grid sample takes the nearest row, moved along the slope of a parabola through 7 neighbours: the noise stays
     that of one sample and white, where a line between two rows would take a third off its variance and correlate
-    neighbours. Where no row is near, a straight line bridges the gap.
+    neighbours. Where no row of data is near, a straight line runs between those around.
+    values, times, rows (which are data): (n_rows,).
     """
-    if not timing.resampled or times.size < NEIGHBOURS:
-        return onto_grid(values, times, timing)
+    known = values if rows.all() else np.where(rows, values, np.interp(times, times[rows], values[rows]))
+    if not timing.resampled:
+        return np.ascontiguousarray(known[timing.first :]), rows[timing.first :].copy()
     grid = timing.grid()
-    right = np.clip(np.searchsorted(times, grid), 1, times.size - 1)
-    nearest = np.where(grid - times[right - 1] < times[right] - grid, right - 1, right)
+    right, nearest = around(times, grid)
     along = grid - times[nearest]
-    moved = values[nearest] + parabola_slopes(values, times, nearest) * along
+    data = rows[nearest] & (np.abs(along) <= NEAR * timing.interval)
+    if times.size < NEIGHBOURS:
+        return onto_grid(known, times, timing), data
+    moved = known[nearest] + parabola_slopes(known, times, nearest) * along
     gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.interval) > NEAR * timing.interval
-    return np.where(gap, np.interp(grid, times, values), moved)
+    return np.where(gap, np.interp(grid, times, known), moved), data
+
+
+def gap_samples(times: Array, timing: Timing) -> Mask:
+    """Return the samples of the grid without a row near by, (n_samples,)."""
+    if not timing.resampled:
+        return np.zeros(timing.n_samples, dtype=np.bool_)
+    grid = timing.grid()
+    return np.asarray(np.abs(grid - times[around(times, grid)[1]]) > NEAR * timing.interval)
+
+
+def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the row on the right of each grid sample, and the nearest one."""
+    right = np.clip(np.searchsorted(times, grid), 1, times.size - 1)
+    return right, np.where(grid - times[right - 1] < times[right] - grid, right - 1, right)
 
 
 def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:

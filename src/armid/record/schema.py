@@ -62,6 +62,12 @@ share = tested(number, lambda value: 0.0 <= value < 1.0)
 text = tested(any_text, bool)
 
 
+def boolean(value: object) -> bool:
+    if isinstance(value, bool):
+        return value
+    raise KindError(value)
+
+
 def any_table(value: object) -> dict[str, Any]:
     if isinstance(value, dict):
         return value
@@ -100,6 +106,7 @@ MOST_RECORDS = 10_000
 HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'")
 CONSTANTS = key(table_of(number), "a finite number in SI")
 TOLERANCES = key(table_of(share), "a share from 0 to below 1")
+LOST = key(share, "a share from 0 to below 1")
 INPUTS = key(table_of(text), "the name of a column")
 BOUND = key(number, "a finite number in SI")
 WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds")
@@ -119,6 +126,7 @@ class RecordSheet:
     restart_s: float | None = field(default=None, metadata=key(above_zero, "a length in seconds above 0"))
     repeat_of: str | None = field(default=None, metadata=key(text, "the file of another record"))
     hold: str | None = field(default=None, metadata=HOLD)
+    most_lost: float | None = field(default=None, metadata=LOST)
     keys: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -136,6 +144,9 @@ class CampaignSheet:
     tolerances: Mapping[str, float] = field(default_factory=dict, metadata=TOLERANCES)
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
     hold: str = field(default="linear", metadata=HOLD)
+    most_lost: float = field(default=0.05, metadata=LOST)
+    unwrap: bool = field(default=False, metadata=key(boolean, "true or false"))
+    counts_per_turn: float | None = field(default=None, metadata=key(above_zero, "counts of the encoder above 0"))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from armid.model import Array, Model, Plant
-from armid.record.noise import noise_of, quantisation_step
-from armid.record.resample import Timing, moved_onto_grid
+from armid.record.signal import Signal
 
 State = tuple[dict[str, float], dict[str, float]]
 # Of a record that is held out, the start comes from this share of its first samples, at most so long [s], at least so
@@ -20,18 +19,20 @@ STEPS, TINY = 4, 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A signal from which a start is taken, SI; noise: deviation of one sample; step: of the sensor, 0: a fine one."""
+    """Hold a signal from which a start is taken, SI, on the grid.
+
+    noise: deviation of one sample, larger by the root of the samples for each that was measured. step: of the sensor,
+    0 for a fine one.
+    """
 
     values: Array
     noise: float
     step: float = 0.0
 
 
-def track_of(values: Array, times: Array, timing: Timing) -> Track:
-    """Return a column on the even grid, with its noise from the differences of what is in the file."""
-    irregular = times if timing.irregularity else None
-    noise = noise_of(np.empty(0), values, timing.interval, irregular)
-    return Track(moved_onto_grid(values, times, timing), noise.rms, quantisation_step(values))
+def track_of(signal: Signal) -> Track:
+    """Return a signal with the noise of the start that it tells."""
+    return Track(signal.measured, signal.noise.rms / float(np.sqrt(np.mean(signal.data))), signal.sensor.step)
 
 
 def state_at(tracks: Mapping[str, Track], index: int) -> State:

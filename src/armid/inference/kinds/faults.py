@@ -164,7 +164,7 @@ def with_shared_starts(replays: Sequence[Replay], inside: Sequence[int]) -> tupl
         pieces = []
         for several in zip(*(replays[k].pieces for k in inside), strict=True):
             piece = several[inside.index(i)]
-            shown = np.concatenate([p.measured[p.window] for p in several])
+            shown = np.concatenate([p.measured[p.samples] for p in several])
             correction = None if piece.correction is None else replace(piece.correction, measured=shown)
             pieces.append(replace(piece, manoeuvre=several[0].manoeuvre, correction=correction))
         found[i] = replace(found[i], pieces=tuple(pieces))
@@ -197,9 +197,10 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
     """
     found = []
     for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
-        replay, step = base.replays[i], base.data.records[i].manoeuvre.interval
-        samples = np.concatenate([p.start_index + np.arange(p.window.start, p.window.stop) for p in replay.pieces])
-        found.append(-np.gradient(simulated, step) * (1.0 if fault.kind == "late" else step * samples))
+        replay, record = base.replays[i], base.data.records[i]
+        step = record.manoeuvre.interval
+        samples = np.concatenate([p.start_index + np.arange(p.measured.size)[p.samples] for p in replay.pieces])
+        found.append(-np.gradient(simulated, record.spacing) * (1.0 if fault.kind == "late" else step * samples))
     return found
 
 

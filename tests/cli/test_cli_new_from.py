@@ -1,0 +1,90 @@
+"""`armid new campaign NAME --from FILE...` guesses what the columns of files are, says so, and its campaign checks."""
+
+import tomllib
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+import pytest
+
+from armid.record.table import read_table
+
+N, INTERVAL = 2000, 0.004
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def wheel(seed, gain=30.0, damping=2.0):
+    """Return times [s], voltage, speed [rad/s] and angle [rad] of a motor with a wheel; the first second is rest."""
+    rng = np.random.default_rng(seed)
+    times = INTERVAL * np.arange(N)
+    drive = np.where(times < 1.0, 0.0, np.repeat(rng.uniform(-6.0, 6.0, N // 100), 100))
+    speed, angle = np.zeros(N), np.zeros(N)
+    for i in range(N - 1):
+        kept = np.exp(-damping * INTERVAL)
+        speed[i + 1] = kept * speed[i] + gain / damping * (1.0 - kept) * drive[i]
+        angle[i + 1] = angle[i] + 0.5 * INTERVAL * (speed[i] + speed[i + 1])
+    noise = 0.05 * rng.standard_normal(N)
+    return times, drive, speed + noise, angle
+
+
+def spreadsheet(seed):
+    """Return a file as a spreadsheet of a language with decimal commas writes it."""
+    times, drive, speed, angle = wheel(seed)
+    columns = (np.round(1e3 * times), np.round(drive, 3), np.round(speed * 30.0 / np.pi, 2),
+               np.round(np.mod(np.rad2deg(angle), 360.0), 2))  # fmt: skip
+    rows = "\n".join(";".join(f"{v:.9g}".replace(".", ",") for v in row) + ";run" for row in zip(*columns))
+    return f"# logger\nZeit [ms];Motor voltage [V];speed [rpm];angle [\u00b0];state\n{rows}\n".encode("utf-16")
+
+
+def test_files_of_a_spreadsheet_become_a_campaign_that_checks(run, refused, tmp_path):
+    for seed, name in ((1, "first.csv"), (2, "second.csv")):
+        (tmp_path / name).write_bytes(spreadsheet(seed))
+    with catch_warnings():
+        simplefilter("default")
+        made = run("new", "campaign", "wheel", "--from", "first.csv", "second.csv")
+    assert (made.code, made.out) == (0, "wrote wheel; try: armid check wheel\n")
+    assert "read with UTF-16, ';' between columns" in made.err
+    text = (tmp_path / "wheel" / "campaign.toml").read_text()
+    sheet = tomllib.loads(text)
+    assert (sheet["plant"], sheet["hold"], sheet["unwrap"]) == ("rotary_arm", "zero", True)
+    assert [(r["file"], r["role"]) for r in sheet["records"]] == [("first.csv", "train"), ("second.csv", "holdout")]
+    told = ("time_s: the column 'Zeit [ms]'", "drive_V: the column 'Motor voltage [V]'", 'role = "holdout"  # GUESS',
+            "2000 rows at 250 Hz, 1.01 s of rest first; angular_velocity_rpm: steps of 0.01")  # fmt: skip
+    for words in told:
+        assert words in text, text
+    times, drive, speed, _ = wheel(1)
+    table = read_table(tmp_path / "wheel" / "first.csv", "first.csv").columns
+    np.testing.assert_array_equal(table["time_s"], np.round(times, 12))
+    np.testing.assert_array_equal(table["drive_V"], np.round(drive, 3))
+    np.testing.assert_array_equal(table["angular_velocity_rpm"], np.round(speed * 30.0 / np.pi, 2))
+    checked = run("check", "wheel")
+    assert (checked.code, checked.err) == (0, "")
+    assert "first.csv, train: 2000 samples at 250 Hz" in checked.out
+    assert "exists already" in refused("new", "campaign", "wheel", "--from", "first.csv")
+
+
+def test_a_unit_that_nothing_tells_is_a_guess(run, tmp_path):
+    times, drive, speed, _ = wheel(3)
+    rows = "\n".join(f"{t:.3f},{v:.4f},{u:.3f}" for t, v, u in zip(times, speed, drive))
+    (tmp_path / "a.csv").write_text(f"t,speed,u\n{rows}\n")
+    assert run("new", "campaign", "mine", "--from", "a.csv").code == 0
+    text = (tmp_path / "mine" / "campaign.toml").read_text()
+    assert "angular_velocity_rad_s: the column 'speed'; GUESS: its unit" in text
+    assert "time_s: the column 't'; GUESS: it is in s" in text
+    assert run("check", "mine").code == 0
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("time_s,drive_V\n0,1\n1,2\n", "a speed or an angle"), ("time_s,speed\n0,1\n1,2\n", "an input"),
+    ("speed,drive\n1,1\n1,2\n", "no column of"), ("time_s,angle_counts,drive_V\n0,1,2\n1,2,3\n", "in counts"),
+    ("time_s,position_m,drive_N\n0,1,2\n1,2,3\n", "a position of a linear axis"),
+])  # fmt: skip
+def test_files_that_say_too_little_are_refused(refused, tmp_path, text, words):
+    (tmp_path / "a.csv").write_text(text)
+    assert words in refused("new", "campaign", "mine", "--from", "a.csv")
+    assert not (tmp_path / "mine").exists()
+    assert "records are expected of a campaign alone" in refused("new", "effect", "mine", "--from", "a.csv")
+    assert "--from before the files" in refused("new", "campaign", "mine", "a.csv")
