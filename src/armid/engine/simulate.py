@@ -130,6 +130,7 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
         DIVERGED * np.array(model.plant.sizes),
         schedule.rough is not None,
         np.zeros(len(model.states)) if schedule.rough is None else 1.0 / schedule.rough,
+        manoeuvre.n_before,
     )  # fmt: skip
     return Prepared(model, kernel, width, schedule, manoeuvre.n_samples, starts, settings, states)
 
@@ -188,7 +189,10 @@ def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
         if np.shape(manoeuvre.inputs[name]) != (manoeuvre.n_samples,):
             raise ArmidError(f"input '{name}' has shape {np.shape(manoeuvre.inputs[name])}: ({manoeuvre.n_samples},) "
                              "is expected")  # fmt: skip
-    return np.array([manoeuvre.inputs[name] for name in names], dtype=np.float64) if names else np.zeros((1, 1))
+    if not names:
+        return np.zeros((1, 1))
+    rows = [np.concatenate([manoeuvre.before.get(name, ()), manoeuvre.inputs[name]]) for name in names]
+    return np.array(rows, dtype=np.float64)
 
 
 def arranged(
