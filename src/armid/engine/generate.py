@@ -30,11 +30,11 @@ FEWEST = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
-DELAYS = TEMPLATE.with_name("delays.py.jinja")
+OF_DELAYS = (TEMPLATE.with_name("delays.py.jinja"), TEMPLATE.with_name("history.py.jinja"))
 # Prefixes of lists of names in the template.
 OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
 OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur", "p0", "p1")
-OF_CARRIED = ("n", "o", "r")
+OF_CARRIED = ("n", "o", "r", "t")
 OF_OUTPUTS = ("rec",)
 OF_LATE_STATES = ("l", "ha", "hm", "hb", "hs", "hq", "hx", "w")
 OF_GUARDS = ("ga", "gb", "gm", "gd", "ge", "c")
@@ -70,8 +70,8 @@ class KernelParts:
     outputs: recorded signals. latch_guards: the guard of each latch; kinks: the other guards; driven_start: whether a
     state starts where the inputs say; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
     whether there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by which
-    inputs and states are late; the first n_cutting of them cut each sample interval, as rates or guards see what jumps
-    there. late_inputs, late_states: what is late, by which of the delays.
+    inputs and states are late; the motion sees the first n_moving of them, and they cut each sample interval where inputs
+    drive it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which of the delays.
     """
 
     equations: str
@@ -90,7 +90,7 @@ class KernelParts:
     jumping_guards: bool
     wide: bool
     delays: list[str]
-    n_cutting: int
+    n_moving: int
     late_inputs: list[LateInput]
     late_states: list[LateState]
 
@@ -119,12 +119,14 @@ class KernelParts:
         lists["judging"] = f"judged, {listed(self.states, 'per_')}"
         names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
         remembered = list(dict.fromkeys(one.of for one in self.late_states))
-        of_delays = [listed([f"{word}_{i}" for i in range(len(self.delays))]) for word in ("late_by", "whole", "rest")]
-        given = "history, place, rows, part, edges, delayed, numbers, " + "".join(of_delays) if self.late_states else ""
+        of_delays = [listed([f"{word}_{i}" for i in range(len(self.delays))]) for word in ("late_by", "whole", "rest", "using")]
+        given = "history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays) if self.late_states else ""
         names |= {
             "driven": driven, "late_names": late_states, "remembered": remembered, "late_by": of_delays[0],
             "late_by_names": [f"late_by_{i}" for i in range(len(self.delays))], "late_given": given,
-            "last_rates": listed(remembered, "k4_"),
+            "last_rates": listed(remembered, "k4_"), "n_cutting": self.n_moving if self.inputs else 0,
+            "felt": sorted({one.delay for one in self.late_states if one.delay < self.n_moving}),
+            "delays_of_states": {one.delay for one in self.late_states},
         }  # fmt: skip
         return environment.get_template(TEMPLATE.name).render(
             names | lists, guards=guards, carried=carried, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST,
@@ -188,7 +190,7 @@ class Emitter:
         guards, inputs = [*latch_guards, *kinks], [i.name for i in model.plant.inputs]
         recorded = [o.signal for o in model.plant.outputs]
         fixed = self.fixed_keys([*rates, *guards, *recorded])
-        delays, n_cutting, late_inputs, late_states = self.late_leaves([*rates, *guards], recorded)
+        delays, n_moving, late_inputs, late_states = self.late_leaves([*rates, *guards], recorded)
         used = [f"{word}_{effect}" for effect in self.strengths for word in ("using", "used")]
         lists: dict[str, Iterable[str]] = {
             "parameters": model.parameters, "starts": model.starts, "fixed": fixed, "states": model.states,
@@ -218,7 +220,7 @@ class Emitter:
         jumping = bool(kinks) and self.uses(guards, [*inputs, *(n.key for n in self.graph.of_kind("late_input"))])
         return KernelParts(
             equations, width, **names, driven_start=bool(at_start), jumping_guards=jumping, wide=bool(self.strengths),
-            delays=delays, n_cutting=n_cutting, late_inputs=late_inputs, late_states=late_states,
+            delays=delays, n_moving=n_moving, late_inputs=late_inputs, late_states=late_states,
         )  # fmt: skip
 
     def late_leaves(
@@ -241,9 +243,9 @@ class Emitter:
             one(variable(n.key), variable(n.needs[0]), known.index(n.needs[0]), by.index(n.by))
             for n in late if n.kind == kind
         ] for kind, one, known in (("late_input", LateInput, inputs), ("late_state", LateState, states))}  # fmt: skip
-        n_cutting = len({n.by for n in late if n.key in seen})
+        n_moving = len({n.by for n in late if n.key in seen})
         delays = [" + ".join(map(variable, several)) for several in by]
-        return delays, n_cutting, made["late_input"], made["late_state"]
+        return delays, n_moving, made["late_input"], made["late_state"]
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:
         return any(k in wanted or self.uses(list(self.graph.nodes[k].needs), wanted) for k in keys)

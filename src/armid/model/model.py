@@ -3,12 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 from armid.errors import ArmidError, nearest
 from armid.model.effect import Effect, State
 from armid.model.graph import Graph, build_graph, equations_text
 from armid.model.parameter import Parameter, resolve
 from armid.model.plant import Plant
+
+
+K = TypeVar("K")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -113,6 +117,29 @@ def refusal_of(effect: Effect, plant: Plant) -> str:
     except ArmidError as error:
         return str(error)
     return ""
+
+
+def fitting_form(effect: Effect, plant: Plant) -> Effect:
+    """Return the first form of an effect that a plant takes, the effect itself where it takes none."""
+    return next((form for form in effect.searched_forms if not refusal_of(form, plant)), effect)
+
+
+def distinct(effects: Mapping[K, Effect], plant: Plant) -> dict[K, Effect]:
+    """Return effects without those whose equations on a plant are those of one before: one effect under two names.
+
+    A late command of a recorded drive (`controller_delay`) is a late drive (`drive_delay`). Each must fit the plant.
+    """
+    first: dict[object, K] = {}
+    for key, effect in effects.items():
+        first.setdefault(own_equations(effect, plant), key)
+    return {key: effects[key] for key in first.values()}
+
+
+def own_equations(effect: Effect, plant: Plant) -> object:
+    """Return what an effect adds to a plant, without its name; equal for equal equations and ranges."""
+    graph, prefix = (Model(plant) + replace(effect, name="own", forms=(), exact=None)).graph, ("own__", "late__own__")
+    nodes = [n for n in graph.nodes.values() if n.owner == "own" or n.key.startswith(prefix)]
+    return effect.parameters, frozenset((n.key, n.kind, n.function, n.arguments, n.terms, n.by) for n in nodes)
 
 
 def applicable(effects: Mapping[str, Effect], plant: Plant) -> dict[str, Effect]:
