@@ -9,7 +9,7 @@ from armid.model.parameter import Parameter, check_name
 
 Equation = Callable[..., Any]
 # How the nodes of a composed model begin: an effect of this name could not be told from them.
-RESERVED = ("rate", "initial", "guard", "late")
+RESERVED = ("rate", "initial", "guard")
 SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
 SIZE_WIDTH = replace(SIGN_WIDTH, note="speed over which the size of speed is smoothed")
 

@@ -262,6 +262,8 @@ def names_for(plant: Plant, effect: Effect | None, initial: bool) -> dict[str, s
             raise ArmidError(f"effect '{effect.name}' binds '{argument}' to '{name}', which nobody offers here: "
                              f"{nearest(name, names)}")  # fmt: skip
         names |= {argument: names[name]} if name in names else {}
+        if plant.aliases.get(name, name) in (i.name for i in plant.inputs):
+            names |= {argument: plant.aliases.get(name, name)}  # an initial value takes the first sample of an input
     names |= {p.name: f"{effect.name}__{p.name}" for p in effect.parameters}
     names |= {s.name: f"{'initial__' if initial else ''}{effect.name}__{s.name}" for s in effect.states}
     names |= {d.name: f"{effect.name}__{d.name}" for d in effect.delays if not initial}
