@@ -1,5 +1,7 @@
 """A plug-in of a user: a winch on a DC motor, the voltage recorded; and its exact motion under a late held voltage."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from armid import Constant, Input, Parameter, Plant, Scales, State
@@ -52,15 +54,22 @@ def held_voltage(rng, n_levels=24):
     return np.concatenate([np.zeros(40), np.repeat(rng.choice([-20.0, -6.0, 6.0, 20.0], n_levels), 30)])
 
 
-def exact_speed(volts, delay, drum=DRUM, friction=FRICTION):
-    """Speed of the drum [rad/s]: the exact solution between the jumps of the late voltage."""
-    rate, gain = -(friction + K_T**2 / OHMS) / drum, K_T / OHMS / drum
-    whole = int(np.floor(delay / INTERVAL))
-    rest = delay - whole * INTERVAL
+def exact_speed(volts, delay, times=None):
+    """Speed of the drum at the samples [rad/s]: the exact solution between the jumps of the late voltage.
+
+    times: of the samples, at which the voltage jumps [s]; None: even ones from 0.
+    """
+    times = INTERVAL * np.arange(len(volts)) if times is None else times
+    rate, gain = -(FRICTION + K_T**2 / OHMS) / DRUM, K_T / OHMS / DRUM
+    jumps = times[1:] + delay
     w = np.zeros(len(volts))
     for k in range(len(volts) - 1):
+        begin, end = times[k], times[k + 1]
+        inside = jumps[np.searchsorted(jumps, begin, "right") : np.searchsorted(jumps, end, "left")]
+        edges = np.concatenate([[begin], inside, [end]])
         w[k + 1] = w[k]
-        for span, at in ((rest, k - whole - 1), (INTERVAL - rest, k - whole)):
-            grown = np.exp(rate * span)
-            w[k + 1] = w[k + 1] * grown + gain * volts[max(at, 0)] * (grown - 1.0) / rate
+        for a, b in pairwise(edges):
+            grown = np.exp(rate * (b - a))
+            level = volts[np.searchsorted(jumps, 0.5 * (a + b))]
+            w[k + 1] = w[k + 1] * grown + gain * level * (grown - 1.0) / rate
     return w

@@ -2,6 +2,7 @@
 
 from bisect import bisect_left
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -21,7 +22,9 @@ AXIS = PLANTS["driven_axis"]
 STEP_S, N_SAMPLES, MASS, SLOPE, GRAVITY = 0.002, 300, 0.05, 0.3, 0.3
 DRIVE = np.repeat(np.random.default_rng(3).choice([-2.0, -1.0, 1.0, 2.0], N_SAMPLES // 20), 20)
 # Delays of the drive and of the sensor [s]: none, below a step, whole and broken numbers of samples, beyond the record.
-LATE = [(0.0, 0.0), (1e-5, 0.0031), (0.0005, 0.0), (0.002, 0.0025), (0.006, 1e-4), (0.0071, 0.004), (0.3, 0.05), (2.0, 3.0)]
+DRIVE_LATE = [0.0, 1e-5, 0.0005, 0.002, 0.006, 0.0071, 0.3, 2.0]
+SENSOR_LATE = [0.0, 0.0031, 0.0, 0.0025, 1e-4, 0.004, 0.05, 3.0]
+LATE = list(zip(DRIVE_LATE, SENSOR_LATE, strict=True))
 
 
 def candidates(model, rows):
@@ -41,7 +44,7 @@ def solved(rate, start, ends, length):
 
     ends = np.unique(np.round([0.0, *ends], 12))
     ends = ends[ends <= length + 1e-12]
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in pairwise(ends):
         if b - a > 1e-11:
             run = solve_ivp(rate, (a, b), y, "DOP853", dense_output=True, rtol=1e-11, atol=1e-13,
                             args=(past, 0.5 * (a + b)))  # fmt: skip
@@ -113,9 +116,7 @@ def test_a_computed_signal_comes_out_of_the_history_however_short_the_delay():
         found = simulate(model, manoeuvre, population, Schedule(substeps)).output
         errors[substeps] = np.abs(found - expected).max(axis=1)
         for candidate, signal in zip(population, found, strict=True):
-            np.testing.assert_array_equal(
-                simulate(model, manoeuvre, candidate, Schedule(substeps)).output[0], signal
-            )
+            np.testing.assert_array_equal(simulate(model, manoeuvre, candidate, Schedule(substeps)).output[0], signal)
     assert errors[2].max() <= 3e-7
     assert errors[4].max() <= 5e-8
     # a fourth-order step where the delay is none, below a step, a step
@@ -203,10 +204,10 @@ def test_what_is_no_delay():
     assert run.failed.tolist() == [False, False, True]
     with pytest.raises(ArmidError, match="delays 'late' by 'wait', which is no parameter of it"):
         replace(EFFECTS["output_delay"], delays=(Delay("late", way, "wait"),))
-    switching = Effect("switching", (Parameter("level", "effort", 0, 9, null=0.0), Parameter("wait", "s", 0, 1, null=0.0)),
-                       {"torque": late_switch}, (), (Guard("on", still, latch=True),),
+    strengths = Parameter("level", "effort", 0, 9, null=0.0), Parameter("wait", "s", 0, 1, null=0.0)
+    switching = Effect("switching", strengths, {"torque": late_switch}, (), (Guard("on", still, latch=True),),
                        delays=(Delay("late", after, "wait"),))  # fmt: skip
-    with pytest.raises(ArmidError, match="effect 'switching' delays what depends on the switch 'switching.on'"):
+    with pytest.raises(ArmidError, match=r"effect 'switching' delays what depends on the switch 'switching\.on'"):
         Model(AXIS) + switching
 
 

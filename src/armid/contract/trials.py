@@ -239,7 +239,7 @@ class PlainModel:
         # what lies within rounding of a sample is that sample
         near = np.abs(ends[:, np.newaxis] - times).min(axis=1)
         ends = ends[(near == 0.0) | (near > 1e-9 * self.manoeuvre.interval)]
-        return ends[(ends > times[0]) & (ends <= times[-1])]
+        return np.asarray(ends[(ends > times[0]) & (ends <= times[-1])])
 
     def remember(self, run: Any) -> None:
         if run.sol is not None and len(run.sol.ts) > 1:

@@ -158,9 +158,8 @@ def long_steps(
         return None
     if model.delays:
         # a candidate with a dead time takes every sample, whatever the plan says
-        places = [list(model.parameters).index(name) for name in model.delays]
         candidates = candidates.copy()
-        candidates[:, places] = 0.0
+        candidates[:, [list(model.parameters).index(name) for name in model.delays]] = 0.0
         run = simulate(model, manoeuvre, candidates, schedule)
     lasting = LASTING * model.plant.scales.speed
     plan = np.ones(manoeuvre.n_samples - 1, dtype=np.int64)

@@ -30,7 +30,7 @@ FEWEST = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
-OF_DELAYS = (TEMPLATE.with_name("delays.py.jinja"), TEMPLATE.with_name("history.py.jinja"))
+TEMPLATES = (TEMPLATE, TEMPLATE.with_name("delays.py.jinja"), TEMPLATE.with_name("history.py.jinja"))
 # Prefixes of lists of names in the template.
 OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
 OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur", "p0", "p1")
@@ -41,18 +41,11 @@ OF_GUARDS = ("ga", "gb", "gm", "gd", "ge", "c")
 
 
 @dataclass(frozen=True)
-class LateInput:
-    """Hold one late input: its local name, the name and the number of the input, and the number of its delay."""
+class Late:
+    """Hold one late input or state: its local name, that of the input or state, and the number of its delay.
 
-    name: str
-    of: str
-    place: int
-    delay: int
-
-
-@dataclass(frozen=True)
-class LateState:
-    """Hold one late state: its local name, the state, its number among those that are remembered, its delay."""
+    place: number of the input, or of the state among those that are remembered.
+    """
 
     name: str
     of: str
@@ -69,9 +62,9 @@ class KernelParts:
     fixed: quantities that do not move, computed once. states, inputs, latches: what moves, each in its order.
     outputs: recorded signals. latch_guards: the guard of each latch; kinks: the other guards; driven_start: whether a
     state starts where the inputs say; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
-    whether there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by which
-    inputs and states are late; the motion sees the first n_moving of them, and they cut each sample interval where inputs
-    drive it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which of the delays.
+    whether there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by
+    which inputs and states are late; the motion sees the first n_moving of them, and they cut each sample interval
+    where inputs drive it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which delay.
     """
 
     equations: str
@@ -91,8 +84,8 @@ class KernelParts:
     wide: bool
     delays: list[str]
     n_moving: int
-    late_inputs: list[LateInput]
-    late_states: list[LateState]
+    late_inputs: list[Late]
+    late_states: list[Late]
 
     def text(self) -> str:
         # Imported here: a module that is in the cache is not generated again.
@@ -119,11 +112,13 @@ class KernelParts:
         lists["judging"] = f"judged, {listed(self.states, 'per_')}"
         names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
         remembered = list(dict.fromkeys(one.of for one in self.late_states))
-        of_delays = [listed([f"{word}_{i}" for i in range(len(self.delays))]) for word in ("late_by", "whole", "rest", "using")]
-        given = "history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays) if self.late_states else ""
+        numbers = [str(i) for i in range(len(self.delays))]
+        of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]
+        given = "history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
         names |= {
             "driven": driven, "late_names": late_states, "remembered": remembered, "late_by": of_delays[0],
-            "late_by_names": [f"late_by_{i}" for i in range(len(self.delays))], "late_given": given,
+            "late_by_names": [f"late_by_{i}" for i in range(len(self.delays))],
+            "late_given": given if self.late_states else "",
             "last_rates": listed(remembered, "k4_"), "n_cutting": self.n_moving if self.inputs else 0,
             "felt": sorted({one.delay for one in self.late_states if one.delay < self.n_moving}),
             "delays_of_states": {one.delay for one in self.late_states},
@@ -223,9 +218,7 @@ class Emitter:
             delays=delays, n_moving=n_moving, late_inputs=late_inputs, late_states=late_states,
         )  # fmt: skip
 
-    def late_leaves(
-        self, moving: list[str], recorded: list[str]
-    ) -> tuple[list[str], int, list[LateInput], list[LateState]]:
+    def late_leaves(self, moving: list[str], recorded: list[str]) -> tuple[list[str], int, list[Late], list[Late]]:
         """Return the delays of a model, how many of them the motion sees, and what is late by them.
 
         moving: keys of rates and guards; recorded: of what is recorded alone.
@@ -240,9 +233,9 @@ class Emitter:
         inputs = [i.name for i in self.model.plant.inputs]
         states = list(dict.fromkeys(n.needs[0] for n in late if n.kind == "late_state"))
         made = {kind: [
-            one(variable(n.key), variable(n.needs[0]), known.index(n.needs[0]), by.index(n.by))
+            Late(variable(n.key), variable(n.needs[0]), known.index(n.needs[0]), by.index(n.by))
             for n in late if n.kind == kind
-        ] for kind, one, known in (("late_input", LateInput, inputs), ("late_state", LateState, states))}  # fmt: skip
+        ] for kind, known in (("late_input", inputs), ("late_state", states))}  # fmt: skip
         n_moving = len({n.by for n in late if n.key in seen})
         delays = [" + ".join(map(variable, several)) for several in by]
         return delays, n_moving, made["late_input"], made["late_state"]

@@ -271,7 +271,7 @@ def late_values(node: Node, manoeuvre: Manoeuvre, model: Model, values: Mapping[
     holds = {i.name: i.hold or manoeuvre.hold for i in model.plant.inputs}
     if holds.get(node.needs[0]) == "zero":
         return np.asarray(known[np.maximum(np.floor(places).astype(int), 0)])
-    return np.interp(places, np.arange(len(known)), known)
+    return np.asarray(np.interp(places, np.arange(len(known)), known))
 
 
 def flat(name: str) -> str:

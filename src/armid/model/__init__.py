@@ -12,5 +12,6 @@ from armid.model.plant import Array, Constant, Input, Manoeuvre, ManoeuvreKey, O
 
 __all__ = [
     "EFFECTS", "PLANTS", "Array", "Constant", "Delay", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
-    "Output", "Parameter", "Plant", "Scales", "State", "applicable", "distinct", "fitting_form", "is_late_as_a_whole", "refusal_of",
+    "Output", "Parameter", "Plant", "Scales", "State", "applicable", "distinct", "fitting_form", "is_late_as_a_whole",
+    "refusal_of",
 ]  # fmt: skip

@@ -83,8 +83,8 @@ class Effect:
     the others, whole effects of the same name. A model takes one of them; who looks for an effect tries `every_form`.
     unless: a port; a plant that offers it refuses this form, as another acts there.
     delays: late signals, names that the equations of the effect may use.
-    exact: the effect that this one approximates, None where it is exact. Both have the same parameters. The difference of
-    their signals is the error of the approximation, see `Model.exact`. A search tries a form that approximates only
+    exact: the effect that this one approximates, None where it is exact. Both have the same parameters. The difference
+    of their signals is the error of the approximation, see `Model.exact`. A search tries a form that approximates only
     where it was chosen by its word.
 
     Raises ArmidError when it adds nothing, names something twice, or has a form of another name or without a word.
@@ -122,8 +122,8 @@ class Effect:
         for delay in self.delays:
             known = [p.name for p in self.parameters]
             if delay.by not in known:
-                raise ArmidError(f"effect '{self.name}' delays '{delay.name}' by '{delay.by}', which is no parameter of "
-                                 f"it: {nearest(delay.by, known)}")  # fmt: skip
+                raise ArmidError(f"effect '{self.name}' delays '{delay.name}' by '{delay.by}', which is no parameter "
+                                 f"of it: {nearest(delay.by, known)}")  # fmt: skip
         if self.exact is not None and self.exact.parameters != self.parameters:
             raise ArmidError(f"effect '{self.name}' approximates one with other parameters: the same are expected")
         words = [e.form for e in self.every_form]

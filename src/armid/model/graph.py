@@ -26,8 +26,9 @@ class Node:
     """One name of the composed equations.
 
     key: flat, unique identifier (`omega`, `coulomb__level`); kind: a leaf, or "quantity", "term", "port", "rate",
-    "initial", "guard", "late" (a quantity of late leaves; "delayed" until these are there); arguments: (argument of the function, key it is bound to); terms: what a port sums; by: keys of
-    the parameters whose sum a late leaf is late by [s].
+    "initial", "guard", "late" (a quantity of late leaves; "delayed" until these are there); arguments: (argument of the
+    function, key it is bound to); terms: what a port sums; by: keys of the parameters whose sum is the delay of a late
+    leaf [s].
     """
 
     key: str
@@ -225,7 +226,8 @@ def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
     for delay in () if effect is None else effect.delays:
         now = f"{prefix}{delay.name}__now"
         equation(now, "quantity", delay.of, f"late signal '{delay.name}'")
-        graph.add(Node(f"{prefix}{delay.name}", "delayed", owner, itself, (("value", now),), by=(f"{prefix}{delay.by}",)))
+        by = (f"{prefix}{delay.by}",)
+        graph.add(Node(f"{prefix}{delay.name}", "delayed", owner, itself, (("value", now),), by=by))
     holder = plant if effect is None else effect
     for state in holder.states:
         equation(f"rate__{prefix}{state.name}", "rate", state.rate, f"rate of '{state.name}'")

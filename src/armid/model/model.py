@@ -11,7 +11,6 @@ from armid.model.graph import Graph, build_graph, equations_text
 from armid.model.parameter import Parameter, resolve
 from armid.model.plant import Plant
 
-
 K = TypeVar("K")
 
 

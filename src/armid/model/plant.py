@@ -215,8 +215,8 @@ class Plant:
         quantity) and `output_unit` say it as well; else these are those of the first output.
     aliases: further names for states and quantities, so that effects can be written once for many plants: ours ask for
         `omega` (speed), `theta` (position), `drive_effort` and `load_effort` (what drives, what it works against), and
-        `voltage` (what a motor with a back-EMF is fed with; effects add to it at the port `winding`). An only input in V
-        of a plant with this port is its `voltage`.
+        `voltage` (what a motor with a back-EMF is fed with; effects add to it at the port `winding`). An only input in
+        V of a plant with this port is its `voltage`.
     from_rest: True when a record starts at t = 0 from the declared initial state; False when it starts at its first
         sample from the measured state: then declare the constants `start_position` and `start_speed` (either or both),
         which the reader sets from the columns of position and speed, and use them as initial values.

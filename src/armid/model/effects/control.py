@@ -146,10 +146,8 @@ def late_speed_error(late_speed, omega):
     return late_speed - omega
 
 
-def late_angle_command(
-    closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, late_angle
-):
-    """Voltage to add to the demand [V]: K_p (q(t) - q(t - T)), q the angle; what makes it full until the late switch."""
+def late_angle_command(closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, late_angle):
+    """Voltage to add to the demand [V]: K_p (q(t) - q(t - T)), q the angle; full voltage until the late switch."""
     full = 2 * (U + u_th) * direction - K_p * (theta_D - theta) + damping * (omega + feedback)
     return np.where(closed - acting > 0.5, full, K_p * (theta - late_angle))
 

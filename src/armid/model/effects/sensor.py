@@ -105,7 +105,6 @@ output_lag = Effect(
 )  # fmt: skip
 
 
-
 def delay_error(late, omega):
     """Speed that is recorded less the true one, w(t - T) - w(t): the sensor shows the speed of a dead time T ago."""
     return late - omega
