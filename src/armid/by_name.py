@@ -68,8 +68,8 @@ def opened(
     campaign: a path, a Campaign, or one or several pandas DataFrames with the headers of a campaign's CSV files, whose
     `table.attrs` holds the keys of its [[records]] entry. effects: names or Effects to add to those that the campaign
     declares; NAME takes the first form that fits, NAME:FORM another. plugins: FILE.py:attribute of the user.
-    window: (begin, end), s, what is seen of every record. bounds, fix: name -> (low, high), and value, SI. plant: name or Plant, of tables; or a plant of the
-    user that campaign.toml names. model: in place of the declared one.
+    window: (begin, end), s, what is seen of every record. bounds, fix: name -> (low, high), and value, SI. plant: name
+    or Plant, of tables; or a plant of the user that campaign.toml names. model: in place of the declared one.
     """
     refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
