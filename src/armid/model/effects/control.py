@@ -130,31 +130,29 @@ def still_to_wait(closed, delay, period, waiting, clock):
     return np.where(closed > 0.5, np.where(period > SHORT, sample, due) - clock, lateness(delay, period))
 
 
-def held_speed(omega, period, smooth, slope):
-    """Speed that a control with this sample period holds on average [rad/s]."""
-    return omega + late_feedback(0.0, period, omega, smooth, slope)
+def present_angle(theta):
+    """Angle that the control measures [rad]."""
+    return theta
 
 
-def held_angle(theta, period, smooth, slope):
-    """Angle that a control with this sample period holds on average [rad]."""
-    bend = held_part(0.0, period) * filter_time(0.0, period) ** 2 / 12
-    return theta - lateness(0.0, period) * smooth - bend * slope
+def late_held_feedback(late_speed, omega, period, smooth, slope):
+    """Speed that the control sees less the true one [rad/s]: the speed of a dead time ago, held for a period."""
+    return late_speed - omega + late_feedback(0.0, period, late_speed, smooth, slope)
 
 
-def late_speed_error(late_speed, omega):
-    """Speed that the control sees less the true one [rad/s], w(t - T) - w(t), T the dead time."""
-    return late_speed - omega
-
-
-def late_angle_command(closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, late_angle):
-    """Voltage to add to the demand [V]: K_p (q(t) - q(t - T)), q the angle; full voltage until the late switch."""
+def late_held_command(
+    closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, late_angle, period, smooth, slope
+):
+    """Voltage to add to the demand [V]: K_p times how far the late, held angle is behind; full until the late switch."""
     full = 2 * (U + u_th) * direction - K_p * (theta_D - theta) + damping * (omega + feedback)
-    return np.where(closed - acting > 0.5, full, K_p * (theta - late_angle))
+    bend = held_part(0.0, period) * filter_time(0.0, period) ** 2 / 12
+    behind = theta - late_angle + lateness(0.0, period) * smooth + bend * slope
+    return np.where(closed - acting > 0.5, full, K_p * behind)
 
 
-def held_slope_rate(period, omega, smooth, slope):
-    """Second derivative of the held speed [rad/s3], see `slope_rate`."""
-    return slope_rate(0.0, period, omega, smooth, slope)
+def held_slope_rate(period, late_speed, smooth, slope):
+    """Second derivative of the late speed that is held [rad/s3], see `slope_rate`."""
+    return slope_rate(0.0, period, late_speed, smooth, slope)
 
 
 def filtered_drive(delay, slope):
@@ -174,7 +172,7 @@ DEAD_TIME = (
 )
 PADE = "Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9"
 late_feedback_of_plant = Effect(
-    name="controller_delay", form="feedback", adds={"feedback": late_speed_error, "command": late_angle_command},
+    name="controller_delay", form="feedback", adds={"feedback": late_held_feedback, "command": late_held_command},
     states=(
         State("smooth", "rad/s", slope_itself, start_speed),
         State("slope", "rad/s2", held_slope_rate, zero),
@@ -182,7 +180,7 @@ late_feedback_of_plant = Effect(
         State("clock", "s", clock_rate, zero),
     ),
     guards=(Guard("acting", still_to_wait, latch=True),),
-    delays=(Delay("late_speed", held_speed, "delay"), Delay("late_angle", held_angle, "delay")),
+    delays=(Delay("late_speed", start_speed, "delay"), Delay("late_angle", present_angle, "delay")),
     parameters=(
         Parameter("delay", "s", 0.0, 0.03, null=0.0, note="dead time of the control"),
         Parameter("period", "s", 0.0, 0.03, null=0.0, fixed=0.0, note="between samples of a digital control"),
