@@ -143,7 +143,7 @@ def late_held_feedback(late_speed, omega, period, smooth, slope):
 def late_held_command(
     closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, late_angle, period, smooth, slope
 ):
-    """Voltage to add to the demand [V]: K_p times how far the late, held angle is behind; full until the late switch."""
+    """Voltage to add to the demand [V]: K_p times the lag of the late, held angle; full until the late switch."""
     full = 2 * (U + u_th) * direction - K_p * (theta_D - theta) + damping * (omega + feedback)
     bend = held_part(0.0, period) * filter_time(0.0, period) ** 2 / 12
     behind = theta - late_angle + lateness(0.0, period) * smooth + bend * slope
