@@ -9,7 +9,7 @@ from typing import Any
 WHERE = {
     "armid.errors": ("ArmidError",),
     "armid.model": (
-        "EFFECTS", "PLANTS", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
+        "EFFECTS", "PLANTS", "Constant", "Delay", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
         "Output", "Parameter", "Plant", "Scales", "State",
     ),
     "armid.engine": ("Schedule", "Simulation", "calibrate", "probes"),

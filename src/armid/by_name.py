@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Effect, Manoeuvre, Model, Plant, refusal_of
+from armid.model import Effect, Manoeuvre, Model, Plant, fitting_form, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.progress import announced
@@ -68,9 +68,9 @@ def opened(
 
     campaign: a path, a Campaign, or one or several pandas DataFrames with the headers of a campaign's CSV files, whose
     `table.attrs` holds the keys of its [[records]] entry. effects: names or Effects to add to those that the campaign
-    declares; NAME:FORM names a form. plugins: FILE.py:attribute of the user. window: (begin, end), s, what is seen of
-    every record. bounds, fix: name -> (low, high), and value, SI. plant: name or Plant, of tables; or a plant of the
-    user that campaign.toml names. model: in place of the declared one.
+    declares; NAME takes the first form that fits, NAME:FORM another. plugins: FILE.py:attribute of the user.
+    window: (begin, end), s, what is seen of every record. bounds, fix: name -> (low, high), and value, SI. plant: name
+    or Plant, of tables; or a plant of the user that campaign.toml names. model: in place of the declared one.
     """
     refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
@@ -85,7 +85,7 @@ def opened(
             chosen(name, {**sensor_effects(read.declared), **effects_known}, "effect")
         model = read.model(registry.effects)
     for effect in each_of(effects):
-        model = model + effect_of(effect, effects_known)
+        model = model + effect_of(effect, effects_known, read.plant)
     warn_of_far(fix or {}, bounds or {}, model)
     return Opened(registry, read, model, dict(bounds or {}), dict(fix or {}))
 
@@ -160,12 +160,13 @@ def each_of(given: Any) -> Iterator[Any]:
         yield from one.split(",") if isinstance(one, str) else [one]
 
 
-def effect_of(given: Any, effects: Mapping[str, Effect]) -> Effect:
+def effect_of(given: Any, effects: Mapping[str, Effect], plant: Plant) -> Effect:
+    """Return an effect by its name, in the form of a word or else in the first form that the plant takes."""
     if isinstance(given, Effect):
         return given
     name, _, form = str(given).strip().partition(":")
     effect: Effect = chosen(name, effects, "effect")
-    return effect.in_form(form) if form else effect
+    return effect.in_form(form) if form else fitting_form(effect, plant)
 
 
 def chosen(name: str, known: Mapping[str, object], what: str) -> Any:

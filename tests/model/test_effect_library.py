@@ -94,7 +94,9 @@ def test_forms_stand_under_one_name():
     forms = {name: [e.form for e in EFFECTS[name].every_form] for name in EFFECTS if EFFECTS[name].forms}
     assert forms.items() >= {"presliding": ["dahl", "lugre", "bouc_wen"],
                              "drive_lag": ["current_loop", "actuator", "voltage"],
-                             "controller_delay": ["feedback", "command", "voltage"]}.items()  # fmt: skip
+                             "drive_delay": ["effort", "voltage"],
+                             "controller_delay": ["feedback", "command", "voltage", "feedback_filter", "command_filter",
+                                                  "voltage_filter"]}.items()  # fmt: skip
     late, lagging = (EFFECTS[name].in_form("voltage") for name in ("controller_delay", "drive_lag"))
     assert "is for plants without the port 'command'" in refusal_of(late, ARM)
     assert "'winding'" in refusal_of(lagging, PLANTS["driven_axis"])

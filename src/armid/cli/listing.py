@@ -96,6 +96,8 @@ def effect_text(effect: Effect, plants: Sequence[Plant] = ()) -> str:
 def form_lines(effect: Effect, with_source: bool) -> list[str]:
     lines = [f"  port {port} += {returned_text(f)}" for port, f in effect.adds.items()]
     lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {returned_text(s.rate)}" for s in effect.states]
+    lines += [f"  {d.name}: {returned_text(d.of)} at t - {d.by}" for d in effect.delays]
+    lines += [f"  approximates the form {effect.exact.form}"] if effect.exact is not None else []
     lines += [f"  switch {g.name} where {returned_text(g.function)} comes to 0" for g in effect.guards]
     lines += [f"  {parameter_text(p)}" for p in effect.parameters]
     return lines + ([f"  source: {effect.source}"] if with_source and effect.source else [])

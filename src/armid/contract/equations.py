@@ -315,4 +315,5 @@ def functions_of(effect: Effect) -> Iterator[tuple[str, Equation]]:
     for state in effect.states:
         yield f"rate__{effect.name}__{state.name}", state.rate
         yield f"initial__{effect.name}__{state.name}", state.initial
+    yield from ((f"{effect.name}__{delay.name}", delay.of) for delay in effect.delays)
     yield from ((f"guard__{effect.name}__{guard.name}", guard.function) for guard in effect.guards)

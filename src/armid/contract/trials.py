@@ -1,6 +1,7 @@
 """What contracts find, and the candidates and manoeuvres on which they are tried."""
 
-from collections.abc import Callable, Iterable
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -11,7 +12,7 @@ from scipy.integrate import solve_ivp
 from armid.engine import probes
 from armid.errors import ArmidError
 from armid.model import Array, Effect, Input, Manoeuvre, Model, Parameter, Plant
-from armid.model.graph import Node
+from armid.model.graph import LATE_LEAVES, Node
 
 N_SAMPLES, INTERVAL = 401, 2e-3
 # The moment of gravity that a hanging axis gets, as a share of the effort scale.
@@ -155,28 +156,33 @@ MOST_RATES = 100_000
 def simulate_plainly(model: Model, manoeuvre: Manoeuvre, candidate: Array) -> Array:
     """Return the recorded signals of one candidate, (n_outputs, n_samples), error about 1e-9 of their size.
 
-    DOP853, restarted at every kink and switch, and at every sample where inputs drive the machine.
+    DOP853, restarted at every kink and switch, at every sample where inputs drive the machine, and where what is late
+    may jump or bend. No piece is longer than a dead time, so that late states are known from the pieces before.
     """
     plain = PlainModel(model, manoeuvre, candidate)
     times, states = manoeuvre.times(), plain.start()
     closed = plain.switched(times[0], states, tuple(0.0 for _ in plain.latches))
     out = np.empty((len(model.plant.outputs), len(times)))
     out[:, 0] = plain.recorded(times[0], states, closed)
-    length = 1 if plain.inputs else len(times) - 1
-    for first in range(0, len(times) - 1, length):
-        begin, n = times[first], first + 1
-        while n <= first + length:
-            plain.sample = first
-            run = plain.integrated(begin, states, closed, times[n : first + length + 1])
+    begin, n = float(times[0]), 1
+    ends = plain.ends(times)
+    for end in ends:
+        plain.sample = n - 1
+        while begin < end:
+            plain.middle = 0.5 * (begin + end)
+            run = plain.integrated(begin, states, closed, np.append(times[n:][times[n:] < end], end))
             if run.status < 0:
                 raise ArmidError(f"scipy does not get beyond {begin:.3g} s: {run.message}")
             hit = [(t[-1], y[-1]) for t, y in zip(run.t_events or [], run.y_events or [], strict=True) if len(t)]
             begin, states = hit[0] if run.status == 1 else (run.t[-1], run.y[:, -1])
+            plain.remember(run)
             before, closed = closed, plain.switched(float(begin), states, closed)
             for t, y in zip(run.t, np.reshape(run.y, (len(states), -1)).T, strict=True):
-                plain.sample = n
-                out[:, n] = plain.recorded(t, y, closed if t == begin else before)
-                n += 1
+                if n < len(times) and t == times[n]:
+                    plain.sample = n
+                    plain.middle = np.nextafter(t, np.inf)
+                    out[:, n] = plain.recorded(t, y, closed if t == begin else before)
+                    n += 1
     return out
 
 
@@ -195,8 +201,11 @@ class PlainModel:
         self.kinks = [g for g in guards if g.removeprefix("guard__") not in self.latches]
         self.orders: dict[tuple[str, ...], list[Node]] = {}
         self.n_rates = 0
-        # the sample whose value a held input has
-        self.sample = 0
+        # the sample whose value a held input has, and a time inside the piece that is integrated
+        self.sample, self.middle = 0, manoeuvre.start_time
+        self.late = {n.key: (n.needs[0], max(sum(self.known[k] for k in n.by), 0.0))
+                     for n in self.graph.of_kind(*LATE_LEAVES)}  # fmt: skip
+        self.pieces: list[tuple[float, Any]] = []
 
     def evaluate(self, keys: list[str], values: dict[str, Any]) -> list[Any]:
         known = self.known | values
@@ -214,9 +223,45 @@ class PlainModel:
     def moment(self, time: float, states: Array, closed: Latches) -> dict[str, Any]:
         values: dict[str, Any] = dict(zip(self.states, states, strict=True))
         values |= dict(zip(self.latches, closed, strict=True))
+        for key, (of, delay) in self.late.items():
+            values[key] = self.late_value(of, delay, time, values)
         return values | {"time": time} | {name: self.input_at(name, time) for name in self.inputs}
 
-    def input_at(self, name: str, time: float) -> float:
+    def ends(self, times: Array) -> Array:
+        """Return where pieces end: at samples where inputs drive, a dead time after them, and after every dead time."""
+        delays = {delay for _, delay in self.late.values() if 0.0 < delay < times[-1] - times[0]}
+        if not (self.inputs or delays):
+            return times[-1:]
+        found = [times[1:], *(times + delay for delay in delays)]
+        if any(of in self.states for of, _ in self.late.values()) and delays:
+            found.append(np.arange(times[0], times[-1], min(delays))[1:])
+        ends = np.unique(np.concatenate(found))
+        # what lies within rounding of a sample is that sample
+        near = np.abs(ends[:, np.newaxis] - times).min(axis=1)
+        ends = ends[(near == 0.0) | (near > 1e-9 * self.manoeuvre.interval)]
+        return np.asarray(ends[(ends > times[0]) & (ends <= times[-1])])
+
+    def remember(self, run: Any) -> None:
+        if run.sol is not None and len(run.sol.ts) > 1:
+            self.pieces.append((float(run.sol.ts[-1]), run.sol))
+
+    def late_value(self, of: str, delay: float, time: float, values: Mapping[str, Any]) -> float:
+        """Return a state or an input a dead time before; before the start its first value."""
+        if of in self.inputs:
+            return self.input_at(of, time - delay, self.middle - delay)
+        if delay == 0.0:
+            return float(values[of])
+        when, place = time - delay, self.states.index(of)
+        if when <= self.manoeuvre.start_time or not self.pieces:
+            return float(self.start()[place])
+        i = min(bisect_left(self.pieces, when - 1e-13, key=lambda piece: piece[0]), len(self.pieces) - 1)
+        return float(self.pieces[i][1](when)[place])
+
+    def input_at(self, name: str, time: float, inside: float | None = None) -> float:
+        """Return an input; inside: a time at which it has the same value where it is held, None: the present sample."""
+        if inside is not None and self.inputs[name] == "zero":
+            place = (inside - self.manoeuvre.start_time) / self.manoeuvre.interval
+            return float(self.manoeuvre.inputs[name][max(int(np.floor(place)), 0)])
         samples, place = self.manoeuvre.inputs[name], (time - self.manoeuvre.start_time) / self.manoeuvre.interval
         if self.inputs[name] == "zero":
             return float(samples[self.sample])
@@ -242,7 +287,7 @@ class PlainModel:
         keys = [f"guard__{k}" for k, c in zip(self.latches, closed, strict=True) if not c] + self.kinks
         return solve_ivp(
             lambda t, y: self.rates(t, y, closed), (begin, times[-1]), states, method="DOP853", rtol=TOLERANCE,
-            atol=TOLERANCE, t_eval=times, max_step=LONGEST_STEP * self.manoeuvre.interval,
+            atol=TOLERANCE, t_eval=times, dense_output=bool(self.late), max_step=LONGEST_STEP * self.manoeuvre.interval,
             events=[self.event(key, begin, closed) for key in keys] or None,
         )  # fmt: skip
 
@@ -251,7 +296,8 @@ class PlainModel:
 
         def event(time: float, states: Array) -> float:
             (value,) = self.evaluate([key], self.moment(time, states, closed))
-            return value if time > begin + 1e-9 else 1.0 if value >= 0.0 else -1.0
+            # nor where a machine rests exactly on it
+            return value if time > begin + 1e-9 and value != 0.0 else 1.0 if value >= 0.0 else -1.0
 
         event.terminal = True  # type: ignore[attr-defined]
         return event

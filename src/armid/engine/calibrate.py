@@ -156,6 +156,11 @@ def long_steps(
     """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may."""
     if not model.latches or model.plant.inputs or manoeuvre.n_samples < 2 * LONGEST:
         return None
+    if model.delays:
+        # a candidate with a dead time takes every sample, whatever the plan says
+        candidates = candidates.copy()
+        candidates[:, [list(model.parameters).index(name) for name in model.delays]] = 0.0
+        run = simulate(model, manoeuvre, candidates, schedule)
     lasting = LASTING * model.plant.scales.speed
     plan = np.ones(manoeuvre.n_samples - 1, dtype=np.int64)
     # The last sample at which enough candidates are still before their first switch.

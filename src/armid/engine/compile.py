@@ -27,7 +27,7 @@ UNCOMPILABLE = (NumbaError, UnsupportedBytecodeError)
 LANE_WIDTH = 8
 Kernel = Callable[..., Any]
 # What a generated module is made by and compiled from.
-MADE_FROM = [generate.TEMPLATE, *(Path(str(module.__file__)) for module in (generate, simd, simd_math))]
+MADE_FROM = [*generate.TEMPLATES, *(Path(str(module.__file__)) for module in (generate, simd, simd_math))]
 KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
 # Threads that ask for the same model at once share one kernel, which numba then compiles once.
 LOCK = RLock()

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from armid.engine.transpile import SourceText, local_name
 from armid.model import Model
+from armid.model.graph import LATE_LEAVES
 
 # Samples that are gathered before they are copied to the rows of the candidates; times that one step may be cut; sample
 # intervals that one step may span.
@@ -27,14 +28,29 @@ LONGEST = 8
 # Below so many effects a model is what a user asked for, every effect in use; the choice would only cost.
 FEWEST = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
-IDLE = {"term": 0.0, "rate": 0.0, "guard": 1.0}
+IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
+TEMPLATES = (TEMPLATE, TEMPLATE.with_name("delays.py.jinja"), TEMPLATE.with_name("history.py.jinja"))
 # Prefixes of lists of names in the template.
 OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
-OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur")
-OF_CARRIED = ("n", "o", "r")
+OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur", "p0", "p1")
+OF_CARRIED = ("n", "o", "r", "t")
 OF_OUTPUTS = ("rec",)
+OF_LATE_STATES = ("l", "ha", "hm", "hb", "hs", "hq", "hx", "w")
 OF_GUARDS = ("ga", "gb", "gm", "gd", "ge", "c")
+
+
+@dataclass(frozen=True)
+class Late:
+    """Hold one late input or state: its local name, that of the input or state, and the number of its delay.
+
+    place: number of the input, or of the state among those that are remembered.
+    """
+
+    name: str
+    of: str
+    place: int
+    delay: int
 
 
 @dataclass(frozen=True)
@@ -46,7 +62,9 @@ class KernelParts:
     fixed: quantities that do not move, computed once. states, inputs, latches: what moves, each in its order.
     outputs: recorded signals. latch_guards: the guard of each latch; kinks: the other guards; driven_start: whether a
     state starts where the inputs say; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
-    whether there are so many effects that what is rarely needed is compiled but once.
+    whether there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by
+    which inputs and states are late; the motion sees the first n_moving of them, and they cut each sample interval
+    where inputs drive it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which delay.
     """
 
     equations: str
@@ -64,21 +82,27 @@ class KernelParts:
     driven_start: bool
     jumping_guards: bool
     wide: bool
+    delays: list[str]
+    n_moving: int
+    late_inputs: list[Late]
+    late_states: list[Late]
 
     def text(self) -> str:
         # Imported here: a module that is in the cache is not generated again.
-        from jinja2 import Environment, StrictUndefined
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
         environment = Environment(
             variable_start_string="{", variable_end_string="}", trim_blocks=True, lstrip_blocks=True,
-            keep_trailing_newline=True, undefined=StrictUndefined,
+            keep_trailing_newline=True, undefined=StrictUndefined, loader=FileSystemLoader(TEMPLATE.parent),
         )  # fmt: skip
         environment.filters |= {"each": each, "listed": listed, "nested": nested}
         guards = [*self.latch_guards, *self.kinks]
         times = [f"time_of_{k}" for k in self.latches]
         carried = [*self.latches, *times, *self.states, *(f"ga_{g}" for g in guards)]
-        prefixed = ((self.states, OF_STATES), (self.inputs, OF_INPUTS), (self.outputs, OF_OUTPUTS),
-                    (guards, OF_GUARDS), (carried, OF_CARRIED))  # fmt: skip
+        late_inputs, late_states = ([one.name for one in several] for several in (self.late_inputs, self.late_states))
+        driven = [*self.inputs, *late_inputs]
+        prefixed = ((self.states, OF_STATES), (driven, OF_INPUTS), (self.outputs, OF_OUTPUTS), (guards, OF_GUARDS),
+                    (carried, OF_CARRIED), (late_states, OF_LATE_STATES))  # fmt: skip
         lists = {prefix: listed(names, f"{prefix}_") for names, prefixes in prefixed for prefix in prefixes}
         lists |= {
             "x": listed(self.states), "x_n": listed(self.states, "n_"), "fixed": listed(self.fixed),
@@ -87,7 +111,19 @@ class KernelParts:
         }  # fmt: skip
         lists["judging"] = f"judged, {listed(self.states, 'per_')}"
         names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
-        return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+        remembered = list(dict.fromkeys(one.of for one in self.late_states))
+        numbers = [str(i) for i in range(len(self.delays))]
+        of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]
+        given = "history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
+        names |= {
+            "driven": driven, "late_names": late_states, "remembered": remembered, "late_by": of_delays[0],
+            "late_by_names": [f"late_by_{i}" for i in range(len(self.delays))],
+            "late_given": given if self.late_states else "",
+            "last_rates": listed(remembered, "k4_"), "n_cutting": self.n_moving if self.inputs else 0,
+            "felt": sorted({one.delay for one in self.late_states if one.delay < self.n_moving}),
+            "delays_of_states": {one.delay for one in self.late_states},
+        }  # fmt: skip
+        return environment.get_template(TEMPLATE.name).render(
             names | lists, guards=guards, carried=carried, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST,
             switches=list(zip(self.latches, self.latch_guards, strict=True)),
         )  # fmt: skip
@@ -149,6 +185,7 @@ class Emitter:
         guards, inputs = [*latch_guards, *kinks], [i.name for i in model.plant.inputs]
         recorded = [o.signal for o in model.plant.outputs]
         fixed = self.fixed_keys([*rates, *guards, *recorded])
+        delays, n_moving, late_inputs, late_states = self.late_leaves([*rates, *guards], recorded)
         used = [f"{word}_{effect}" for effect in self.strengths for word in ("using", "used")]
         lists: dict[str, Iterable[str]] = {
             "parameters": model.parameters, "starts": model.starts, "fixed": fixed, "states": model.states,
@@ -161,7 +198,8 @@ class Emitter:
         given = [*names["parameters"], *names["starts"], *names["constants"]]
         starts = [n.replace("rate__", "initial__", 1) for n in rates]
         at_start = [variable(k) for k in ("time", *inputs)] if self.uses(starts, ["time", *inputs]) else []
-        moving = [variable("time"), *names["latches"], *names["states"], *names["inputs"], *names["fixed"]]
+        moving = [variable("time"), *names["latches"], *names["states"], *names["inputs"],
+                  *(one.name for one in (*late_inputs, *late_states)), *names["fixed"]]  # fmt: skip
         switches = [line for effect, nulls in self.strengths.items() for line in use_lines(effect, nulls)]
         values = [f"1.0 * {variable(k)}" for k in fixed] + used
         texts = [
@@ -171,10 +209,36 @@ class Emitter:
             self.evaluation("guards", moving, guards),
             self.evaluation("recorded", moving, recorded),
         ]
+        if delays:
+            texts.append(self.function("delay_values", given, [], [f"{by} + 0.0" for by in delays]))
         equations = self.function_texts() + "\n\n".join(texts)
-        jumping = bool(kinks) and self.uses(guards, inputs)
-        wide = bool(self.strengths)
-        return KernelParts(equations, width, **names, driven_start=bool(at_start), jumping_guards=jumping, wide=wide)
+        jumping = bool(kinks) and self.uses(guards, [*inputs, *(n.key for n in self.graph.of_kind("late_input"))])
+        return KernelParts(
+            equations, width, **names, driven_start=bool(at_start), jumping_guards=jumping, wide=bool(self.strengths),
+            delays=delays, n_moving=n_moving, late_inputs=late_inputs, late_states=late_states,
+        )  # fmt: skip
+
+    def late_leaves(self, moving: list[str], recorded: list[str]) -> tuple[list[str], int, list[Late], list[Late]]:
+        """Return the delays of a model, how many of them the motion sees, and what is late by them.
+
+        moving: keys of rates and guards; recorded: of what is recorded alone.
+        """
+        keys: dict[str, None] = {}
+        for wanted in (moving, recorded):
+            keys |= dict.fromkeys(k for n in self.graph.order(wanted) for k in n.needs)
+            if wanted is moving:
+                seen = list(keys)
+        late = [self.graph.nodes[k] for k in keys if self.graph.nodes[k].kind in LATE_LEAVES]
+        by = list(dict.fromkeys(node.by for node in late))
+        inputs = [i.name for i in self.model.plant.inputs]
+        states = list(dict.fromkeys(n.needs[0] for n in late if n.kind == "late_state"))
+        made = {kind: [
+            Late(variable(n.key), variable(n.needs[0]), known.index(n.needs[0]), by.index(n.by))
+            for n in late if n.kind == kind
+        ] for kind, known in (("late_input", inputs), ("late_state", states))}  # fmt: skip
+        n_moving = len({n.by for n in late if n.key in seen})
+        delays = [" + ".join(map(variable, several)) for several in by]
+        return delays, n_moving, made["late_input"], made["late_state"]
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:
         return any(k in wanted or self.uses(list(self.graph.nodes[k].needs), wanted) for k in keys)

@@ -117,6 +117,23 @@ def make_access(width: int) -> tuple[Any, Any]:
 
 
 @intrinsic
+def gather(typing_context, array, places):
+    """Return lanes from a contiguous float64 array, each from its own place, a whole number inside the array."""
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        indices = builder.fptosi(arguments[1], ir.VectorType(INT64, places.width))
+        result = ir.Constant(vector_of(places.width), ir.Undefined)
+        for i in range(places.width):
+            place = builder.extract_element(indices, ir.Constant(INT32, i))
+            value = builder.load(builder.gep(data, [place], source_etype=DOUBLE), align=8, typ=DOUBLE)
+            result = builder.insert_element(result, value, ir.Constant(INT32, i))
+        return result
+
+    return places(array, places), generate
+
+
+@intrinsic
 def store(typing_context, array, index, value):
     """Write lanes to a contiguous float64 array from an index on."""
 

@@ -1,6 +1,6 @@
 """Simulate a population of candidates."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model, compiling
 from armid.errors import ArmidError, nearest
 from armid.model import Array, Manoeuvre, Model
+from armid.model.graph import LATE_LEAVES, Node
 
 # Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
 SHARES = 4
@@ -130,6 +131,7 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
         DIVERGED * np.array(model.plant.sizes),
         schedule.rough is not None,
         np.zeros(len(model.states)) if schedule.rough is None else 1.0 / schedule.rough,
+        manoeuvre.n_before,
     )  # fmt: skip
     return Prepared(model, kernel, width, schedule, manoeuvre.n_samples, starts, settings, states)
 
@@ -188,7 +190,10 @@ def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
         if np.shape(manoeuvre.inputs[name]) != (manoeuvre.n_samples,):
             raise ArmidError(f"input '{name}' has shape {np.shape(manoeuvre.inputs[name])}: ({manoeuvre.n_samples},) "
                              "is expected")  # fmt: skip
-    return np.array([manoeuvre.inputs[name] for name in names], dtype=np.float64) if names else np.zeros((1, 1))
+    if not names:
+        return np.zeros((1, 1))
+    rows = [np.concatenate([manoeuvre.before.get(name, ()), manoeuvre.inputs[name]]) for name in names]
+    return np.array(rows, dtype=np.float64)
 
 
 def arranged(
@@ -243,6 +248,7 @@ def along(
     values |= {i.name: np.asarray(manoeuvre.inputs[i.name], dtype=float) for i in model.plant.inputs}
     values |= {flat(name): state[0] for name, state in run.states.items()} | {"time": times}
     values |= {flat(name): np.where(times >= when[0], 1.0, 0.0) for name, when in run.switch_times.items()}
+    values |= {node.key: late_values(node, manoeuvre, model, values) for node in model.graph.of_kind(*LATE_LEAVES)}
     keys = {name: flat(model.plant.aliases.get(name, name)) for name in names}
     for name, key in keys.items():
         if key not in model.graph.nodes:
@@ -251,6 +257,21 @@ def along(
     return {
         name: np.broadcast_to(np.asarray(values[key], dtype=float), times.shape).copy() for name, key in keys.items()
     }
+
+
+def late_values(node: Node, manoeuvre: Manoeuvre, model: Model, values: Mapping[str, Any]) -> Array:
+    """Return a late state or input on the samples, (n_samples,); a state runs straight between samples.
+
+    values: key -> value of parameters, states and inputs.
+    """
+    delay = max(sum(values[by] for by in node.by), 0.0) / manoeuvre.interval
+    before = np.asarray(manoeuvre.before.get(node.needs[0], ()), dtype=float)
+    known = np.concatenate([before, values[node.needs[0]]])
+    places = len(before) + np.arange(manoeuvre.n_samples) - delay
+    holds = {i.name: i.hold or manoeuvre.hold for i in model.plant.inputs}
+    if holds.get(node.needs[0]) == "zero":
+        return np.asarray(known[np.maximum(np.floor(places).astype(int), 0)])
+    return np.asarray(np.interp(places, np.arange(len(known)), known))
 
 
 def flat(name: str) -> str:

@@ -19,7 +19,7 @@ from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.errors import ArmidError
 from armid.estimation.least_squares import side_by_side
 from armid.inference.whitening import WhitenedData, WhiteRecords
-from armid.model import Array, Effect, Manoeuvre, Model, Parameter
+from armid.model import Array, Effect, Manoeuvre, Model, Parameter, distinct
 from armid.model.parameter import powers_of
 from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
@@ -307,8 +307,9 @@ def library_of(
     applicable = {
         EffectKey(effect.name, "" if form is effect else form.form): form
         for effect in candidates.values() if effect.name not in present
-        for form in effect.every_form if joined(declared, form) is not None
+        for form in effect.searched_forms if joined(declared, form) is not None
     }  # fmt: skip
+    applicable = distinct(applicable, declared.plant)
 
     def for_each_form(given: Mapping[str, T]) -> dict[str, T]:
         """Repeat what is given for a parameter for every form of its effect that has a parameter of that name."""

@@ -293,7 +293,7 @@ def estimates(
 def delays_of_the_drive(fit: Fit, library: Library) -> list[str]:
     """Return the names of the effects that follow the drive with states of their own, and act in its place."""
     effects = {key.public: library.candidates[key.declared] for key in fit.active}
-    return sorted(name for name, effect in effects.items() if effect.states and "drive" in effect.adds)
+    return sorted(n for n, e in effects.items() if (e.states or e.delays) and "drive" in e.adds)
 
 
 def interval_view(

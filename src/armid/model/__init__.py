@@ -5,12 +5,13 @@ model: a plant with effects. catalogue, effects, plants: what there is.
 """
 
 from armid.model.catalogue import EFFECTS, PLANTS
-from armid.model.effect import Effect, Guard, State
-from armid.model.model import Model, applicable, is_late_as_a_whole, refusal_of
+from armid.model.effect import Delay, Effect, Guard, State
+from armid.model.model import Model, applicable, distinct, fitting_form, is_late_as_a_whole, refusal_of
 from armid.model.parameter import Parameter, Scales
 from armid.model.plant import Array, Constant, Input, Manoeuvre, ManoeuvreKey, Output, Plant
 
 __all__ = [
-    "EFFECTS", "PLANTS", "Array", "Constant", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
-    "Output", "Parameter", "Plant", "Scales", "State", "applicable", "is_late_as_a_whole", "refusal_of",
+    "EFFECTS", "PLANTS", "Array", "Constant", "Delay", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
+    "Output", "Parameter", "Plant", "Scales", "State", "applicable", "distinct", "fitting_form", "is_late_as_a_whole",
+    "refusal_of",
 ]  # fmt: skip

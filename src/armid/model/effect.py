@@ -50,6 +50,28 @@ class Guard:
 
 
 @dataclass(frozen=True)
+class Delay:
+    """Declare a signal as it was a dead time ago, s(t - T); the delay is exact, no filter.
+
+    name: as the equations of the effect spell the late signal.
+    of: the signal s, a function of what the effect may ask for (no latch: a late switch is a guard of its own).
+    by: own parameter that is T [s]; a negative T is 0, and at 0 the late signal is the signal.
+
+    A recorded input is shifted with its hold: a held one jumps at its late time, inside a sample interval. States are
+    interpolated between the steps of the integrator (cubic, fourth order); T may be shorter than a step. Before the
+    first sample the signal has its first value: that of the inputs that a longer record holds before a piece of it,
+    else of the first sample. A T longer than the record leaves this first value throughout.
+    """
+
+    name: str
+    of: Equation
+    by: str
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "delay")
+
+
+@dataclass(frozen=True)
 class Effect:
     """Declare an addition: plain scalar functions whose argument names are the binding.
 
@@ -60,6 +82,10 @@ class Effect:
     form, forms: where one effect has several published forms, `form` says in a word which one this is and `forms` holds
     the others, whole effects of the same name. A model takes one of them; who looks for an effect tries `every_form`.
     unless: a port; a plant that offers it refuses this form, as another acts there.
+    delays: late signals, names that the equations of the effect may use.
+    exact: the effect that this one approximates, None where it is exact. Both have the same parameters. The difference
+    of their signals is the error of the approximation, see `Model.exact`. A search tries a form that approximates only
+    where it was chosen by its word.
 
     Raises ArmidError when it adds nothing, names something twice, or has a form of another name or without a word.
     """
@@ -75,6 +101,8 @@ class Effect:
     form: str = ""
     forms: tuple["Effect", ...] = ()
     unless: str = ""
+    delays: tuple[Delay, ...] = ()
+    exact: "Effect | None" = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "effect")
@@ -82,7 +110,8 @@ class Effect:
             raise ArmidError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED)} are taken")
         if not self.adds:
             raise ArmidError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
-        names = [*(p.name for p in self.parameters), *(s.name for s in self.states), *(g.name for g in self.guards)]
+        own = (self.parameters, self.states, self.guards, self.delays)
+        names = [one.name for several in own for one in several]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ArmidError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")
@@ -90,11 +119,23 @@ class Effect:
         if ports:
             raise ArmidError(f"effect '{self.name}' calls something else '{ports[0]}', as a port to which it adds: "
                              "another name is expected")  # fmt: skip
+        for delay in self.delays:
+            known = [p.name for p in self.parameters]
+            if delay.by not in known:
+                raise ArmidError(f"effect '{self.name}' delays '{delay.name}' by '{delay.by}', which is no parameter "
+                                 f"of it: {nearest(delay.by, known)}")  # fmt: skip
+        if self.exact is not None and self.exact.parameters != self.parameters:
+            raise ArmidError(f"effect '{self.name}' approximates one with other parameters: the same are expected")
         words = [e.form for e in self.every_form]
         if any(e.name != self.name for e in self.forms):
             raise ArmidError(f"effect '{self.name}' has a form of another name: forms are found under one name")
         if self.forms and (not all(words) or len(set(words)) < len(words)):
             raise ArmidError(f"effect '{self.name}' has the forms {words}: a word of its own is expected for each")
+
+    @property
+    def searched_forms(self) -> tuple["Effect", ...]:
+        """The effect and those of its other forms that are exact."""
+        return (self, *(form for form in self.forms if form.exact is None))
 
     @property
     def every_form(self) -> tuple["Effect", ...]:

@@ -16,7 +16,8 @@ from armid.errors import ArmidError, nearest
 from armid.model.effect import Effect, Equation
 from armid.model.plant import Plant
 
-LEAVES = ("parameter", "constant", "state", "input", "latch", "time")
+LATE_LEAVES = ("late_state", "late_input")
+LEAVES = ("parameter", "constant", "state", "input", "latch", "time", *LATE_LEAVES)
 STATIC_LEAVES = ("parameter", "constant")
 
 
@@ -25,7 +26,9 @@ class Node:
     """One name of the composed equations.
 
     key: flat, unique identifier (`omega`, `coulomb__level`); kind: a leaf, or "quantity", "term", "port", "rate",
-    "initial", "guard"; arguments: (argument of the function, key it is bound to); terms: what a port sums.
+    "initial", "guard", "late" (a quantity of late leaves; "delayed" until these are there); arguments: (argument of the
+    function, key it is bound to); terms: what a port sums; by: keys of the parameters whose sum is the delay of a late
+    leaf [s].
     """
 
     key: str
@@ -34,6 +37,7 @@ class Node:
     function: Equation | None = None
     arguments: tuple[tuple[str, str], ...] = ()
     terms: tuple[str, ...] = ()
+    by: tuple[str, ...] = ()
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -117,7 +121,51 @@ def build_graph(plant: Plant, effects: tuple[Effect, ...]) -> Graph:
     for node in graph.of_kind("initial"):
         graph.nodes[node.key] = replace(node, arguments=tuple((a, at_start(graph, k)) for a, k in node.arguments))
     graph.order(graph.nodes)
+    add_late_nodes(graph)
     return graph
+
+
+def add_late_nodes(graph: Graph) -> None:
+    """Give each delayed signal, so far the signal itself, the equation of the signal on late states and inputs."""
+    delayed = graph.of_kind("delayed")
+    made = {node.key: graph.nodes[late(graph, node.arguments[0][1], node.by)] for node in delayed}
+    for key, node in made.items():
+        graph.nodes[key] = replace(node, key=key)
+        graph.nodes.pop(node.key, None) if node.kind == "late" else None
+
+
+def late(graph: Graph, key: str, by: tuple[str, ...]) -> str:
+    """Return the key of what a node was before the sum of some parameters; what it needs is made late in turn."""
+    node, name = graph.nodes[key], f"late__{'__and__'.join(by)}__of__{key}"
+    if name in graph.nodes:
+        return name
+    if node.kind == "latch":
+        raise ArmidError(f"effect '{by[0].partition('__')[0]}' delays what depends on the switch '{spelled(key)}': a "
+                         "signal without a switch is expected, and a guard for the late switch")  # fmt: skip
+    if node.kind == "delayed":
+        return late(graph, node.arguments[0][1], tuple(sorted((*by, *node.by))))
+    if node.kind in ("state", "input"):
+        graph.nodes[name] = Node(name, f"late_{node.kind}", arguments=(("value", key),), by=by)
+    elif node.kind == "time":
+        sooner = key if len(by) == 1 else late(graph, key, by[:-1])
+        graph.nodes[name] = Node(name, "late", function=earlier, arguments=(("time", sooner), ("delay", by[-1])))
+    elif graph.is_static(key):
+        return key
+    else:
+        arguments = tuple((a, late(graph, k, by)) for a, k in node.arguments)
+        terms = tuple(late(graph, k, by) for k in node.terms)
+        # of one delay only its own effect makes use, of a delay within a delay two do
+        owner = by[0].partition("__")[0] if len(by) == 1 else ""
+        graph.nodes[name] = replace(node, key=name, kind="late", owner=owner, arguments=arguments, terms=terms)
+    return name
+
+
+def itself(value: float) -> float:
+    return value
+
+
+def earlier(time: float, delay: float) -> float:
+    return time - delay
 
 
 def at_start(graph: Graph, key: str) -> str:
@@ -175,6 +223,11 @@ def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
                 raise ArmidError(f"{who} adds to the port '{port}', which plant '{plant.name}' does not offer: "
                                  f"{nearest(port, plant.ports)}")  # fmt: skip
             equation(f"{prefix}{port}", "term", function, f"port '{port}'")
+    for delay in () if effect is None else effect.delays:
+        now = f"{prefix}{delay.name}__now"
+        equation(now, "quantity", delay.of, f"late signal '{delay.name}'")
+        by = (f"{prefix}{delay.by}",)
+        graph.add(Node(f"{prefix}{delay.name}", "delayed", owner, itself, (("value", now),), by=by))
     holder = plant if effect is None else effect
     for state in holder.states:
         equation(f"rate__{prefix}{state.name}", "rate", state.rate, f"rate of '{state.name}'")
@@ -211,12 +264,18 @@ def names_for(plant: Plant, effect: Effect | None, initial: bool) -> dict[str, s
             raise ArmidError(f"effect '{effect.name}' binds '{argument}' to '{name}', which nobody offers here: "
                              f"{nearest(name, names)}")  # fmt: skip
         names |= {argument: names[name]} if name in names else {}
+        if plant.aliases.get(name, name) in (i.name for i in plant.inputs):
+            names |= {argument: plant.aliases.get(name, name)}  # an initial value takes the first sample of an input
     names |= {p.name: f"{effect.name}__{p.name}" for p in effect.parameters}
     names |= {s.name: f"{'initial__' if initial else ''}{effect.name}__{s.name}" for s in effect.states}
+    names |= {d.name: f"{effect.name}__{d.name}" for d in effect.delays if not initial}
     return names | {g.name: f"{effect.name}__{g.name}" for g in effect.guards if g.latch}
 
 
 def spelled(key: str) -> str:
+    by, is_late, of = key.removeprefix("late__").partition("__of__")
+    if key.startswith("late__") and is_late:
+        return f"{spelled(of)}(t - {' - '.join(map(spelled, by.split('__and__')))})"
     return key.replace("__", ".")
 
 
@@ -237,7 +296,7 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
     lines += [f"  d {spelled(r.key.removeprefix('rate__'))}/dt = {right_hand_side(r)}" for r in rates]
     guards = graph.of_kind("guard")
     needed = graph.order([n.key for n in (*rates, *guards)] + [o.signal for o in plant.outputs])
-    inner = [n for n in needed if n.kind in ("quantity", "port", "term")]
+    inner = [n for n in needed if n.kind in ("quantity", "port", "term", "late")]
     lines += ["  where"] + [f"    {spelled(n.key)} = {right_hand_side(n)}{unit_of(n)}" for n in inner]
     lines += ["  start"] + [
         f"    {spelled(n.key.removeprefix('initial__'))} = {right_hand_side(n).replace('initial.', '')}"

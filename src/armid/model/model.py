@@ -3,12 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 from armid.errors import ArmidError, nearest
 from armid.model.effect import Effect, State
 from armid.model.graph import Graph, build_graph, equations_text
 from armid.model.parameter import Parameter, resolve
 from armid.model.plant import Plant
+
+K = TypeVar("K")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,6 +67,21 @@ class Model:
         return own | {f"{e.name}.{s.name}": s for e in self.effects for s in e.states}
 
     @cached_property
+    def delays(self) -> list[str]:
+        """Qualified names of the parameters by which a signal is late, each once."""
+        return list(dict.fromkeys(f"{e.name}.{d.by}" for e in self.effects for d in e.delays))
+
+    @cached_property
+    def exact(self) -> "Model":
+        """The model with each effect that approximates another (`Effect.exact`) replaced by that one.
+
+        Both have the same parameters: the difference of their signals at one candidate is the error of the
+        approximation [unit of the output], and what explains no more than that explains nothing.
+        """
+        exact = (e if e.exact is None else replace(e.exact, name=e.name) for e in self.effects)
+        return replace(self, effects=tuple(exact))
+
+    @cached_property
     def latches(self) -> list[str]:
         """Qualified names of the one-way switches."""
         own = [g.name for g in self.plant.guards if g.latch]
@@ -98,6 +116,29 @@ def refusal_of(effect: Effect, plant: Plant) -> str:
     except ArmidError as error:
         return str(error)
     return ""
+
+
+def fitting_form(effect: Effect, plant: Plant) -> Effect:
+    """Return the first form of an effect that a plant takes, the effect itself where it takes none."""
+    return next((form for form in effect.searched_forms if not refusal_of(form, plant)), effect)
+
+
+def distinct(effects: Mapping[K, Effect], plant: Plant) -> dict[K, Effect]:
+    """Return effects without those whose equations on a plant are those of one before: one effect under two names.
+
+    A late command of a recorded drive (`controller_delay`) is a late drive (`drive_delay`). Each must fit the plant.
+    """
+    first: dict[object, K] = {}
+    for key, effect in effects.items():
+        first.setdefault(own_equations(effect, plant), key)
+    return {key: effects[key] for key in first.values()}
+
+
+def own_equations(effect: Effect, plant: Plant) -> object:
+    """Return what an effect adds to a plant, without its name; equal for equal equations and ranges."""
+    graph, prefix = (Model(plant) + replace(effect, name="own", forms=(), exact=None)).graph, ("own__", "late__own__")
+    nodes = [n for n in graph.nodes.values() if n.owner == "own" or n.key.startswith(prefix)]
+    return effect.parameters, frozenset((n.key, n.kind, n.function, n.arguments, n.terms, n.by) for n in nodes)
 
 
 def applicable(effects: Mapping[str, Effect], plant: Plant) -> dict[str, Effect]:

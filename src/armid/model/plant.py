@@ -14,6 +14,8 @@ from armid.model.parameter import Parameter, Scales, check_name
 from armid.units import COUNTS, SUFFIXES
 
 Array = NDArray[np.float64]
+# How much of its record before it a piece keeps of the inputs [s]: more than a usual dead time.
+BEFORE_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class Manoeuvre:
     interval: sample interval [s]; n_samples: number of samples, the first at start_time.
     inputs: name -> values, shape (n_samples,).
     hold: "linear" (inputs run straight between samples) or "zero" (they keep the value of the last sample).
+    before: name -> values of the inputs at the samples before the first, (n_before,), which a late input sees; empty
+        where the record begins.
     """
 
     interval: float
@@ -32,6 +36,12 @@ class Manoeuvre:
     inputs: Mapping[str, Array] = field(default_factory=dict)
     hold: str = "linear"
     start_time: float = 0.0
+    before: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def n_before(self) -> int:
+        """Number of samples before the first at which the inputs are known."""
+        return max((len(values) for values in self.before.values()), default=0)
 
     def times(self) -> Array:
         """Return the sample times [s], shape (n_samples,)."""
@@ -42,16 +52,24 @@ class Manoeuvre:
         return replace(self, n_samples=n_samples, inputs={k: v[:n_samples] for k, v in self.inputs.items()})
 
     def part(self, start: int, n_samples: int, state: Mapping[str, float]) -> "Manoeuvre":
-        """Return the part from one sample on, with the constants that give the state there."""
+        """Return the part from one sample on, with the constants that give the state there.
+
+        It knows the inputs of the second before, for a dead time.
+        """
+        known = {name: np.concatenate([self.before.get(name, ()), values]) for name, values in self.inputs.items()}
+        first = self.n_before + start
+        sooner = max(first - round(BEFORE_S / self.interval), 0)
         return replace(
             self, n_samples=n_samples, start_time=self.start_time + start * self.interval,
             constants={**self.constants, **state},
             inputs={name: values[start : start + n_samples] for name, values in self.inputs.items()},
+            before={name: values[sooner:first] for name, values in known.items()} if sooner < first else {},
         )  # fmt: skip
 
     def likeness(self) -> tuple[object, ...]:
         """Return what two manoeuvres have in common when a machine answers both alike, hashable; not the start time."""
-        inputs = tuple((name, values.tobytes()) for name, values in sorted(self.inputs.items()))
+        each = [*sorted(self.inputs.items()), *sorted(self.before.items())]
+        inputs = tuple((name, values.tobytes()) for name, values in each)
         return self.interval, self.n_samples, self.hold, tuple(sorted(self.constants.items())), inputs
 
 
@@ -202,7 +220,8 @@ class Plant:
         quantity) and `output_unit` say it as well; else these are those of the first output.
     aliases: further names for states and quantities, so that effects can be written once for many plants: ours ask for
         `omega` (speed), `theta` (position), `drive_effort` and `load_effort` (what drives, what it works against), and
-        `voltage` (what a motor with a back-EMF is fed with; effects add to it at the port `winding`).
+        `voltage` (what a motor with a back-EMF is fed with; effects add to it at the port `winding`). An only input in
+        V of a plant with this port is its `voltage`.
     from_rest: True when a record starts at t = 0 from the declared initial state; False when it starts at its first
         sample from the measured state: then declare the constants `start_position` and `start_speed` (either or both),
         which the reader sets from the columns of position and speed, and use them as initial values.
@@ -245,6 +264,9 @@ class Plant:
         speeds = [s.unit for s in self.states if s.name == self.aliases.get("omega", "omega")]
         if speeds == ["m/s"] and self.scales.length_unit != "m":  # its author left the units of the scales as they are
             object.__setattr__(self, "scales", replace(self.scales, effort_unit="N", length_unit="m"))
+        volts = [i.name for i in self.inputs if i.unit == "V"]
+        if "winding" in self.ports and "voltage" not in self.declared and len(volts) == 1:
+            object.__setattr__(self, "aliases", {**self.aliases, "voltage": volts[0]})
         for name in (*self.quantities, *self.ports, *self.aliases):
             check_name(name, "quantity, port or alias")
         twice = sorted({n for n in self.declared if self.declared.count(n) > 1})

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant
+from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, fitting_form
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
 from armid.record.reader import NAME, SUFFIX, campaign_path, gravity_of, read_record, record_path
@@ -105,7 +105,7 @@ class Campaign(Shown):
         Raises ArmidError where they do not compose.
         """
         known = {**sensor_effects(self.declared), **effects}
-        return Model(self.plant, tuple(known[name] for name in self.effects))
+        return Model(self.plant, tuple(fitting_form(known[name], self.plant) for name in self.effects))
 
     def with_window(self, begin: float, end: float) -> "Campaign":
         """Return the campaign with one window [s] for every record, whatever its file says; both ends count.

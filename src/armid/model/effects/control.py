@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from armid.model.effect import Effect, Guard, State, drive_now, slope_itself, start_speed, zero
+from armid.model.effect import Delay, Effect, Guard, State, drive_now, slope_itself, start_speed, zero
+from armid.model.effects.drive import torque_delay, voltage_delay
 from armid.model.effects.sensor import lag_error, lagging_rate
 from armid.model.parameter import Parameter
 
@@ -55,19 +56,18 @@ tachometer_ripple = Effect(
 
 # The control acts late: the switch and every command come a dead time after what was measured.
 #
-# The switch is exactly late: after the plant's switch the full voltage stays on for the dead time. The angle and the
-# speed that the control sees pass through the second-order Pade approximation of a dead time T,
+# A digital control samples every `period`, first at the start of the stroke, and holds its command between samples:
+# after the dead time its switch waits for the next sample, and the hold is late by half a period on average. The hold
+# is approximated by 1 / (1 + T s/2 + T^2 s^2/12), T the period, for (1 - exp(-T s)) / (T s). A period of 0 does not
+# sample. Source of the hold: Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 4.
+#
+# The forms named filter approximate the dead time T too, by the second-order Pade approximation
 #
 # exp(-T s) = (1 - T s/2 + T^2 s^2/12) / (1 + T s/2 + T^2 s^2/12) = 1 - T s / (1 + T s/2 + T^2 s^2/12),
 #
-# good to (w T)^5/720 at the frequency w. Below 2 ms the filter stays that of 2 ms while the factor T goes on falling:
-# the same delay, no stiff equation, a derivative at the null. A loop that is closed from the start is not late.
-#
-# A digital control samples every `period`, first at the start of the stroke, and holds its command between samples:
-# after the dead time its switch waits for the next sample, and the hold is late by half a period on average. Of the
-# hold alone the approximation is 1 / (1 + T s/2 + T^2 s^2/12), T the period, the one of (1 - exp(-T s)) / (T s);
-# where it is a part h of the lateness, T and the equations lie between the two, right to s^2. A period of 0 does not
-# sample. Source of the hold: Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 4.
+# good to (w T)^5/720 at the frequency w; a step it answers before T. Where the hold is a part h of the lateness, T and
+# the equations lie between the two, right to s^2. Below 2 ms the filter stays that of 2 ms while the factor T goes on
+# falling: the same delay, no stiff equation, a derivative at the null. A loop closed from the start is not late.
 SHORT = 1e-4
 
 
@@ -130,48 +130,90 @@ def still_to_wait(closed, delay, period, waiting, clock):
     return np.where(closed > 0.5, np.where(period > SHORT, sample, due) - clock, lateness(delay, period))
 
 
-def late_drive(delay, slope):
+def present_angle(theta):
+    """Angle that the control measures [rad]."""
+    return theta
+
+
+def late_held_feedback(late_speed, omega, period, smooth, slope):
+    """Speed that the control sees less the true one [rad/s]: the speed of a dead time ago, held for a period."""
+    return late_speed - omega + late_feedback(0.0, period, late_speed, smooth, slope)
+
+
+def late_held_command(
+    closed, acting, K_p, theta_D, theta, damping, omega, feedback, direction, U, u_th, late_angle, period, smooth, slope
+):
+    """Voltage to add to the demand [V]: K_p times the lag of the late, held angle; full until the late switch."""
+    full = 2 * (U + u_th) * direction - K_p * (theta_D - theta) + damping * (omega + feedback)
+    bend = held_part(0.0, period) * filter_time(0.0, period) ** 2 / 12
+    behind = theta - late_angle + lateness(0.0, period) * smooth + bend * slope
+    return np.where(closed - acting > 0.5, full, K_p * behind)
+
+
+def held_slope_rate(period, late_speed, smooth, slope):
+    """Second derivative of the late speed that is held [rad/s3], see `slope_rate`."""
+    return slope_rate(0.0, period, late_speed, smooth, slope)
+
+
+def filtered_drive(delay, slope):
     """Effort on top of the drive's, -T dw/dt: with w = E / (1 + T s/2 + T^2 s^2/12) the drive is E exp(-T s)."""
     return -delay * slope
 
 
-def late_drive_rate(delay, drive_effort, smooth, slope):
+def filtered_drive_rate(delay, drive_effort, smooth, slope):
     """Second derivative of the smoothed effort w, 12/T^2 (E - w - T/2 dw/dt), T at least 2 ms (see above)."""
     T = np.maximum(delay, 2e-3)
     return 12 / T**2 * (drive_effort - smooth - 0.5 * T * slope)
 
 
-dead_time = Effect(
-    name="controller_delay", form="command", adds={"drive": late_drive},
-    states=(State("smooth", "effort", slope_itself, drive_now), State("slope", "effort/s", late_drive_rate, zero)),
-    parameters=(Parameter("delay", "s", 0.0, 0.1, null=0.0, note="dead time of the command"),),
-    note="the command acts a dead time late",
-    source="Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9",
-)  # fmt: skip
-# Behind a motor that induces a voltage of its own a late voltage is no late torque: told as one it bends the inertia.
-# Where the plant holds the control itself, with a port for its command, that is what is late.
-late_voltage = replace(
-    dead_time, form="voltage", adds={"winding": late_drive}, binds={"drive_effort": "voltage"}, unless="command",
-    states=tuple(replace(s, unit=s.unit.replace("effort", "V")) for s in dead_time.states),
-    note="the voltage at the motor comes a dead time late",
-)  # fmt: skip
-controller_delay = Effect(
-    name="controller_delay", form="feedback", forms=(dead_time, late_voltage),
-    adds={"feedback": late_feedback, "command": late_command},
+DEAD_TIME = (
+    "Astrom and Murray, Feedback Systems, chapter 9; Franklin, Powell, Workman, Digital Control of Dynamic Systems, "
+    "chapter 4"
+)
+PADE = "Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9"
+late_feedback_of_plant = Effect(
+    name="controller_delay", form="feedback", adds={"feedback": late_held_feedback, "command": late_held_command},
     states=(
         State("smooth", "rad/s", slope_itself, start_speed),
-        State("slope", "rad/s2", slope_rate, zero),
+        State("slope", "rad/s2", held_slope_rate, zero),
         State("waiting", "s", waiting_rate, waited),
         State("clock", "s", clock_rate, zero),
     ),
     guards=(Guard("acting", still_to_wait, latch=True),),
+    delays=(Delay("late_speed", start_speed, "delay"), Delay("late_angle", present_angle, "delay")),
     parameters=(
         Parameter("delay", "s", 0.0, 0.03, null=0.0, note="dead time of the control"),
         Parameter("period", "s", 0.0, 0.03, null=0.0, fixed=0.0, note="between samples of a digital control"),
     ),
-    note="the control switches and commands late",
-    source="Golub and Van Loan, Matrix Computations, section 9.3; Astrom and Murray, Feedback Systems, chapter 9",
+    note="the control switches and commands late", source=DEAD_TIME,
 )  # fmt: skip
+# Behind a motor that induces a voltage of its own a late voltage is no late torque: taken for one it bends the inertia.
+# Where the plant holds the control itself, with a port for its command, that is what is late.
+late_command_of_record = replace(
+    torque_delay, name="controller_delay", form="command", note="the command acts a dead time late"
+)
+late_voltage = replace(voltage_delay, name="controller_delay")
+feedback_filter = replace(
+    late_feedback_of_plant, form="feedback_filter", exact=late_feedback_of_plant, delays=(),
+    adds={"feedback": late_feedback, "command": late_command},
+    states=tuple(replace(s, rate=slope_rate) if s.name == "slope" else s for s in late_feedback_of_plant.states),
+    note="the control switches and commands late (second-order filter)", source=PADE,
+)  # fmt: skip
+command_filter = replace(
+    late_command_of_record, form="command_filter", exact=late_command_of_record, delays=(),
+    adds={"drive": filtered_drive},
+    states=(State("smooth", "effort", slope_itself, drive_now), State("slope", "effort/s", filtered_drive_rate, zero)),
+    note="the command acts a dead time late (second-order filter)", source=PADE,
+)  # fmt: skip
+voltage_filter = replace(
+    late_voltage, form="voltage_filter", exact=late_voltage, delays=(), adds={"winding": filtered_drive},
+    states=tuple(replace(s, unit=s.unit.replace("effort", "V")) for s in command_filter.states),
+    note="the voltage at the motor comes a dead time late (second-order filter)", source=PADE,
+)  # fmt: skip
+controller_delay = replace(
+    late_feedback_of_plant,
+    forms=(late_command_of_record, late_voltage, feedback_filter, command_filter, voltage_filter),
+)
 
 
 def position_gain_command(K_p, theta_D, theta, error):

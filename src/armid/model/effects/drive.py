@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armid.model.effect import SIGN_WIDTH, SIZE_WIDTH, Effect, Guard, State, drive_now, zero
+from armid.model.effect import SIGN_WIDTH, SIZE_WIDTH, Delay, Effect, Guard, State, drive_now, zero
 from armid.model.parameter import Parameter
 
 
@@ -41,7 +41,8 @@ actuator_lag = Effect(
     note="the actuator follows late, first order, up to half a second",
     source="Mahony, Kumar, Corke 2012, doi:10.1109/MRA.2012.2206474 (rotors)",
 )  # fmt: skip
-# Where it is offered, and why it is another, see late_voltage in control.py.
+# Behind a motor that induces a voltage of its own a lagging voltage is no lagging torque: taken for one it bends the
+# inertia. Where the plant computes its own command, the port of that command takes the lag.
 voltage_lag = replace(
     actuator_lag, form="voltage", unless="command", adds={"winding": drive_lag_effort},
     states=(State("lagging", "V", drive_lag_rate, drive_now),), binds={"drive_effort": "voltage"},
@@ -54,6 +55,24 @@ drive_lag = replace(
     note="the drive follows late, first order",
     source="Leonhard, Control of Electrical Drives, doi:10.1007/978-3-642-56649-3",
 )  # fmt: skip
+
+
+def late_effort(late, drive_effort):
+    """Effort on top of the drive's, E(t - T) - E(t): the drive of a dead time T ago acts."""
+    return late - drive_effort
+
+
+torque_delay = Effect(
+    name="drive_delay", form="effort", adds={"drive": late_effort}, delays=(Delay("late", drive_now, "delay"),),
+    parameters=(Parameter("delay", "s", 0.0, 0.1, null=0.0, note="dead time of the drive"),),
+    note="the force or torque of the drive comes a dead time late",
+    source="Astrom and Murray, Feedback Systems, chapter 9",
+)  # fmt: skip
+voltage_delay = replace(
+    torque_delay, form="voltage", unless="command", adds={"winding": late_effort}, binds={"drive_effort": "voltage"},
+    note="the voltage at the motor comes a dead time late",
+)  # fmt: skip
+drive_delay = replace(torque_delay, forms=(voltage_delay,))
 
 
 def saturation_loss(drive_effort, sharpness):
@@ -344,7 +363,7 @@ line_loss = Effect(
 )  # fmt: skip
 
 EFFECTS = (
-    drive_gain, drive_lag, drive_saturation, torque_constant_droop, dead_zone, backlash, elastic_drive,
+    drive_gain, drive_lag, drive_delay, drive_saturation, torque_constant_droop, dead_zone, backlash, elastic_drive,
     coupling_damping, worm_direction, worm_speed, flux_saturation, brush_drop, winding_heating, supply_sag,
     supply_error, gas_heat_loss, line_loss,
 )  # fmt: skip

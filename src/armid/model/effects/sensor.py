@@ -4,7 +4,7 @@ from inspect import signature
 
 import numpy as np
 
-from armid.model.effect import Effect, State, slope_itself, start_speed, zero
+from armid.model.effect import Delay, Effect, State, slope_itself, start_speed, zero
 from armid.model.parameter import Parameter
 from armid.model.plant import Output, Plant
 
@@ -13,9 +13,9 @@ SCALES = {"rad/s": "speed", "m/s": "speed", "rad": "speed*s", "m": "speed*s", "N
 
 
 def sensor_effects(plant: Plant) -> dict[str, Effect]:
-    """Return name -> bias, scale and lag (`hub_angle_bias`) of each output that has a port of its own.
+    """Return name -> bias, scale, delay and lag (`hub_angle_bias`) of each output that has a port of its own.
 
-    Scale and lag need what the sensor sees: the signal is that and the port, and of a lag it is a state.
+    Scale, delay and lag need what the sensor sees: the signal is that and the port, and of a lag it is a state.
     """
     found = [e for o in plant.outputs if o.port not in ("", "output") for e in effects_at(o, plant)]
     return {e.name: e for e in found}
@@ -33,6 +33,9 @@ def effects_at(output: Output, plant: Plant) -> list[Effect]:
     binds = {"omega": seen[0]}
     found.append(Effect(f"{output.name}_scale", gyro_scale.parameters, {output.port: scale_error}, binds=binds,
                         note=f"error {of} in proportion to it", source=source))  # fmt: skip
+    found.append(Effect(f"{output.name}_delay", output_delay.parameters, {output.port: delay_error}, binds=binds,
+                        delays=output_delay.delays, note=f"{output.name} is recorded a dead time late",
+                        source=source))  # fmt: skip
     if seen[0] in {s.name for s in plant.states}:
         states = (State("lagging", output.unit, lagging_rate, start_speed),)
         found.append(Effect(f"{output.name}_lag", output_lag.parameters, {output.port: lag_error}, states, binds=binds,
@@ -101,4 +104,16 @@ output_lag = Effect(
     note="the recorded speed lags, first order", source="Doebelin, Measurement Systems, chapter 3",
 )  # fmt: skip
 
-EFFECTS = (gyro_lag, gyro_bias, gyro_scale, output_lag)
+
+def delay_error(late, omega):
+    """Speed that is recorded less the true one, w(t - T) - w(t): the sensor shows the speed of a dead time T ago."""
+    return late - omega
+
+
+output_delay = Effect(
+    name="output_delay", adds={"output": delay_error}, delays=(Delay("late", start_speed, "delay"),),
+    parameters=(Parameter("delay", "s", 0.0, 0.1, null=0.0, note="dead time of the sensor or of its transmission"),),
+    note="the recorded speed comes a dead time late", source="Doebelin, Measurement Systems, chapter 3",
+)  # fmt: skip
+
+EFFECTS = (gyro_lag, gyro_bias, gyro_scale, output_lag, output_delay)
