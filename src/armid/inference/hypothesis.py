@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from armid.inference.library import Activation
 from armid.inference.model import Fit
 from armid.model import Array
 
@@ -44,7 +45,7 @@ class Proposal:
     together, each with a strength of its own; otherwise exactly one of them holds. one_sided: whether strengths are
     positive. scales: prior standard deviations of a strength, equally likely, (n_scales,). variants: log prior of each
     variant, (n_variants,). refit: of a fit, its expansion, the forecast and a sum of squares that must be in reach, the
-    model with the hypothesis.
+    model with the hypothesis. grid: of an effect, the strength and the shapes of each variant.
     """
 
     hypothesis: Hypothesis
@@ -54,6 +55,7 @@ class Proposal:
     refit: Callable[..., Fit | None]
     one_sided: bool = False
     joint: bool = False
+    grid: Sequence[Activation] = ()
 
 
 def expected(number: float, n: int) -> float:

@@ -34,6 +34,7 @@ from armid.inference.refit import freed as freed_shape
 from armid.inference.unknowns import Unknown, constants_of, freed
 from armid.model import Array
 
+Trial = tuple[Hypotheses, Callable[[], Fit | None]]
 # A model is expanded whose posterior is above this share of the best one's.
 WINDOW = float(np.log(100.0))
 # What is more probable than this to first order, beside a model, is fitted.
@@ -222,7 +223,7 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     beside = [forecast(about, p) for p in others]
     found.forecasts[model] = [*ahead, *beside]
     limit = limit_of(found, scale)
-    trials: list[tuple[Hypotheses, Callable[[], Fit | None]]] = []
+    trials: list[Trial] = []
     if is_significant(fit):
         # Far from noise a straight line is a poor guess: the first steps of a fit tell which lead on.
         begun = library.each(lambda a: effects.first_steps(fit, held, a, library), ahead_held)
@@ -260,7 +261,7 @@ def leading(forecasts: Sequence[Forecast]) -> list[Forecast]:
 
 def trial_of(
     found: Exploration, model: Hypotheses, about: Expansion, ahead: Forecast, limit: float, *begun: Array
-) -> list[tuple[Hypotheses, Callable[[], Fit | None]]]:
+) -> list[Trial]:
     """Return the fit of a model with one hypothesis more, where it is not known."""
     key = model | {ahead.proposal.hypothesis}
     if key in found.fits or not np.isfinite(ahead.total):
@@ -268,9 +269,9 @@ def trial_of(
     return [(key, partial(ahead.proposal.refit, about.fit, about, ahead, limit, *begun))]
 
 
-def drops(found: Exploration, model: Hypotheses, fit: Fit) -> list[tuple[Hypotheses, Callable[[], Fit | None]]]:
+def drops(found: Exploration, model: Hypotheses, fit: Fit) -> list[Trial]:
     """Return the fits of a model without one of its effects."""
-    trials = []
+    trials: list[Trial] = []
     for hypothesis in model:
         key = model - {hypothesis}
         if hypothesis.kind == "effect" and key not in found.fits:
@@ -291,9 +292,7 @@ def near(fit: Fit, active: tuple[EffectKey, ...], values: dict[str, float], libr
     return None if again is None else replace(again, others=fit.others, base=effects.base_of(fit, active, library))
 
 
-def swaps(
-    found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal]
-) -> list[tuple[Hypotheses, Callable[[], Fit | None]]]:
+def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal]) -> list[Trial]:
     """Return the fits in which what moves the records most alike takes the place of an effect of a model.
 
     A swap partner that was never fitted would make a posterior that is sure of the wrong one.
@@ -327,7 +326,7 @@ def likest(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, 
     low, span = fit.records.space.low[fit.records.space.free][own], fit.records.span[own]
     away = np.array([0.0 if null is None else z - (null - a) / s
                      for z, null, a, s in zip(fit.z[own], nulls, low, span, strict=True)])  # fmt: skip
-    n, grid = len(slopes), proposal.refit.args[1]  # type: ignore[attr-defined]
+    n, grid = len(slopes), proposal.grid
     local = [i for i, a in enumerate(grid) if a.share == effects.SLOPE]
     if not local:
         return 0.0, proposal, 0, 0.0
@@ -344,7 +343,7 @@ def swapped(
 ) -> Fit | None:
     """Return the model with one effect in the place of another, its shapes free where those of the other are."""
     new: EffectKey = proposal.hypothesis.means
-    grid = proposal.refit.args[1]  # type: ignore[attr-defined]
+    grid = proposal.grid
     active = tuple(k for k in fit.active if k != key)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     values |= grid[variant].at(float(np.clip(strength, 0.01, library.reach)))
@@ -388,10 +387,8 @@ def pairs(
         key = model | {one.hypothesis, two.hypothesis}
         if total <= best_single or key in found.fits or len(key) < len(model) + 2:
             continue
-        values_of = dict(about.fit.values) | one.refit.args[1][variants[i]].at(
-            float(np.clip(first, 0.01, found.library.reach))
-        )  # type: ignore[attr-defined]
-        values_of |= two.refit.args[1][variants[k]].at(float(np.clip(second, 0.01, found.library.reach)))  # type: ignore[attr-defined]
+        values_of = dict(about.fit.values) | one.grid[variants[i]].at(float(np.clip(first, 0.01, found.library.reach)))
+        values_of |= two.grid[variants[k]].at(float(np.clip(second, 0.01, found.library.reach)))
         active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
         yield key, near(about.fit, active, values_of, found.library)
 

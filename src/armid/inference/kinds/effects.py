@@ -66,7 +66,9 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
         return None
     chosen = [grid[i] for i in good]
     variants = np.full(len(good), -np.log(len(grid)))
-    return Proposal(hypothesis, moved[good], SCALES, variants, partial(refit, key, chosen, library), one_sided=True)
+    return Proposal(
+        hypothesis, moved[good], SCALES, variants, partial(refit, key, library), one_sided=True, grid=chosen
+    )
 
 
 def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
@@ -90,7 +92,7 @@ def responses(records: WhiteRecords, fit: Fit, grid: list[Activation]) -> Array:
 
 
 def refit(
-    key: EffectKey, grid: list[Activation], library: Library, fit: Fit, about: Expansion, ahead: Forecast, limit: float,
+    key: EffectKey, library: Library, fit: Fit, about: Expansion, ahead: Forecast, limit: float,
     begun: Array | None = None,
 ) -> Fit | None:  # fmt: skip
     """Return the model with an effect, fitted from the best two of the starts that a forecast gives.
@@ -99,7 +101,7 @@ def refit(
     """
     posed = beside(fit, (*fit.active, key), library)
     if begun is None:
-        starts = np.array(starts_of(fit, about, ahead, posed, grid, library))
+        starts = np.array(starts_of(fit, about, ahead, posed, library))
         best = starts[np.argsort(posed.chi2(starts), kind="stable")[:2]]
     else:
         best = begun[np.newaxis]
@@ -114,9 +116,9 @@ def base_of(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteR
 
 def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -> tuple[float, Array]:
     """Return where the first steps of a fit from the best start lead: the sum of squares, and the candidate."""
-    key, grid = ahead.proposal.refit.args[:2]  # type: ignore[attr-defined]
+    key = ahead.proposal.hypothesis.means
     posed = beside(fit, (*fit.active, key), library)
-    starts = np.array(starts_of(fit, about, ahead, posed, grid, library))
+    starts = np.array(starts_of(fit, about, ahead, posed, library))
     chi2 = posed.chi2(starts)
     best = starts[int(np.argmin(chi2))]
     if not np.isfinite(chi2.min()):
@@ -126,10 +128,10 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
 
 
 def starts_of(
-    fit: Fit, about: Expansion, ahead: Forecast, posed: WhiteRecords, grid: list[Activation], library: Library
+    fit: Fit, about: Expansion, ahead: Forecast, posed: WhiteRecords, library: Library
 ) -> list[Array]:  # fmt: skip
     """Return extended candidates at expected and tried strengths, with the linear answer of the parameters."""
-    starts = []
+    starts, grid = [], ahead.proposal.grid
     for variant, strength in ahead.best(N_STARTS):
         for share in dict.fromkeys((float(np.clip(strength, 0.01, library.reach)), grid[variant].share)):
             z = np.clip(fit.z - share * ahead.answer[: fit.n_free, variant], 0.01, 0.99)
