@@ -255,7 +255,7 @@ def test_what_is_too_large_or_counts_nowhere(write, tmp_path):
     long, file = "x" * 11_000_000, tmp_path / "campaign" / "lower.csv"
     with pytest.raises(ArmidError, match=r"campaign\.toml has 11 MB, at most 2 MB of TOML are expected"):
         read_campaign(write(f"{GOOD}note = '{long}'\n"))
-    with pytest.raises(ArmidError, match=r"line 4: 100,001 dots on one line, .* shorter lines are expected"):
+    with pytest.raises(ArmidError, match=r"line 4: 100,001 dots on one line .*, shorter lines are expected"):
         read_campaign(write(f"a = 1\n\n\n{'a.' * 100_000}b.c = 1\n{GOOD}"))
     with pytest.raises(ArmidError, match=r"'records' is a list of 10,001, 1 to 10,000 tables headed \[\[records\]\]"):
         read_campaign(write(GOOD + '[[records]]\nfile = "lower.csv"\n' * 10_000))
