@@ -32,7 +32,7 @@ from armid.model import Array
 SCALES = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 # Fewest independent samples of a residual that is no noise.
 FEWEST = 10.0
-LOG_2PI = float(np.log(2.0 * np.pi))
+LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -245,7 +245,7 @@ def log_evidence(about: Expansion) -> float:
     # A strength counts with its own prior, below; the density along its box cancels there.
     found = scale.log_likelihood(fit.chi2) + 0.5 * fit.n_free * LOG_2PI - 0.5 * determinant
     found += float(np.sum(np.log(density)))
-    found -= 0.5 * sum(f.value**2 + f.unknown.lost(f.value) for f in fit.others)
+    found -= 0.5 * float(sum(f.value**2 + f.unknown.lost(f.value) for f in fit.others))
     found -= 0.5 * fit.records.data.log_cover
     for key in fit.active:
         found += log_strength(about, key)
@@ -271,13 +271,13 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
         places.append(i)
         shares.append((value - parameter.null) / far)
         sizes.append(far / (high[i] - low[i]))
-        found += 0.0 if low[i] < parameter.null < high[i] else np.log(2.0)
+        found += 0.0 if low[i] < parameter.null < high[i] else LOG_2
     if not places:
         return 0.0
     size = np.array(sizes)
     covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
     each = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
-    return found + float(logsumexp(each) - np.log(len(SCALES)) - np.sum(np.log(size)))
+    return float(found + logsumexp(each) - np.log(len(SCALES)) - np.sum(np.log(size)))
 
 
 def doubts_of(fit: Fit, library: Library) -> Array:

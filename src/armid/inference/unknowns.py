@@ -29,13 +29,15 @@ class Unknown:
     """Declare an unknown.
 
     moved: the records as they are with a value of it. lost: samples that a value leaves out. column: of records, a
-    candidate and a value, how much of the residual a unit of it takes away; None: by differences.
+    candidate and a value, how much of the residual a unit of it takes away; None: by differences. product: which
+    constants it is, None for what is no constant.
     """
 
     name: str
     moved: Callable[[WhiteRecords, float], WhiteRecords]
     lost: Callable[[float], float] = lambda _: 0.0
     column: Callable[[WhiteRecords, Array, float], Array] | None = None
+    product: Product | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +51,16 @@ class Freed:
 
 def constant(product: Product) -> Unknown:
     """Return a constant, or several that act as one, as an unknown whose prior is its tolerance."""
-    return Unknown(product.public, lambda records, value: replace(
-        records, replays=moved_replays(records.replays, {product.names[0]: value * product.tolerance})))  # fmt: skip
+
+    def moved_by(records: WhiteRecords, value: float) -> WhiteRecords:
+        return replace(records, replays=moved_replays(records.replays, shares_of([product], [value])))
+
+    return Unknown(product.public, moved_by, product=product)
+
+
+def shares_of(chosen: Sequence[Product | None], values: Sequence[float] | Array) -> dict[str, float]:
+    """Return by which share of its value the first member of each product is off; values: in tolerances."""
+    return {p.names[0]: float(v) * p.tolerance for p, v in zip(chosen, values, strict=True) if p is not None}
 
 
 def constants_of(records: WhiteRecords, z: Array, tolerances: Mapping[str, float]) -> list[Unknown]:
@@ -125,7 +135,7 @@ def freed(
     records = moved(base, unknowns, values)
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
     return replace(fit, records=records, z=z, residual=records.with_all_samples().residuals(z)[0], base=base,
-                   others=others, rough=rough)  # fmt: skip
+                   others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
 
 
 def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array) -> float:
