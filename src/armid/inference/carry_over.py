@@ -23,9 +23,9 @@ SHARE = 0.9
 class Missed:
     """Say how a held-out record is missed.
 
-    factor: its error over that of the train records; errors: both, [unit of the output]. outside: variable -> (its
-    value farthest outside, the nearest end of the range of the train records, unit). changes: parameter -> relative
-    change that would take away most of its error.
+    factor: its error over that of the train records, in units of noise and doubt. errors: both, [unit of the output].
+    outside: variable -> (its value farthest outside, the nearest end of the range of the train records, unit).
+    changes: parameter -> relative change that would take away most of its error.
     """
 
     record: str
@@ -38,8 +38,9 @@ class Missed:
     @property
     def sentence(self) -> str:
         error, train = (shown(e, self.unit)[0] for e in self.errors)
-        said = [f"{self.record} does not carry over: it is missed by {error:.3g} {shown(1.0, self.unit)[1]}, "
-                f"{self.factor:.2g} times the error of the train records ({train:.3g})."]  # fmt: skip
+        unit = shown(1.0, self.unit)[1]
+        said = [f"{self.record} does not carry over: it is missed by {error:.3g} {unit}, the train "
+                f"records by {train:.3g}. In units of noise and doubt this is {self.factor:.2g} times as much."]  # fmt: skip
         if self.outside:
             reach = [f"{name} reaches {shown(value, unit)[0]:.3g} {shown(1.0, unit)[1]} (train: "
                      f"{shown(end, unit)[0]:.3g})" for name, (value, end, unit) in self.outside.items()]  # fmt: skip
@@ -64,20 +65,26 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
     """Return the held-out records that are missed by more than noise, and by far more than the train records."""
     if holdout is None:
         return []
-    seen, noise, found = train.errors.outputs, holdout.noise_of, []
-    outputs = [o.name for o in fit.model.plant.outputs]
+    outputs, found = [o.name for o in fit.model.plant.outputs], []
+    known = {place: max(rms_of(train, place), 1.0) for place in {r.place for r in train.replays}}
     edges = holdout.data.edges
     for i, (replay, raw) in enumerate(zip(holdout.replays, holdout.raw, strict=True)):
-        output = outputs[replay.place]
-        before = seen[output].rmse if output in seen else 0.0
-        error = float(np.sqrt(np.mean(raw**2)))
-        least = max(before, noise.get(output, 0.0))
-        if not np.isfinite(error) or error <= FACTOR * least:
-            continue
         inside = slice(int(edges[i]), int(edges[i + 1]))
-        found.append(Missed(replay.name, error / least, (error, least), replay.record.unit,
+        # Divided by noise and doubt together: the start of a held-out record is known from few samples.
+        factor = float(np.sqrt(np.mean(holdout.residual[inside] ** 2))) / known.get(replay.place, 1.0)
+        if not np.isfinite(factor) or factor <= FACTOR:
+            continue
+        output = outputs[replay.place]
+        before = train.errors.outputs[output].rmse if output in train.errors.outputs else holdout.noise_of[output]
+        found.append(Missed(replay.name, factor, (float(np.sqrt(np.mean(raw**2))), before), replay.record.unit,
                             outside(train, holdout, inside), changes(fit, holdout, inside)))  # fmt: skip
     return found
+
+
+def rms_of(seen: Residuals, place: int) -> float:
+    """Return the rms of the whitened residual of one output."""
+    parts = zip(seen.data.by_record(seen.residual), seen.replays, strict=True)
+    return float(np.sqrt(np.mean(np.concatenate([part for part, replay in parts if replay.place == place]) ** 2)))
 
 
 def outside(train: Residuals, holdout: Residuals, inside: slice) -> dict[str, tuple[float, float, str]]:

@@ -123,6 +123,7 @@ class Library:
     misfit: float = 1.0
     priors: Mapping[str, float] = field(default_factory=dict)
     reach: float = 1.0
+    widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
 
@@ -216,6 +217,8 @@ class Library:
             model, self.overrides, {n: b for n, b in self.bounds.items() if n in there},
             {n: v for n, v in self.fixed.items() if n in there},
         )  # fmt: skip
+        for name, (low, high) in self.widened.items():
+            space = space.with_bounds(name, low, high)
         for name, parameter in model.parameters.items():
             owner = self.owner(name)
             mine = next((k for k in active if k.declared == owner), None)
@@ -223,7 +226,7 @@ class Library:
                 space = space.with_fixed(name, idle(parameter))
             elif mine is not None and mine.free_shape and name in self.fixed_shapes(mine):
                 space = space.with_bounds(name, parameter.low, parameter.high)
-            elif self.reach > 1.0 and name in space.free_names and name in self.scaled_strengths:
+            elif self.reach > 1.0 and mine is not None and name in space.free_names and name in self.scaled_strengths:
                 space = space.with_bounds(name, self.reach * parameter.low, self.reach * parameter.high)
         return space
 
@@ -260,6 +263,11 @@ class Library:
         """Return the log prior odds of an effect: what the user knows of it, else the default."""
         given = self.priors.get(effect)
         return default if given is None else float(np.log(given / (1.0 - given)))
+
+    @property
+    def declared_strengths(self) -> frozenset[str]:
+        """Names of strengths of the declared model's own effects that scale with the machine."""
+        return self.scaled_strengths & self.declared.parameters.keys()
 
     def declared_ranges(self, model: Model, key: EffectKey) -> dict[str, tuple[float, float]]:
         """Return the declared ranges of those strengths of an effect whose box is wider."""

@@ -11,9 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from armid.engine import along
 from armid.estimation.constants import NAMED
-from armid.estimation.least_squares import spread_starts
 from armid.inference.checks import is_significant
 from armid.inference.evidence import (
     Expansion,
@@ -29,8 +27,9 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, words
 from armid.inference.kinds import drifts, effects, records, unknown
 from armid.inference.library import EffectKey, Library
 from armid.inference.model import Fit, fit_from
-from armid.inference.refit import accurate, finished, start_of, unless_diverged, with_free_shapes
+from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
+from armid.inference.scales import with_scales
 from armid.inference.unknowns import Unknown, constants_of, freed
 from armid.model import Array
 
@@ -113,9 +112,7 @@ class Exploration:
 
 def explore(library: Library, most: int = MOST_EXPANDED) -> Exploration:
     """Return the models that the train records ask for, from the declared one on."""
-    declared = declared_fit(library)
-    library = rescaled(library, declared)
-    declared = declared if library.declared.plant is declared.model.plant else declared_fit(library)
+    library, declared = with_scales(library)
     found = Exploration(library, effects.hypotheses(library))
     found.constants = constants_of(declared.records, declared.z, library.tolerances)
     found.fits[frozenset()] = with_constants(declared, found.constants)
@@ -131,34 +128,6 @@ def explore(library: Library, most: int = MOST_EXPANDED) -> Exploration:
             finish(found)
     finish_all(found)
     return found
-
-
-def declared_fit(library: Library) -> Fit:
-    posed = library.problem(())
-    starts = spread_starts(posed) if posed.space.free.any() else ()
-    return accurate(fit_from(posed, (), starts), library)
-
-
-def rescaled(library: Library, declared: Fit) -> Library:
-    """Return the library with the effort scale of the declared fit, where the plant takes its scales from records.
-
-    The drive's column is no effort where it is in volts or a duty and the gain is a free parameter.
-    """
-    plant, model = library.declared.plant, declared.model
-    if not plant.scales_from_records or "drive_effort" not in plant.quantities:
-        return library
-    largest = 0.0
-    for replay in declared.records.replays:
-        for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
-            effort = along(model, piece.manoeuvre, declared.candidate, calibration.schedule, ["drive_effort"])
-            largest = max(largest, float(np.nanmax(np.abs(effort["drive_effort"]), initial=0.0)))
-    if not np.isfinite(largest) or largest <= 0.0:
-        return library
-    scaled = replace(plant, scales=replace(plant.scales, effort=largest))
-    own = {n: (p.low, p.high) for n, p in library.declared.parameters.items()
-           if p.fixed is None and n not in library.overrides and "." not in n}  # fmt: skip
-    return replace(library, declared=replace(library.declared, plant=scaled), bounds={**own, **library.bounds},
-                   _models={}, _problems={})  # fmt: skip
 
 
 def add_unknown(found: Exploration) -> bool:

@@ -12,7 +12,8 @@ from armid.estimation.advice import Advice, Rival, advise
 from armid.estimation.constants import NAMED, moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import Estimates, with_fitted_starts
-from armid.estimation.screen import given_twice, screen
+from armid.estimation.mends import Suspicion
+from armid.estimation.screen import AS_GOOD, given_twice, screen
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.library import (
@@ -27,6 +28,7 @@ from armid.inference.library import (
 )
 from armid.inference.missing_signal import Missing
 from armid.inference.model import Fit, with_standard_accuracy
+from armid.inference.scales import with_scales
 from armid.inference.score_test import proven_biases
 from armid.inference.whitening import whitened
 from armid.loop.constants import (
@@ -74,7 +76,6 @@ from armid.loop.suspects import (
 )
 from armid.model import EFFECTS, Effect, Model
 from armid.model.effects.sensor import sensor_effects
-from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
 LibraryFor = Callable[[Sequence[Record]], Library]
@@ -158,14 +159,14 @@ def close_loop(
         library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told,
                              within)  # fmt: skip
         posed = library.problem(())
-        return library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
+        library = library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
+        return with_scales(library)[0] if model.plant.scales_from_records or library.declared_strengths else library
 
-    own_bounds = {n: b for n, b in (bounds or {}).items() if n in model.parameters}
-    own_fixed = {n: v for n, v in (fixed or {}).items() if n in model.parameters}
-    space = space_of(model, campaign.parameters, own_bounds, own_fixed)
-    screened = screen(replace(campaign, records=campaign.train), model, space)
+    library = library_for(campaign.train)
+    space = library.space(library.declared, ())
+    screened = screen(replace(campaign, records=campaign.train), library.declared, space)
+    found, suspects, train, screened = searched(library_for, library, campaign.train, screened)
     implausible = any(s.kind in GROSS for s in screened)
-    found, suspects, train = settled(library_for, campaign.train, implausible)
     found = with_curve(found) if curve and not implausible else found
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
@@ -206,7 +207,35 @@ def close_loop(
                       found.term)  # fmt: skip
 
 
-def settled(library_for: LibraryFor, train: tuple[Record, ...], implausible: bool) -> Settled:
+def searched(
+    library_for: LibraryFor, library: Library, train: tuple[Record, ...], screened: Sequence[Suspicion]
+) -> tuple["Decision", list[Suspect], tuple[Record, ...], tuple[Suspicion, ...]]:
+    """Return what `settled` does, and what remains of the mistakes that the screen suspects.
+
+    What a whole campaign has wrong needs no search. One record, or an input, is accused only where the model at which
+    the search ends does not do as well.
+    """
+    gross = [s for s in screened if s.kind in GROSS]
+    if any(not s.record and s.kind != "input" for s in gross):
+        return *settled(library_for, library, train, True), tuple(screened)
+    found, suspects, left = settled(library_for, library, train, False)
+    if all(does_as_well(found.chosen, s) for s in gross):
+        return found, suspects, left, tuple(s for s in screened if s not in gross)
+    declared = found.declared
+    return Decision(found.search, library, declared, declared, declared, ()), [], train, tuple(screened)
+
+
+def does_as_well(fit: Fit, suspicion: Suspicion) -> bool:
+    """Tell whether a model misses an accused record, or all, by no more of the signal than the mended records would."""
+    shares = []
+    for replay, part in zip(fit.records.replays, train_residuals(fit).raw, strict=True):
+        if suspicion.record in ("", replay.record.file):
+            about = replay.measured - (np.mean(replay.measured) if replay.record.unit in ("rad", "m") else 0.0)
+            shares.append(float(np.sum(part**2)) / max(float(np.sum(about**2)), 1e-300))
+    return bool(np.sqrt(np.mean(shares)) <= AS_GOOD * suspicion.after) if shares else False
+
+
+def settled(library_for: LibraryFor, library: Library, train: tuple[Record, ...], implausible: bool) -> Settled:
     """Suspect the records, then decide.
 
     A fault of one record that leaves noise, or next to nothing of what was more, is undone, unless one effect or
@@ -215,7 +244,6 @@ def settled(library_for: LibraryFor, train: tuple[Record, ...], implausible: boo
     A trend from record to record that leaves noise is undone where it does clearly better than any of these.
     Where nothing does and all but one record agree, that one is left out. Nothing is looked for in implausible records.
     """
-    library = library_for(train)
     search = Search(library)
     declared = search.start()
     if implausible:
