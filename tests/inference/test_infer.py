@@ -65,8 +65,9 @@ def test_twins_share_the_probability(inferred):
 
 def test_two_effects_are_found_together(inferred):
     found = inferred("coulomb=60", "tilt_deg=2")
-    best = found.probabilities["sets"][0]
-    assert set(best["hypotheses"]) in ({"coulomb", "tilt"}, {"seal_friction", "tilt"})
+    chances = found.probabilities["effects"]
+    assert chances["tilt"] > 0.9
+    assert chances["coulomb"] + chances["seal_friction"] > 0.9
     assert all(inside(found))
 
 
@@ -100,8 +101,7 @@ def test_what_the_user_knows_counts(inferred):
 
 def test_constants_in_tolerances_widen_the_intervals_and_may_be_off(stand, inferred):
     campaign = read_campaign(stand(*COMMON))
-    campaign = replace(campaign, tolerances={"J_M": 0.05, "i_1": 0.02} & campaign.tolerances.keys()
-                       and dict.fromkeys(list(campaign.tolerances)[:3], 0.03))  # fmt: skip
+    campaign = replace(campaign, tolerances=dict.fromkeys(("R", "C_T", "eta1"), 0.03))
     found = infer(Model(campaign.plant), campaign, CANDIDATES)
     exact = inferred()
     widths = [[f.intervals[n]["high"] - f.intervals[n]["low"] for n in TRUTH] for f in (exact, found)]

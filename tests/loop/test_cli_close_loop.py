@@ -30,7 +30,7 @@ def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
         assert f"]({name})" in text
         assert (tmp_path / "out" / name).stat().st_size > 10_000
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("<svg") == 5 + 4 + 4
+    assert page.count("<svg") == 6 + 4 + 4
     for wanted in ("Explained: The declared model lacked supply_sag", "+     supply_sag.supply = ", "armid close-loop ",
                    "What supply_sag would explain", "Error on the records held out"):  # fmt: skip
         assert wanted in page, wanted
@@ -48,7 +48,7 @@ def whole(stand, tmp_path_factory):
         return descend(*given, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("armid.loop.fit.descend", counted)
+        patch.setattr("armid.inference.model.descend", counted)
         assert ended("close-loop", campaign, "--out", out, *IN_ONE_THREAD) == 0
     assert not (out / "progress.jsonl").exists()
     return campaign, (out / "report.json").read_bytes(), len(made)
@@ -73,7 +73,7 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_pat
         made.append(given)
         return descend(*given, **options)
 
-    monkeypatch.setattr("armid.loop.fit.descend", counted)
+    monkeypatch.setattr("armid.inference.model.descend", counted)
     stop_at = n_whole - 5
     assert ended("close-loop", campaign, "--out", tmp_path, *IN_ONE_THREAD) == 130
     kept = tmp_path / "progress.jsonl"

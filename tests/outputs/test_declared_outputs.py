@@ -77,13 +77,12 @@ def test_a_wrong_output_is_refused() -> None:
 @pytest.mark.slow
 def test_a_sensor_has_effects_at_the_port_of_its_output() -> None:
     found = sensor_effects(two_inertias)
-    assert list(found) == ["load_angle_bias", "load_angle_scale", "load_angle_lag"]
+    assert list(found) == ["load_angle_bias", "load_angle_scale", "load_angle_delay", "load_angle_lag"]
     u = drive(300, 1.0)
     manoeuvre, truth = Manoeuvre(INTERVAL, 300, STARTS, {"u": u}), list(TRUTH.values())
     model = Model(two_inertias, tuple(found.values()))
-    still, moved = simulate(model, manoeuvre, [[*truth, 0.0, 0.0, 0.0], [*truth, 0.05, 0.1, 0.0]], Schedule(4)).outputs[
-        1
-    ]
+    population = [[*truth, 0.0, 0.0, 0.0, 0.0], [*truth, 0.05, 0.1, 0.0, 0.0]]
+    still, moved = simulate(model, manoeuvre, population, Schedule(4)).outputs[1]
     np.testing.assert_allclose(moved, 1.1 * still + 0.05, atol=1e-12)
     assert Model(two_inertias) + EFFECTS["gyro_bias"]
     points = check_effects([*found.values(), EFFECTS["coulomb"]], {"two_inertias": two_inertias})

@@ -278,7 +278,9 @@ def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposa
         forms = [one for one in each if one[1].hypothesis.name == hypothesis.name]
         for _, proposal, variant, strength in [*forms, *each[:N_SWAPPED]]:
             other = model - {hypothesis} | {proposal.hypothesis}
-            if other not in found.fits:
+            if other in found.fits:  # a rival must not lose by the width of a sign alone
+                complete(found, other)
+            else:
                 trials[other] = partial(swapped, fit, key, proposal, variant, strength, found.library)
     return list(trials.items())
 

@@ -13,7 +13,7 @@ from armid.inference.model import ROUGHLY, Fit, fit_from
 from armid.inference.refit import unless_diverged
 from armid.inference.score_test import at_null, candidate_at, free_values
 from armid.inference.whitening import WhiteRecords
-from armid.model import Array
+from armid.model import EFFECTS, Array
 
 # Effects that a campaign is expected to lack, of all in the library.
 EXPECTED = 0.7
@@ -27,8 +27,11 @@ N_STEPS = 2
 
 
 def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
-    """Return a hypothesis for each form of each effect; the forms of one effect share its prior."""
-    names = {key.public for key in library.candidates}
+    """Return a hypothesis for each form of each effect; the forms of one effect share its prior.
+
+    That a user asks for a few candidates makes none of them more probable: the whole library shares what is expected.
+    """
+    names = {key.public for key in library.candidates} | set(EFFECTS)
     forms = [key.public for key in library.candidates]
     return {
         key: Hypothesis("effect", key.public, key.form,
