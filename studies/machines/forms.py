@@ -15,6 +15,7 @@ from scipy.signal import cont2discrete, lfilter
 from machines.catalogue import Array, Machine
 
 Sizes = Mapping[str, Any]
+Library = tuple[tuple[str, ...], ...]
 WIDTH = 0.005
 """Share of the typical speed over which the sign of a speed is smoothed; an eighth of it needs a step below 1 ms."""
 
@@ -42,10 +43,10 @@ class Form:
     """Declare a form of an effect.
 
     sizes: name -> (low, high, unit), drawn between; the first is the strength, which is 0 where the effect is not
-    there. Units are SI or products of the machine's scales, as in `SCALES`; a size with the unit "signed" changes its
-    sign at random and is a share of the effort. act: (sizes, states, here) -> (value, rates of its states); of a
+    there. Units are SI or products of the machine's scales, as in `SCALES`, or `command`, the largest command; a size
+    with the unit "signed" is a share of the effort with a random sign. act: (sizes, states, here) -> (value, rates of its states); of a
     sensor: (sizes, values (n_steps,), step [s]) -> values. start, after: states at the start and after each step.
-    library: machine -> names of the effects of armid's library that have this very form, () for none.
+    library: machine -> sets of effects of armid's library, each of which has this very form, () for none.
     """
 
     family: str
@@ -54,7 +55,7 @@ class Form:
     sizes: Mapping[str, tuple[float, float, str]]
     act: Callable[..., Any]
     source: str
-    library: Callable[[Machine], tuple[str, ...]] = lambda machine: ()
+    library: Callable[[Machine], Library] = lambda machine: ()
     n_states: int = 0
     start: Callable[..., list[Array]] | None = None
     after: Callable[..., list[Array]] | None = None
@@ -69,18 +70,24 @@ SCALES: Mapping[str, Callable[[Machine], float]] = {
     "s": lambda m: 1.0, "1": lambda m: 1.0, "1/s": lambda m: 1.0, "effort": lambda m: m.effort,
     "signed": lambda m: m.effort, "speed": lambda m: m.speed, "1/effort": lambda m: 1.0 / m.effort,
     "1/effort2": lambda m: 1.0 / m.effort**2, "effort/speed": lambda m: m.effort / m.speed,
-    "speed*s": lambda m: m.speed, "1/speed/s": lambda m: 1.0 / m.speed, "1/speed": lambda m: 1.0 / m.speed,
-    "angle": lambda m: 0.1 * m.speed, "command": lambda m: 1.0,
+    "speed*s": lambda m: m.speed, "1/speed/s": lambda m: 1.0 / m.speed,
+    "angle": lambda m: 0.1 * m.speed,
 }  # fmt: skip
 
 
-def named(*names: str) -> Callable[[Machine], tuple[str, ...]]:
-    return lambda machine: names
+def named(*names: str) -> Callable[[Machine], Library]:
+    """Return effects of armid's library, any of which has the form."""
+    return lambda machine: tuple((name,) for name in names)
 
 
-def of_sensor(end: str) -> Callable[[Machine], tuple[str, ...]]:
+def together(*names: str) -> Callable[[Machine], Library]:
+    """Return effects of armid's library that have the form only together."""
+    return lambda machine: (names,)
+
+
+def of_sensor(end: str) -> Callable[[Machine], Library]:
     """Return the effect of armid's library at the sensor of the first output: `output_lag`, `angle_lag`."""
-    return lambda machine: (f"{machine.outputs[0].prefix}_{end}",)
+    return lambda machine: ((f"{machine.outputs[0].prefix}_{end}",),)
 
 
 def records_angle(machine: Machine) -> bool:
@@ -378,7 +385,7 @@ FORMS = (
     Form("dead_zone", "threshold", "drive", ZONE, threshold, "Horowitz and Hill, The Art of Electronics, section 4.3"),
     Form("dead_zone", "one_sided", "drive", ZONE, one_sided, "Merritt, Hydraulic Control Systems, section 5.2"),
     Form("dry_friction", "coulomb", "torque", DRY, coulomb, BOOK, named("coulomb")),
-    Form("dry_friction", "stribeck", "torque", FADING, stribeck, BOOK, named("coulomb", "stribeck")),
+    Form("dry_friction", "stribeck", "torque", FADING, stribeck, BOOK, together("coulomb", "stribeck")),
     Form("dry_friction", "dahl", "torque", {**DRY, "way": (0.003, 0.03, "speed*s")}, dahl,
          "doi:10.1016/S0947-3580(98)70113-X", named("presliding"), 1),
     Form("dry_friction", "lugre", "torque", {**FADING, "way": (0.003, 0.03, "speed*s")}, lugre, "doi:10.1109/9.376053",
@@ -403,7 +410,7 @@ FORMS = (
     Form("cogging", "sine", "torque", {"level": (0.02, 0.15, "effort"), **WAVES}, ripple,
          "Holtz and Springob 1996, IEEE Trans. Industrial Electronics 43(2)", named("torque_ripple", "cogging")),
     Form("cogging", "two_harmonics", "torque", {"level": (0.02, 0.1, "effort"), **WAVES, "second": (0.4, 1.0, "1")},
-         two_harmonics, "Islam, Mir, Sebastian 2004, doi:10.1109/TIA.2004.827469"),
+         two_harmonics, "Islam, Mir, Sebastian 2004, doi:10.1109/TIA.2004.827469", named("cogging")),
     Form("cogging", "triangle", "torque", {"level": (0.02, 0.15, "effort"), **WAVES}, triangle,
          "Hanselman, Brushless Permanent Magnet Motor Design, chapter 5"),
     Form("cogging", "with_drive", "drive", {"level": (0.05, 0.3, "1"), **WAVES}, drive_ripple,
@@ -411,13 +418,13 @@ FORMS = (
     Form("asymmetry", "viscous", "torque", {"slope": (0.03, 0.2, "effort/speed")}, asymmetric_viscous,
          "Janot, Gautier, Brunot 2019", named("asymmetric_viscous")),
     Form("asymmetry", "coulomb", "torque", {**DRY, "difference": (0.2, 0.7, "1")}, asymmetric_coulomb,
-         "Janot, Gautier, Brunot 2019", named("coulomb", "torque_offset")),
+         "Janot, Gautier, Brunot 2019", together("coulomb", "torque_offset")),
     Form("asymmetry", "gain", "drive", {"share": (0.05, 0.3, "1")}, asymmetric_gain,
          "Merritt, Hydraulic Control Systems, chapter 6 (cylinders with a rod)"),
     Form("offset", "constant", "torque", {"level": (0.02, 0.12, "signed")}, constant_effort,
          "Janot, Gautier, Brunot 2019", named("torque_offset")),
     Form("offset", "sensor", "sensor", {"level": (0.01, 0.05, "speed")}, sensor_bias, DOEBELIN,
-         lambda machine: ("gyro_bias",) if machine.outputs[0].state == 1 else of_sensor("bias")(machine)),
+         lambda machine: (("gyro_bias",),) if machine.outputs[0].state == 1 else of_sensor("bias")(machine)),
     Form("offset", "wandering", "torque", {"level": (0.02, 0.12, "signed"), "period": (1.0, 6.0, "s")}, wandering,
          DOEBELIN),
     Form("offset", "warming_up", "torque", {"level": (0.03, 0.15, "signed"), "period": (0.5, 4.0, "s")}, warming_up,
