@@ -40,8 +40,8 @@ class Machine:
     command: (numbers, inputs, position) -> u. drive: (numbers, u, speed) -> E. load: (numbers, states) -> the effort
     against which the drive works. rates: (numbers, states, E and what is lost or gained of it, T) -> rates of states.
     limit: largest command. travel: largest position of a sound record. rates_hz: sample rates. seconds: of a record.
-    controlled: its input is a target position. volts: u is a voltage at a winding. free_gain: E is a free parameter
-    times u. left_out: never used while tuning.
+    controlled: its input is a target position. volts: u is a voltage at a winding. left_out: never used
+    while tuning. extra: further ranges, of a supply.
     """
 
     name: str
@@ -64,7 +64,6 @@ class Machine:
     travel: float = float("inf")
     controlled: bool = False
     volts: bool = False
-    free_gain: bool = False
     left_out: bool = False
     extra: Mapping[str, Any] = field(default_factory=dict)
 
@@ -217,7 +216,7 @@ propeller_pendulum = Machine(
     inputs={"throttle": "throttle_1"}, outputs=(ANGLE,),
     command=first_input, drive=thrust, load=hanging, rates=rigid("inertia", hanging),
     limit=lambda p: min(1.0, (0.6 * p["gravity_moment"] / p["thrust"]) ** 0.5),
-    rates_hz=(20.0, 500.0), seconds=(6.0, 16.0), travel=2.4, free_gain=True,
+    rates_hz=(20.0, 500.0), seconds=(6.0, 16.0), travel=2.4,
 )  # fmt: skip
 cart = Machine(
     name="cart", source="Apkarian, Lacheray, Levis 2012, Linear servo base unit (Quanser), force and back EMF of the cart",
@@ -234,7 +233,7 @@ hydraulic_boom = Machine(
     parameters={"gain": (0.3, 0.8), "lag": (0.06, 0.3)}, constants={"load_drop": (0.01, 0.05)},
     inputs={"valve": "valve_1"}, outputs=(ANGLE,),
     command=first_input, drive=valve, load=boom_load, rates=boom_rates,
-    limit=lambda p: 1.0, rates_hz=(20.0, 200.0), seconds=(8.0, 20.0), travel=2.5, free_gain=True,
+    limit=lambda p: 1.0, rates_hz=(20.0, 200.0), seconds=(8.0, 20.0), travel=2.5,
 )  # fmt: skip
 elastic_joint = Machine(
     name="elastic_joint", source="Spong 1987, doi:10.1115/1.3143860",

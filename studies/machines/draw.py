@@ -10,7 +10,7 @@ from machines.catalogue import MACHINES, Array, Machine
 from machines.excite import KINDS, SMOOTH, excitation
 from machines.forms import FORMS, SCALES, Form
 from machines.integrate import Planted, simulate
-from machines.sensors import DIRT, FAULTS, Sensor, draw_sensor, fault_size, faulty
+from machines.sensors import DIRT, FAULTS, SMOOTH_DIRT, Sensor, draw_sensor, fault_size, faulty
 
 RATES_HZ = (20.0, 25.0, 40.0, 50.0, 100.0, 125.0, 200.0, 250.0, 400.0, 500.0, 1000.0, 2000.0)
 N_EFFECTS = (0.2, 0.4, 0.25, 0.15)
@@ -22,6 +22,8 @@ FEWEST, MOST = 150, 6000
 """Samples of a record."""
 MOVES = 1.0
 """An effect moves some record by more than so many times its noise."""
+WEAKER = (-0.7, 0.0)
+"""Decimal logarithm of the factor on a strength, so that weak effects are among them."""
 STRONGER = 3
 """Doublings of an effect that moves no record by more than its noise."""
 ATTEMPTS = 60
@@ -78,11 +80,10 @@ def plan(seed: int, index: int, names: Sequence[str]) -> tuple[Plan, np.random.G
     tolerances = {name: round(float(rng.uniform(0.0, 0.05)), 3) if rng.random() < 0.7 else 0.0 for name in known}
     n_records = round(float(np.exp(rng.uniform(np.log(2.0), np.log(30.0)))))
     is_faulty = n_records > 3 and rng.random() < 0.25
-    dirt = str(rng.choice(DIRT))
+    dirt = str(rng.choice(DIRT if hold == "zero" else SMOOTH_DIRT))
     return Plan(
         machine, tuple(bool(rng.random() > UNLISTED) for _ in range(n_effects)), n_records, float(rng.choice(rates)),
-        hold, str(rng.choice(FAULTS)) if is_faulty else "", "none" if dirt == "jitter" and hold == "zero" else dirt,
-        tolerances,
+        hold, str(rng.choice(FAULTS)) if is_faulty else "", dirt, tolerances,
     ), rng  # fmt: skip
 
 
@@ -105,6 +106,7 @@ def drawn_sizes(form: Form, machine: Machine, command: float, h: float, rng: np.
     for name, (low, high, unit) in form.sizes.items():
         scale = {"command": command, "s/command": 1.0 / command}.get(unit) or SCALES[unit](machine)
         value = scale * (float(np.exp(rng.uniform(np.log(low), np.log(high)))) if low > 0.0 else rng.uniform(low, high))
+        value *= float(10.0 ** rng.uniform(*WEAKER)) if name == form.strength else 1.0
         sizes[name] = value * (float(rng.choice([-1.0, 1.0])) if unit == "signed" else 1.0)
     if "delay" in sizes:
         sizes["delay"] = max(round(sizes["delay"] / h), 1) * h
@@ -156,10 +158,10 @@ def attempt(plan: Plan, rng: np.random.Generator) -> Drawn | None:
         if not np.all(np.isfinite(runs)) or np.max(np.abs(whole[0])) > machine.travel:
             return None
         moved, still = (np.sqrt(np.mean((r - r[:, :, :1]) ** 2, axis=2)) for r in (whole, plain))
-        if np.any(moved < 0.15 * still) or np.any(moved > 6.0 * still):
+        if np.any(moved < 0.25 * still) or np.any(moved > 4.0 * still):
             return None
         state = rng.bit_generator.state
-        sensors = tuple(draw_sensor(o.headers, o.unit, float(np.sqrt(np.mean(moved[i] ** 2))), rng)
+        sensors = tuple(draw_sensor(o.headers, o.unit, float(np.sqrt(np.mean(moved[i] ** 2))), dt, rng)
                         for i, o in enumerate(machine.outputs))  # fmt: skip
         floors = np.array([s.floor for s in sensors])
         if np.any(moved < 6.0 * floors[:, None]):
@@ -195,7 +197,8 @@ def compared(
     n, variants = plan.n_records, len(planted) + 2
     there = []
     for i, each in enumerate(planted):
-        on = np.ones((variants, n))
+        weight = np.linspace(0.0, 1.0, n) if each.form.by_record else np.ones(n)
+        on = np.tile(weight, (variants, 1))
         on[[i + 1, -1]] = 0.0
         there.append(replace(each, on=on.ravel()))
     tiled = {name: np.tile(value, variants) if np.ndim(value) else value for name, value in numbers.items()}

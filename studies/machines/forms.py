@@ -47,6 +47,8 @@ class Form:
     with the unit "signed" is a share of the effort with a random sign. act: (sizes, states, here) -> (value, rates of its states); of a
     sensor: (sizes, values (n_steps,), step [s]) -> values. start, after: states at the start and after each step.
     library: machine -> sets of effects of armid's library, each of which has this very form, () for none.
+    fits: whether a machine may have it; a form that free parameters of its plant take over entirely does not fit.
+    by_record: the strength grows from record to record, from 0 in the first.
     """
 
     family: str
@@ -60,6 +62,7 @@ class Form:
     start: Callable[..., list[Array]] | None = None
     after: Callable[..., list[Array]] | None = None
     fits: Callable[[Machine], bool] = field(default=lambda machine: True)
+    by_record: bool = False
 
     @property
     def strength(self) -> str:
@@ -88,6 +91,23 @@ def together(*names: str) -> Callable[[Machine], Library]:
 def of_sensor(end: str) -> Callable[[Machine], Library]:
     """Return the effect of armid's library at the sensor of the first output: `output_lag`, `angle_lag`."""
     return lambda machine: ((f"{machine.outputs[0].prefix}_{end}",),)
+
+
+def late_whole(where: str) -> Callable[[Machine], Library]:
+    """Return the effects of a dead time; where the only output answers a recorded drive, a late sensor is a late drive."""
+
+    def library(machine: Machine) -> Library:
+        drive, sensor = named("drive_delay", "controller_delay")(machine), of_sensor("delay")(machine)
+        is_alike = not machine.controlled and len(machine.outputs) == 1
+        first, second = (drive, sensor) if where == "drive" else (sensor, drive)
+        return (*first, *second) if is_alike else first
+
+    return library
+
+
+def shows_bias(machine: Machine) -> bool:
+    """Tell whether a bias of the sensor is more than another start."""
+    return machine.name not in ("elastic_joint", "hydraulic_boom")
 
 
 def records_angle(machine: Machine) -> bool:
@@ -357,8 +377,8 @@ PART = {"sharpness": (0.2, 1.0, "1/effort")}
 ZONE = {"zone": (0.03, 0.2, "effort")}
 LATE = {"delay": (0.005, 0.08, "s")}
 FORMS = (
-    Form("dead_time", "drive", "command", LATE, keep, CONTROL, named("drive_delay", "controller_delay")),
-    Form("dead_time", "sensor", "sensor", LATE, late_sensor, DOEBELIN, of_sensor("delay")),
+    Form("dead_time", "drive", "command", LATE, keep, CONTROL, late_whole("drive")),
+    Form("dead_time", "sensor", "sensor", LATE, late_sensor, DOEBELIN, late_whole("sensor")),
     Form("dead_time", "beating", "command", {**LATE, "period": (0.3, 2.0, "s")}, keep,
          "Nilsson, Bernhardsson, Wittenmark 1998, doi:10.1016/S0005-1098(97)00170-2"),
     Form("lag", "voltage", "signal", {"time": (0.005, 0.05, "s")}, lag, "Leonhard, Control of Electrical Drives",
@@ -424,13 +444,13 @@ FORMS = (
     Form("offset", "constant", "torque", {"level": (0.02, 0.12, "signed")}, constant_effort,
          "Janot, Gautier, Brunot 2019", named("torque_offset")),
     Form("offset", "sensor", "sensor", {"level": (0.01, 0.05, "speed")}, sensor_bias, DOEBELIN,
-         lambda machine: (("gyro_bias",),) if machine.outputs[0].state == 1 else of_sensor("bias")(machine)),
+         lambda machine: (("gyro_bias",),) if machine.outputs[0].state == 1 else of_sensor("bias")(machine), fits=shows_bias),
     Form("offset", "wandering", "torque", {"level": (0.02, 0.12, "signed"), "period": (1.0, 6.0, "s")}, wandering,
          DOEBELIN),
     Form("offset", "warming_up", "torque", {"level": (0.03, 0.15, "signed"), "period": (0.5, 4.0, "s")}, warming_up,
          DOEBELIN),
-    Form("drifted_gain", "constant", "drive", {"loss": (0.05, 0.3, "1")}, gain_error, "doi:10.1115/1.4027506",
-         named("drive_gain"), fits=lambda machine: not machine.free_gain),
+    Form("drifted_gain", "between_records", "drive", {"loss": (0.1, 0.4, "1")}, gain_error, "doi:10.1115/1.4027506",
+         by_record=True),
     Form("drifted_gain", "fading", "drive", {"loss": (0.1, 0.4, "1"), "period": (0.5, 4.0, "s")}, fading_gain,
          "Hughes and Drury, Electric Motors and Drives, chapter 3"),
     Form("drifted_gain", "heated", "drive", {"loss": (0.1, 0.5, "1")}, heated_gain, "IEC 60034-1", n_states=1),

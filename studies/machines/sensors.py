@@ -7,7 +7,11 @@ import numpy as np
 from machines.catalogue import Array
 
 FAULTS = ("late", "offset", "gain", "drift")
-DIRT = ("none", "none", "lost", "jitter")
+DIRT = ("none", "none", "lost")
+SMOOTH_DIRT = ("none", "lost", "jitter", "jitter")
+"""Times jitter only where the drive is smooth: a step between two samples has no time of its own in a file."""
+HELD_S = 0.06
+"""Longest time for which a sensor holds its value [s]."""
 TURN = 2.0 * np.pi
 FACTORS = {"rpm": TURN / 60.0, "deg": np.pi / 180.0, "mm": 1e-3}
 
@@ -46,8 +50,8 @@ class Sensor:
         return np.rint(column) if self.counts else column, (read - values)[renewed]
 
 
-def draw_sensor(headers: tuple[str, ...], unit: str, size: float, rng: np.random.Generator) -> Sensor:
-    """Draw a sensor for an output whose rms is `size` [SI]; an angle may have an encoder, a speed may be held."""
+def draw_sensor(headers: tuple[str, ...], unit: str, size: float, dt: float, rng: np.random.Generator) -> Sensor:
+    """Draw a sensor for an output whose rms is `size` [SI], read every dt [s]; a speed may be held, for 0.06 s at most."""
     header, noise = str(rng.choice(headers)), size * float(10.0 ** rng.uniform(-2.8, -1.7))
     if header.endswith("counts"):
         counts = int(2 ** np.ceil(np.log2(TURN / (3.0 * noise))))
@@ -57,7 +61,8 @@ def draw_sensor(headers: tuple[str, ...], unit: str, size: float, rng: np.random
     # a step is 1, 2 or 5 of a decimal of the unit that is written
     decimal = 10.0 ** np.floor(np.log10(noise / factor))
     step = float(decimal * rng.choice([1.0, 2.0])) * factor if quantised else 0.0
-    hold = int(rng.integers(2, 19)) if unit == "rad/s" and rng.random() < 0.3 else 1
+    longest = min(int(HELD_S / dt), 18)
+    hold = int(rng.integers(2, longest + 1)) if unit == "rad/s" and longest >= 2 and rng.random() < 0.4 else 1
     return Sensor(header, 0.5 * noise if quantised else noise, step, hold)
 
 
