@@ -88,7 +88,7 @@ def entry_of(drawn: Drawn, records: list[dict[str, Any]]) -> dict[str, Any]:
         place = fault["place"]
         fault = {"kind": fault["kind"], "record": records[place]["file"], "role": records[place]["role"],
                  "size": fault["size"], "moves": fault["moves"]}  # fmt: skip
-    first = drawn.sensors[0]
+    first, rms = drawn.sensors[0], {o.name: s.floor for o, s in zip(machine.outputs, drawn.sensors, strict=True)}
     return {
         "class": plan.label,
         "machine": machine.name,
@@ -101,8 +101,7 @@ def entry_of(drawn: Drawn, records: list[dict[str, Any]]) -> dict[str, Any]:
         "dirt": plan.dirt,
         "rate_hz": plan.rate_hz,
         "hold": plan.hold,
-        "noise": {"kind": first.kind, "rms": {o.name: s.floor for o, s in zip(machine.outputs, drawn.sensors, strict=True)},
-                  "step": first.step, "held_samples": first.hold},
+        "noise": {"kind": first.kind, "rms": rms, "step": first.step, "held_samples": first.hold},
         "floor": {role: floor(records, role) for role in ("train", "holdout")},
         "records": records,
         "declared_fit": None,

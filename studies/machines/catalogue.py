@@ -189,7 +189,8 @@ wheel_pwm = Machine(
     limit=lambda p: 1.0, rates_hz=(20.0, 1000.0), seconds=(3.0, 12.0), volts=True, extra={"supply": (11.0, 25.0)},
 )  # fmt: skip
 unbalanced_disc = Machine(
-    name="unbalanced_disc", source="Koelewijn and Toth 2019, Physical parameter estimation of an unbalanced disc system",
+    name="unbalanced_disc",
+    source="Koelewijn and Toth 2019, Physical parameter estimation of an unbalanced disc system",
     effort=0.08, speed=10.0,
     parameters={"inertia": (1.5e-4, 4e-4), "motor_constant": (0.03, 0.06), "gravity_moment": (0.015, 0.04)},
     constants={"resistance": (6.0, 12.0)},
@@ -219,7 +220,8 @@ propeller_pendulum = Machine(
     rates_hz=(20.0, 500.0), seconds=(6.0, 16.0), travel=2.4,
 )  # fmt: skip
 cart = Machine(
-    name="cart", source="Apkarian, Lacheray, Levis 2012, Linear servo base unit (Quanser), force and back EMF of the cart",
+    name="cart",
+    source="Apkarian, Lacheray, Levis 2012, Linear servo base unit (Quanser)",
     effort=10.0, speed=0.6,
     parameters={"mass": (0.4, 1.6), "motor_constant": (4.0, 9.0)},
     constants={"resistance": (2.0, 4.0), "kp": (20.0, 80.0)}, exact=("kp",),

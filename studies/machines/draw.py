@@ -174,8 +174,8 @@ def attempt(plan: Plan, rng: np.random.Generator) -> Drawn | None:
             roles = ["train"] * n
             for i in rng.permutation(n)[: max(1, n // 3)]:
                 roles[i] = "holdout"
-            return Drawn(plan, numbers, off, tuple(planted), tuple(map(float, moves)), times, kinds, tuple(roles), inputs,
-                         outputs, sensors, fault)  # fmt: skip
+            return Drawn(plan, numbers, off, tuple(planted), tuple(map(float, moves)), times, kinds, tuple(roles),
+                         inputs, outputs, sensors, fault)  # fmt: skip
         rng.bit_generator.state = state
         planted = [stronger(p) if m <= MOVES else p for p, m in zip(planted, moves, strict=True)]
     return None
@@ -220,4 +220,3 @@ def with_fault(
     broken[0, place] = faulty(plan.fault, size, times, clean)
     moves = float(np.sqrt(np.mean((broken[0, place] - clean) ** 2))) / floor
     return {"kind": plan.fault, "place": place, "size": size, "moves": moves}, broken
-

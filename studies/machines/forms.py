@@ -43,9 +43,10 @@ class Form:
     """Declare a form of an effect.
 
     sizes: name -> (low, high, unit), drawn between; the first is the strength, which is 0 where the effect is not
-    there. Units are SI or products of the machine's scales, as in `SCALES`, or `command`, the largest command; a size
-    with the unit "signed" is a share of the effort with a random sign. act: (sizes, states, here) -> (value, rates of its states); of a
-    sensor: (sizes, values (n_steps,), step [s]) -> values. start, after: states at the start and after each step.
+    there. Units are SI, products of the machine's scales as in `SCALES`, or `command`, the largest command. A size with
+    the unit "signed" is a share of the effort with a random sign.
+    act: (sizes, states, here) -> (value, rates of its states); of a sensor: (sizes, values (n_steps,), step [s]) ->
+    values. start, after: its states at the start and after each step.
     library: machine -> sets of effects of armid's library, each of which has this very form, () for none.
     fits: whether a machine may have it; a form that free parameters of its plant take over entirely does not fit.
     by_record: the strength grows from record to record, from 0 in the first.
@@ -94,7 +95,7 @@ def of_sensor(end: str) -> Callable[[Machine], Library]:
 
 
 def late_whole(where: str) -> Callable[[Machine], Library]:
-    """Return the effects of a dead time; where the only output answers a recorded drive, a late sensor is a late drive."""
+    """Return the effects of a dead time; a late sensor is a late drive where one output answers a recorded drive."""
 
     def library(machine: Machine) -> Library:
         drive, sensor = named("drive_delay", "controller_delay")(machine), of_sensor("delay")(machine)
@@ -444,7 +445,8 @@ FORMS = (
     Form("offset", "constant", "torque", {"level": (0.02, 0.12, "signed")}, constant_effort,
          "Janot, Gautier, Brunot 2019", named("torque_offset")),
     Form("offset", "sensor", "sensor", {"level": (0.01, 0.05, "speed")}, sensor_bias, DOEBELIN,
-         lambda machine: (("gyro_bias",),) if machine.outputs[0].state == 1 else of_sensor("bias")(machine), fits=shows_bias),
+         lambda machine: (("gyro_bias",),) if machine.outputs[0].state == 1 else of_sensor("bias")(machine),
+         fits=shows_bias),
     Form("offset", "wandering", "torque", {"level": (0.02, 0.12, "signed"), "period": (1.0, 6.0, "s")}, wandering,
          DOEBELIN),
     Form("offset", "warming_up", "torque", {"level": (0.03, 0.15, "signed"), "period": (0.5, 4.0, "s")}, warming_up,

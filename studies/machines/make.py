@@ -36,7 +36,9 @@ class Parser(argparse.ArgumentParser):
 
 def main(words: Sequence[str]) -> int:
     """Make the campaigns of the command line; return the exit code, 2 with a sentence on stderr where refused."""
-    parser = Parser(prog="make.py", description="Make blind campaigns of eight machines. SYNTHETIC.", allow_abbrev=False)
+    parser = Parser(
+        prog="make.py", description="Make blind campaigns of eight machines. SYNTHETIC.", allow_abbrev=False
+    )
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="where the campaigns go; FOLDER.key.json: the key")
     parser.add_argument("--seed", type=int, required=True, help="seed of all that is drawn")
     parser.add_argument("--count", type=int, required=True, help="number of campaigns")

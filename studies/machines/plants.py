@@ -331,8 +331,8 @@ hydraulic_boom = Plant(
     scales=Scales(effort=0.6, speed=0.6, effort_unit="rad/s"), from_rest=False,
 )  # fmt: skip
 elastic_joint = Plant(
-    name="elastic_joint", note="motor and load with a spring between them: J1 dv/dt = c i - b v + K s, J2 (dv/dt + s'') "
-    "= -K s",
+    name="elastic_joint",
+    note="motor and load with a spring between them: J1 dv/dt = c i - b v + K s, J2 (dv/dt + s'') = -K s",
     parameters=(
         Parameter("motor_inertia", "kg m2", 1e-3, 0.2, nominal=0.02, note="of the motor and its gear"),
         Parameter("load_inertia", "kg m2", 1e-3, 0.5, nominal=0.04, note="behind the joint"),

@@ -51,7 +51,7 @@ class Sensor:
 
 
 def draw_sensor(headers: tuple[str, ...], unit: str, size: float, dt: float, rng: np.random.Generator) -> Sensor:
-    """Draw a sensor for an output whose rms is `size` [SI], read every dt [s]; a speed may be held, for 0.06 s at most."""
+    """Draw a sensor for an output whose rms is `size` [SI], read every dt [s]; a speed may be held for 0.06 s."""
     header, noise = str(rng.choice(headers)), size * float(10.0 ** rng.uniform(-2.8, -1.7))
     if header.endswith("counts"):
         counts = int(2 ** np.ceil(np.log2(TURN / (3.0 * noise))))

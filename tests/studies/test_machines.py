@@ -23,7 +23,7 @@ from machines.make import main
 from machines.plants import PLANTS
 
 OF_NAME = {plant.name: plant for plant in PLANTS}
-DT, N, N_SUB = 0.01, 300, 10
+DT, N = 0.01, 300
 
 
 def numbers_of(machine):
@@ -31,18 +31,18 @@ def numbers_of(machine):
     return {name: float(rng.uniform(*r)) for name, r in {**machine.parameters, **machine.constants}.items()}
 
 
-def both(name, hold, planted=(), effects=(), values=None):
+def both(name, hold, planted=(), effects=(), values=None, n_sub=10):
     """Simulate a machine here and by armid's engine; return the outputs of each over the speed scale."""
     machine, plant = MACHINES[name], OF_NAME[name]
     numbers, times = numbers_of(machine), DT * np.arange(N)
     command = machine.limit(numbers) * (0.4 * np.sin(5.0 * times) + 0.4 * np.sign(np.sin(3.1 * times)))
     inputs = {i: np.full(N, 10.0) if i == "supply" else command for i in machine.inputs}
-    ours = simulate(machine, numbers, {k: v[None] for k, v in inputs.items()}, DT, N_SUB, hold, planted)
+    ours = simulate(machine, numbers, {k: v[None] for k, v in inputs.items()}, DT, n_sub, hold, planted)
     model = Model(plant, tuple(effects))
     known = {**numbers, **{n: p.fixed for n, p in model.parameters.items() if p.fixed is not None}, **(values or {})}
     manoeuvre = Manoeuvre(DT, N, {c: numbers[c] for c in machine.constants}, inputs, hold)
-    run = prepare(model, manoeuvre, Schedule(substeps=8)).run(np.array([[known[p] for p in model.parameters]]))
-    return SimpleNamespace(ours=ours[:, 0, ::N_SUB] / machine.speed, theirs=run.outputs[:, 0] / machine.speed)
+    run = prepare(model, manoeuvre, Schedule(substeps=4 * n_sub)).run(np.array([[known[p] for p in model.parameters]]))
+    return SimpleNamespace(ours=ours[:, 0, ::n_sub] / machine.speed, theirs=run.outputs[:, 0] / machine.speed)
 
 
 def form_of(family, form):
@@ -80,7 +80,9 @@ def test_a_form_that_the_library_holds_is_its_form(name, family, form, sizes, ef
     known = applicable({**sensor_effects(plant), **EFFECTS}, plant)[word]
     known = known.in_form(of_form) if of_form else known
     planted = Planted(form_of(family, form), sizes)
-    plain, run = both(name, "zero"), both(name, "zero", [planted], [known], {f"{word}.{n}": v for n, v in values.items()})
+    plain = both(name, "zero")
+    # friction that changes its sign takes short steps
+    run = both(name, "zero", [planted], [known], {f"{word}.{n}": v for n, v in values.items()}, n_sub=40)
     moved = np.max(np.abs(run.ours - plain.ours))
     assert moved > 1e-3
     assert np.max(np.abs(run.ours - run.theirs)) < 2e-3 * moved
@@ -129,7 +131,9 @@ def test_campaigns_are_the_same_for_the_same_seed_also_after_a_cut(tmp_path):
     assert (tmp_path / "two.key.json").read_text() == (tmp_path / "one.key.json").read_text()
     files = sorted(f.name for f in (tmp_path / "one" / "c001").iterdir())
     assert files == sorted(f.name for f in (tmp_path / "two" / "c001").iterdir())
-    assert all((tmp_path / "one" / "c001" / f).read_bytes() == (tmp_path / "two" / "c001" / f).read_bytes() for f in files)
+    assert all(
+        (tmp_path / "one" / "c001" / f).read_bytes() == (tmp_path / "two" / "c001" / f).read_bytes() for f in files
+    )
 
 
 @pytest.mark.slow
