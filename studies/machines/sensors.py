@@ -10,6 +10,8 @@ FAULTS = ("late", "offset", "gain", "drift")
 DIRT = ("none", "none", "lost")
 SMOOTH_DIRT = ("none", "lost", "jitter", "jitter")
 """Times jitter only where the drive is smooth: a step between two samples has no time of its own in a file."""
+NOISE = (-2.8, -1.7)
+"""Decimal logarithm of the noise over the rms of the motion."""
 HELD_S = 0.06
 """Longest time for which a sensor holds its value [s]."""
 TURN = 2.0 * np.pi
@@ -52,7 +54,7 @@ class Sensor:
 
 def draw_sensor(headers: tuple[str, ...], unit: str, size: float, dt: float, rng: np.random.Generator) -> Sensor:
     """Draw a sensor for an output whose rms is `size` [SI], read every dt [s]; a speed may be held for 0.06 s."""
-    header, noise = str(rng.choice(headers)), size * float(10.0 ** rng.uniform(-2.8, -1.7))
+    header, noise = str(rng.choice(headers)), size * float(10.0 ** rng.uniform(*NOISE))
     if header.endswith("counts"):
         counts = int(2 ** np.ceil(np.log2(TURN / (3.0 * noise))))
         return Sensor(header, 0.3 * TURN / counts, TURN / counts, counts=counts)
