@@ -44,9 +44,9 @@ def record_text(drawn: Drawn, i: int, rng: np.random.Generator) -> tuple[str, di
         times = moved
     columns, noise = [times[rows]], {}
     for output, y, sensor in zip(machine.outputs, values, drawn.sensors, strict=True):
-        column, error = sensor.column(y[rows], rng)
-        columns.append(column)
-        noise[output.name] = float(np.sqrt(np.mean(error**2)))
+        column, error = sensor.column(y, rng)
+        columns.append(column[rows])
+        noise[output.name] = float(np.sqrt(np.mean(error[rows] ** 2)))
     headers = ["time_s", *(s.header for s in drawn.sensors), *machine.inputs.values()]
     lines = [",".join(headers)]
     lines += [",".join(text(v) for v in row) for row in zip(*columns, *driven[:, rows], strict=True)]

@@ -88,9 +88,9 @@ def test_a_form_that_the_library_holds_is_its_form(name, family, form, sizes, ef
 
 def test_the_longest_step_is_short_enough_for_dry_friction():
     machine = MACHINES["position_servo"]
-    numbers, times = numbers_of(machine), DT * np.arange(N)
+    numbers, times = numbers_of(machine), DT * np.arange(120)
     target = machine.limit(numbers) * (0.5 * np.sin(5.0 * times) + 0.4 * np.sign(np.sin(3.1 * times)))
-    inputs = {"goal": target[None], "supply": np.full((1, N), 8.0)}
+    inputs = {"goal": target[None], "supply": np.full((1, 120), 8.0)}
     planted = [Planted(form_of("dry_friction", "coulomb"), {"level": 0.08 * machine.effort})]
     coarse, fine = (
         simulate(machine, numbers, inputs, DT, n, "zero", planted)[0, 0, ::n] for n in (round(DT / STEP), 40)
