@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from machines.draw import Drawn
+from machines.forms import FORMS
 from machines.sensors import kept_rows
 
 SAID = (
@@ -119,8 +120,13 @@ def effect_entry(drawn: Drawn, i: int) -> dict[str, Any]:
 
     library: sets of effects, each of which has the form; all of a set are needed.
     """
-    planted, library = drawn.planted[i], drawn.planted[i].form.library(drawn.plan.machine)
-    form = planted.form
+    planted, machine = drawn.planted[i], drawn.plan.machine
+    form, library = planted.form, planted.form.library(machine)
+    # behind a linear machine alone, a lag of the sensor is a lag of the drive
+    if library and form.family == "lag" and machine.linear and len(drawn.planted) == 1:
+        others = ("voltage", "sensor") if form.form in ("voltage", "sensor") else ()
+        alike = [f.library(machine) for f in FORMS if f.family == "lag" and f.form in others and f is not form]
+        library = (*library, *(names for sets in alike for names in sets))
     return {
         "name": library[0][0] if library else f"{form.family}:{form.form}",
         "family": form.family,

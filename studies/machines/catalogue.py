@@ -40,8 +40,8 @@ class Machine:
     command: (numbers, inputs, position) -> u. drive: (numbers, u, speed) -> E. load: (numbers, states) -> the effort
     against which the drive works. rates: (numbers, states, E and what is lost or gained of it, T) -> rates of states.
     limit: largest command. travel: largest position of a sound record. rates_hz: sample rates. seconds: of a record.
-    controlled: its input is a target position. volts: u is a voltage at a winding. left_out: never used
-    while tuning. extra: further ranges, of a supply.
+    controlled: its input is a target position. volts: u is a voltage at a winding. linear: its one
+    output is linear in u. left_out: never used while tuning. extra: further ranges, of a supply.
     """
 
     name: str
@@ -64,6 +64,7 @@ class Machine:
     travel: float = float("inf")
     controlled: bool = False
     volts: bool = False
+    linear: bool = False
     left_out: bool = False
     extra: Mapping[str, Any] = field(default_factory=dict)
 
@@ -177,7 +178,7 @@ motor_disc = Machine(
     parameters={"inertia": (5e-4, 3e-3), "motor_constant": (0.06, 0.16)}, constants={"resistance": (0.7, 2.5)},
     inputs={"volts": "volts_V"}, outputs=(SPEED,),
     command=first_input, drive=motor, load=no_load, rates=rigid("inertia", no_load),
-    limit=lambda p: 100.0 * p["motor_constant"], rates_hz=(50.0, 2000.0), seconds=(2.0, 8.0), volts=True,
+    limit=lambda p: 100.0 * p["motor_constant"], rates_hz=(50.0, 2000.0), seconds=(2.0, 8.0), volts=True, linear=True,
 )  # fmt: skip
 wheel_pwm = Machine(
     name="wheel_pwm", source="Mohan, Undeland, Robbins, Power Electronics, chapters 7 and 13",
@@ -186,7 +187,8 @@ wheel_pwm = Machine(
     constants={"resistance": (0.8, 2.0)},
     inputs={"duty": "duty_1", "supply": "supply_V"}, outputs=(SPEED,),
     command=duty_command, drive=motor, load=no_load, rates=rigid("inertia", no_load),
-    limit=lambda p: 1.0, rates_hz=(20.0, 1000.0), seconds=(3.0, 12.0), volts=True, extra={"supply": (11.0, 25.0)},
+    limit=lambda p: 1.0, rates_hz=(20.0, 1000.0), seconds=(3.0, 12.0), volts=True, linear=True,
+    extra={"supply": (11.0, 25.0)},
 )  # fmt: skip
 unbalanced_disc = Machine(
     name="unbalanced_disc",
