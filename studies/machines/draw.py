@@ -24,8 +24,9 @@ MOVES = 1.0
 """An effect moves some record by more than so many times its noise."""
 WEAKER = (-0.7, 0.0)
 """Decimal logarithm of the factor on a strength, so that weak effects are among them."""
-STRONGER = 3
-"""Doublings of an effect that moves no record by more than its noise."""
+REVISIONS = 6
+"""Simulations of one draw: too small an effect is doubled, and a record that goes too far is asked for less."""
+SMALLER = 0.7
 ATTEMPTS = 60
 """Draws of numbers for one plan; a plan that fails so often has an error."""
 
@@ -140,31 +141,32 @@ def attempt(plan: Plan, rng: np.random.Generator) -> Drawn | None:
     kinds = tuple(str(kind) for kind in rng.choice(allowed, n))
     size = limit * rng.uniform(0.4, 1.0, n)
     slowest = max(0.15, 8.0 * dt, times[-1] / 40.0)
-    command = np.array([s * excitation(kind, times, slowest, rng) for s, kind in zip(size, kinds, strict=True)])
-    inputs = {name: command for name in machine.inputs if name != "supply"}
+    asked = np.array([excitation(kind, times, slowest, rng) for kind in kinds])
+    (commanded,) = (name for name in machine.inputs if name != "supply")
+    inputs: dict[str, Array] = dict.fromkeys(machine.inputs, asked)
     if "supply" in machine.inputs:
         full = float(rng.uniform(*machine.extra["supply"]))
         inputs["supply"] = np.round(full * (1.0 - 0.05 * rng.uniform(0.0, 1.0, (n, 1)) * times / times[-1]), 4)
-    inputs = {name: np.array([[float(f"{v:.6g}") for v in row] for row in rows]) for name, rows in inputs.items()}
     largest = limit * float(np.mean(numbers["kp"])) if "kp" in numbers else limit
     largest *= float(np.mean(inputs["supply"])) if "supply" in inputs else 1.0
     start = np.zeros((machine.n_states, n))
     if machine.name == "hydraulic_boom":
         start[0] = rng.uniform(-0.4, 0.4, n)
     planted = [Planted(f, drawn_sizes(f, machine, largest, h, rng)) for f in chosen_forms(plan, rng)]
-    for _ in range(STRONGER + 1):
+    for _ in range(REVISIONS):
+        inputs[commanded] = np.round(size[:, None] * asked, 6)
         runs = compared(plan, numbers, inputs, start, planted, n_sub)
         whole, plain = runs[0], runs[-1]
-        if not np.all(np.isfinite(runs)) or np.max(np.abs(whole[0])) > machine.travel:
-            return None
+        is_far = ~(np.max(np.abs(runs[:, 0]), axis=(0, 2)) <= machine.travel)
+        if np.any(is_far):
+            size = np.where(is_far, SMALLER * size, size)
+            continue
         moved, still = (np.sqrt(np.mean((r - r[:, :, :1]) ** 2, axis=2)) for r in (whole, plain))
-        if np.any(moved < 0.25 * still) or np.any(moved > 4.0 * still):
-            return None
         state = rng.bit_generator.state
         sensors = tuple(draw_sensor(o.headers, o.unit, float(np.sqrt(np.mean(moved[i] ** 2))), dt, rng)
                         for i, o in enumerate(machine.outputs))  # fmt: skip
         floors = np.array([s.floor for s in sensors])
-        if np.any(moved < 6.0 * floors[:, None]):
+        if np.any(moved < 0.25 * still) or np.any(moved > 4.0 * still) or np.any(moved < 6.0 * floors[:, None]):
             return None
         changes = np.sqrt(np.mean((runs[1:-1] - whole) ** 2, axis=3))
         moves = np.max(changes / floors[:, None], axis=(1, 2))
