@@ -13,7 +13,9 @@ from armid.model import Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import RecordWarning, read_campaign
+from armid.record.broken import repeated_samples
 from armid.record.resample import timing_of
+from armid.record.sensor import Sensor
 from armid.record.signal import signal_of
 from armid.record.table import read_table, time_column
 
@@ -235,3 +237,16 @@ def test_of_measured_records_nothing_is_left_out(name):
             ]
         assert all(signal.broken == () for signal in signals), file.name
         assert signals[0].sensor.hold in holds
+
+
+@pytest.mark.parametrize("noise", [0.45, 0.6, 0.9])
+def test_equal_values_of_a_coarse_encoder_are_no_fault_and_a_frozen_one_is(noise):
+    """In steps; the noise of the rest counts with its rounding. 20 records of 3,000 samples of a slow motion."""
+    rng, times = np.random.default_rng(5), np.arange(3000) / 200.0
+    rms, sudden = float(np.hypot(noise, 12.0**-0.5)), np.zeros(3000, dtype=np.bool_)
+    motion = 40.0 * np.sin(0.4 * times)
+    for _ in range(20):
+        values = np.rint(motion + noise * rng.standard_normal(3000))
+        assert not repeated_samples(values, rms, True, Sensor(step=1.0), sudden)["stuck"].any()
+    values[1000:1100] = values[1000]
+    assert repeated_samples(values, rms, True, Sensor(step=1.0), sudden)["stuck"].sum() >= 100

@@ -4,6 +4,7 @@ They are looked for in the rows that bring a new value, as they were read: on an
 rows makes values that no sensor gave.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from armid.record.sensor import Mask, Sensor
 
 # So many equal values in a row are no chance where the noise exceeds half a step of the sensor.
 REPEATED = 8
+# Chance of one longer run of equal values in a record of a sound sensor; a larger one loses samples of an encoder.
+CHANCE = 0.001
 # A sample that is so many times the noise away from the median of its four neighbours, this many times what nearly all
 # samples of the record are, and so many times what the closest three of the neighbours span: a step spans them.
 ABOVE_NOISE, ABOVE_OTHERS, USUAL, ABOVE_SPAN = 10.0, 6.0, 0.95, 3.0
@@ -66,13 +69,29 @@ def repeated_samples(values: Array, noise: float, known: bool, sensor: Sensor, s
         in_noise = known and int(np.sum(values == limit)) > longest
         if longest and any(in_noise or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in stretches):
             clipped |= values == limit
+    by_chance = longest_by_chance(noise, sensor.step, values.size)
     for begin, end in repeated:
+        if end - begin <= by_chance:
+            continue
         last = min(end, values.size - 1)
         away = abs(float(values[last] - values[begin]))
         left_behind = known or (away > leap and not sudden[last])
         # many sensors show a standstill without noise, and a machine may start at once
         stuck[begin:end] = abs(values[begin]) > sensor.step and left_behind
     return {"clipped": clipped, "stuck": stuck & ~clipped}
+
+
+def longest_by_chance(noise: float, step: float, n: int) -> float:
+    """Return the longest run of equal values that noise leaves within one step of the sensor among n values.
+
+    p^(r - 1) n = CHANCE, p = erf(step / (2 sqrt(2) sigma)) the chance that a value at the middle of a step stays in it,
+    sigma^2 = noise^2 - step^2/12 the noise before it is rounded. noise: rms with the rounding.
+    """
+    sigma = math.sqrt(max(noise**2 - step**2 / 12.0, 0.0))
+    stays = math.erf(0.5 * step / (math.sqrt(2.0) * sigma)) if sigma > 0.0 else 1.0
+    if stays in (0.0, 1.0):
+        return math.inf if stays else 1.0
+    return 1.0 + math.log(CHANCE / n) / math.log(stays)
 
 
 def visits(values: Array, limit: float) -> list[tuple[int, int]]:
