@@ -40,7 +40,7 @@ class Missed:
         error, train = (shown(e, self.unit)[0] for e in self.errors)
         unit = shown(1.0, self.unit)[1]
         said = [f"{self.record} does not carry over: it is missed by {error:.3g} {unit}, the train "
-                f"records by {train:.3g}. In noise and doubt this is {self.factor:.2g} times as much."]  # fmt: skip
+                f"records by {train:.3g}. In noise and doubt this is {self.factor:.3g} times as much."]  # fmt: skip
         if self.outside:
             reach = [f"{name} reaches {shown(value, unit)[0]:.3g} {shown(1.0, unit)[1]} (train: "
                      f"{shown(end, unit)[0]:.3g})" for name, (value, end, unit) in self.outside.items()]  # fmt: skip
@@ -57,7 +57,7 @@ def missed_sentences(missed: Sequence[Missed]) -> list[str]:
     if not missed:
         return []
     worst, *others = sorted(missed, key=lambda m: -m.factor)
-    rest = [f"The same holds for {', '.join(f'{m.record} ({m.factor:.2g} times)' for m in others)}."] if others else []
+    rest = [f"The same holds for {', '.join(f'{m.record} ({m.factor:.3g} times)' for m in others)}."] if others else []
     return [" ".join([worst.sentence, *rest])]
 
 

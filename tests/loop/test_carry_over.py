@@ -1,0 +1,71 @@
+"""What does not carry over is reported: how far records are missed, what is new in them, what may have changed."""
+
+import numpy as np
+import pytest
+
+import armid
+
+pytestmark = pytest.mark.slow
+STEP, N, INERTIA, FRICTION = 0.01, 600, 0.02, 0.05
+TOML = """\
+name = "axis"
+plant = "driven_axis"
+effects = ["viscous"]
+hold = "zero"
+[parameters.inertia]
+low = 0.002
+high = 0.2
+[[records]]
+file = "a.csv"
+role = "train"
+[[records]]
+file = "b.csv"
+role = "train"
+[[records]]
+file = "held.csv"
+role = "holdout"
+"""
+
+
+def write(folder, file, amplitude, seed, inertia=INERTIA, most=np.inf):
+    """Write a record of a motor whose drive gives no more than some effort; exact between samples."""
+    rng = np.random.default_rng(seed)
+    drive = np.repeat(amplitude * rng.choice([-1.0, -0.4, 0.4, 1.0], N // 20), 20)
+    keeps, speed = np.exp(-FRICTION * STEP / inertia), [0.0]
+    for effort in np.clip(drive, -most, most)[:-1]:
+        speed.append(keeps * speed[-1] + (1.0 - keeps) * effort / FRICTION)
+    measured = np.array(speed) + 0.02 * rng.standard_normal(N)
+    table = np.column_stack([STEP * np.arange(N), measured, drive])
+    np.savetxt(folder / file, table, delimiter=",", header="time_s,angular_velocity_rad_s,drive_V", comments="")
+
+
+def closed(folder, **held):
+    (folder / "campaign.toml").write_text(TOML)
+    write(folder, "a.csv", 1.0, 1)
+    write(folder, "b.csv", 1.0, 2)
+    write(folder, "held.csv", seed=3, **held)
+    return armid.close_loop(folder, candidates=["torque_offset"], curve=False)
+
+
+def test_a_record_of_more_drive_than_any_train_record(tmp_path):
+    found = closed(tmp_path, amplitude=4.0, most=2.0)
+    assert found.verdict == "does_not_carry_over"
+    (said,) = [s for s in found.next_steps if "does not carry over" in s]
+    assert said.startswith("held.csv")
+    assert "drive_effort reaches" in said
+    assert found.after.missed[0].factor > 10.0
+    assert found.effects == ()
+
+
+def test_a_parameter_that_changed_between_the_records(tmp_path):
+    found = closed(tmp_path, amplitude=1.0, inertia=1.1 * INERTIA)
+    missed = found.after.missed[0]
+    assert next(iter(missed.changes)) == "inertia"
+    assert missed.changes["inertia"] == pytest.approx(0.1, abs=0.03)
+    assert "A change of inertia by" in missed.sentence
+
+
+def test_a_record_like_the_others_carries_over(tmp_path):
+    found = closed(tmp_path, amplitude=1.0)
+    assert found.verdict == "no_discrepancy"
+    assert found.after.missed == []
