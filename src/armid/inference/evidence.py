@@ -12,7 +12,6 @@ Adding a column X with a strength of prior deviation s to a fit with residual r 
     2 ln B = (X'r)^2 / (|X|^2 + 1/s^2) - ln(1 + s^2 |X|^2),     X beyond what the unknowns of the fit can do.
 """
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -291,7 +290,3 @@ def doubts_of(fit: Fit, library: Library) -> Array:
 def expansion_of(fit: Fit, scale: Scale, library: Library, with_doubts: bool = True) -> Expansion:
     none = np.empty((len(fit.residual), 0))
     return Expansion(fit, scale, library, doubts_of(fit, library) if with_doubts else none)
-
-
-def best_of(fits: Iterable[Fit], values: Sequence[float]) -> Fit:
-    return max(zip(fits, values, strict=True), key=lambda pair: pair[1])[0]

@@ -44,9 +44,9 @@ N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED = 8, 3, 3, 3
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
-# In log units: a fit that is so far behind is given up, and one that is so near is brought to its estimate.
-HOPELESS, NEAR = 60.0, 20.0
-# Models of the best number of effects that are expanded beside the window where more than noise is left.
+# In log units: a fit that is so far behind the best is given up.
+HOPELESS = 60.0
+# Models of each size that are expanded outside the window where more than noise is left.
 BEAM = 3
 
 
@@ -55,7 +55,7 @@ class Exploration:
     """Hold every model that was fitted.
 
     fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. completed: models at
-    their estimates with all unknowns freed. rounds: the log.
+    their estimates with all unknowns freed.
     """
 
     library: Library
@@ -66,7 +66,6 @@ class Exploration:
     fits: dict[Hypotheses, Fit] = field(default_factory=dict)
     forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
     completed: set[Hypotheses] = field(default_factory=set)
-    rounds: list[dict[str, object]] = field(default_factory=list)
     _evidence: dict[tuple[int, Scale], float] = field(default_factory=dict)
     _scale: dict[int, Scale] = field(default_factory=dict)
 
@@ -209,7 +208,7 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
         found.take(key, again)
-    for key, again in pairs(found, model, about, ahead, limit):
+    for key, again in pairs(found, model, about, ahead):
         found.take(key, again)
 
 
@@ -324,7 +323,7 @@ def swapped(
 
 
 def pairs(
-    found: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast], limit: float
+    found: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast]
 ) -> Iterable[tuple[Hypotheses, Fit | None]]:
     """Yield the fits with two effects more that promise clearly more than the best single one."""
     lead = sorted((f for f in ahead if np.isfinite(f.total)), key=lambda f: -f.posterior)[:N_LEADING]
@@ -333,7 +332,6 @@ def pairs(
     variants = [f.best(1)[0][0] for f in lead]
     columns = np.array([f.proposal.columns[v] for f, v in zip(lead, variants, strict=True)])
     gram, slope, _ = about.products(columns)
-    scale = about.scale
     width = np.array([f.proposal.scales[int(np.argmax(f.log_factor[v]))] for f, v in zip(lead, variants, strict=True)])
     prior = np.array([f.proposal.hypothesis.log_prior + f.proposal.variants[v] - np.log(len(f.proposal.scales))
                       for f, v in zip(lead, variants, strict=True)])  # fmt: skip
@@ -352,7 +350,6 @@ def pairs(
             _, determinant = np.linalg.slogdet(normal)
             total = rise - 0.5 * determinant - float(np.log(width[both]).sum()) + float(prior[both].sum())
             values.append((total, i, k, float(mean[0]), float(mean[1])))
-    _ = scale
     for total, i, k, first, second in sorted(values, reverse=True)[:N_PAIRS]:
         one, two = lead[i].proposal, lead[k].proposal
         key = model | {one.hypothesis, two.hypothesis}

@@ -9,7 +9,7 @@ from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal, expected
 from armid.inference.kinds.faults import Fault, column_of, faults_of, moved_by, with_record
 from armid.inference.library import Library
-from armid.inference.model import Fit
+from armid.inference.model import Fit, fit_from
 from armid.inference.refit import unless_diverged
 from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
@@ -98,7 +98,6 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
 
 
 def relabelled(fit: Fit, what: OfRecord, limit: float) -> Fit:
-    from armid.inference.model import fit_from
-
+    """Return the model with another load, or key, of a record than its file says."""
     posed = what.moved(fit.records, 1.0)
     return fit_from(posed, fit.active, [fit.z, np.full(fit.n_free, 0.5)], limit=limit)
