@@ -160,6 +160,7 @@ def load_file(file: Path) -> Any:
     folder = str(file.resolve().parent)
     if folder not in sys.path:
         sys.path.append(folder)
+    importlib.invalidate_caches()  # a file that was written a moment ago is seen
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
