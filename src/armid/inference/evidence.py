@@ -78,6 +78,7 @@ class Expansion:
     """Hold a fit to second order: all its unknowns A, their prior precision, and the residual.
 
     doubts: further unknowns with a prior deviation of 1 that the fit holds at their prior mean, (n_samples, n).
+    without: an effect whose parameters are no unknowns here.
     """
 
     fit: Fit
@@ -85,7 +86,6 @@ class Expansion:
     library: Library
     doubts: Array
     without: EffectKey | None = None
-    change: Array | None = None
 
     @cached_property
     def kept(self) -> NDArray[np.bool_]:
@@ -95,10 +95,6 @@ class Expansion:
     @cached_property
     def unknowns(self) -> Array:
         return np.hstack([self.fit.jacobian[:, self.kept], self.fit.columns, self.doubts])
-
-    @cached_property
-    def residual(self) -> Array:
-        return self.fit.residual if self.change is None else self.fit.residual + self.change
 
     @cached_property
     def density(self) -> Array:
@@ -141,21 +137,21 @@ class Expansion:
         """Return Gram matrix and slopes of columns beyond the unknowns, and how the unknowns answer to each column."""
         mixed, answer = self.beyond(columns)
         gram = self.scale.weight * columns @ columns.T - mixed.T @ answer
-        gradient = self.scale.weight * (self.unknowns.T @ self.residual)
-        slope = self.scale.weight * columns @ self.residual - answer.T @ gradient
+        gradient = self.scale.weight * (self.unknowns.T @ self.fit.residual)
+        slope = self.scale.weight * columns @ self.fit.residual - answer.T @ gradient
         return gram, slope, answer
 
     def squares(self, columns: Array) -> tuple[Array, Array, Array]:
         """Return what `products` does, of the Gram matrix its diagonal."""
         mixed, answer = self.beyond(columns)
         square = self.scale.weight * np.einsum("ij,ij->i", columns, columns) - np.einsum("ij,ij->j", mixed, answer)
-        gradient = self.scale.weight * (self.unknowns.T @ self.residual)
-        slope = self.scale.weight * columns @ self.residual - answer.T @ gradient
+        gradient = self.scale.weight * (self.unknowns.T @ self.fit.residual)
+        slope = self.scale.weight * columns @ self.fit.residual - answer.T @ gradient
         return np.maximum(square, 0.0), slope, answer
 
     @cached_property
     def base(self) -> float:
-        return self.scale.rest + self.scale.weight * float(self.residual @ self.residual)
+        return self.scale.rest + self.scale.weight * float(self.fit.residual @ self.fit.residual)
 
     def student(self, fall: Array) -> Array:
         """Return the rise of the log-likelihood by a fall of the weighted sum of squares."""

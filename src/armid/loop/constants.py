@@ -16,6 +16,7 @@ from armid.estimation.constants import NAMED, STEP, Product, columns_of, common_
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import LeastSquaresProblem, descend
 from armid.inference.checks import is_significant, train_residuals
+from armid.inference.kinds.drifts import order_of
 from armid.inference.kinds.faults import simulated_file, with_measured
 from armid.inference.library import ROUGHLY, Library
 from armid.inference.model import Fit, beyond, decomposed, fit_from, with_own_starts
@@ -327,13 +328,6 @@ def trends_of(fit: Fit, library: Library) -> list[Trend]:
     good = [t for t in found if t is not None and is_earned(fit, t.fit, t.chi2, len(tried))
             and not is_significant(t.fit)]  # fmt: skip
     return sorted(good, key=lambda t: t.chi2)
-
-
-def order_of(records: WhiteRecords) -> Array:
-    """Return the place of the file of each sample in the order of the campaign, from -1/2 to 1/2, (n_samples,)."""
-    files = list(dict.fromkeys(r.file for r in records.data.records))
-    places = np.array([files.index(r.file) for r in records.data.records]) / (len(files) - 1.0) - 0.5
-    return np.repeat(places, np.diff(records.data.edges))
 
 
 def slope_of(fit: Fit, moves: int | Product) -> Array:

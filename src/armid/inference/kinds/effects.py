@@ -8,10 +8,10 @@ import numpy as np
 from armid.estimation.least_squares import descend
 from armid.inference.evidence import SCALES, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal, expected
-from armid.inference.library import Activation, EffectKey, Library, activation_grid
+from armid.inference.library import EffectKey, Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
 from armid.inference.refit import unless_diverged
-from armid.inference.score_test import at_null, candidate_at, free_values
+from armid.inference.score_test import free_values, responses
 from armid.inference.whitening import WhiteRecords
 from armid.model import EFFECTS, Array
 
@@ -63,7 +63,7 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
     records = beside(fit, (*fit.active, key), library)
     every, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
     grid = [replace(a, share=share) for a in every if a.share == every[0].share for share in SHARES]
-    moved = responses(records, fit, grid)
+    moved = responses(fit, records, grid)
     good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
     if not len(good):
         return None
@@ -82,16 +82,6 @@ def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRe
     for one in fit.others:
         posed = one.unknown.moved(posed, one.value)
     return posed
-
-
-def responses(records: WhiteRecords, fit: Fit, grid: list[Activation]) -> Array:
-    """Return the change of the whitened signal per full strength of each activation, (n_activations, n_samples)."""
-    population = np.tile(candidate_at(records, fit.values), (len(grid) + 1, 1))
-    for row, activation in zip(population[1:], grid, strict=True):
-        for name, value in activation.at(activation.share).items():
-            row[records.space.index(name)] = value
-    signals = records.whole_signals(population)
-    return np.asarray((signals[1:] - signals[0]) / np.array([a.share for a in grid])[:, np.newaxis])
 
 
 def refit(
@@ -141,9 +131,3 @@ def starts_of(
             values = dict(zip(fit.values, fit.records.values(z), strict=True)) | grid[variant].at(share)
             starts.append(np.clip(posed.shares(free_values(posed, values)), 1e-3, 1.0 - 1e-3))
     return starts
-
-
-def change_without(fit: Fit, key: EffectKey) -> Array:
-    """Return what an effect of a fit does to the whitened signal, (n_samples,)."""
-    signals = fit.records.whole_signals(np.array([fit.candidate, at_null(fit.records, fit.candidate, key)]))
-    return np.asarray(signals[0] - signals[1])
