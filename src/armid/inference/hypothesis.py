@@ -1,5 +1,6 @@
 """A hypothesis: something that may be true of the machine or of its records, and is not in the declared model."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -62,6 +63,11 @@ def expected(number: float, n: int) -> float:
     """Return the log prior odds of each of n hypotheses of which so many are expected to hold."""
     p = min(number / max(n, 1), 0.5)
     return float(np.log(p / (1.0 - p)))
+
+
+def log_prior(model: Hypotheses) -> float:
+    """Return the log prior odds of a model; the sum does not depend on the order of a set."""
+    return math.fsum(h.log_prior for h in model)
 
 
 def words(hypotheses: Sequence[Hypothesis] | Hypotheses) -> str:

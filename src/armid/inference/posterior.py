@@ -69,7 +69,7 @@ class Posterior:
 
     def of_kind(self, kind: str, beside_unknown: bool = False) -> dict[str, float]:
         """Return the probabilities of the hypotheses of a kind, the most probable first."""
-        names = {n for s in self.sets for k, n in s if k == kind}
+        names = sorted({n for s in self.sets for k, n in s if k == kind})
         each = ((n, self.probability(kind, n, beside_unknown)) for n in names)
         return dict(sorted(each, key=lambda pair: -pair[1]))
 

@@ -23,7 +23,7 @@ from armid.inference.evidence import (
     log_evidence,
     scale_of,
 )
-from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, words
+from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior, words
 from armid.inference.kinds import drifts, effects, records, unknown
 from armid.inference.library import EffectKey, Library
 from armid.inference.model import Fit, fit_from
@@ -86,7 +86,7 @@ class Exploration:
         key = (id(fit), scale)
         if key not in self._evidence:
             self._evidence[key] = log_evidence(expansion_of(fit, scale, self.library))
-        return self._evidence[key] + sum(h.log_prior for h in model)
+        return self._evidence[key] + log_prior(model)
 
     def ranked(self) -> list[tuple[Hypotheses, float]]:
         """Return the models with their log posteriors, the best first."""
@@ -101,9 +101,8 @@ class Exploration:
         known = self.fits.get(model)
         if known is not None:
             scale = self.scale()
-            if self.log_posterior(model, scale) >= log_evidence(expansion_of(fit, scale, self.library)) + sum(
-                h.log_prior for h in model
-            ):
+            again = log_evidence(expansion_of(fit, scale, self.library)) + log_prior(model)
+            if self.log_posterior(model, scale) >= again:
                 return False
         self.fits[model] = fit
         return True
@@ -240,7 +239,7 @@ def trial_of(
 def drops(found: Exploration, model: Hypotheses, fit: Fit) -> list[Trial]:
     """Return the fits of a model without one of its effects."""
     trials: list[Trial] = []
-    for hypothesis in model:
+    for hypothesis in sorted(model):
         key = model - {hypothesis}
         if hypothesis.kind == "effect" and key not in found.fits:
             trials.append((key, partial(without, fit, hypothesis, found.library)))
