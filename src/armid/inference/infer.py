@@ -13,8 +13,9 @@ from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import Estimates, with_fitted_starts
-from armid.inference.evidence import Expansion
-from armid.inference.library import constant_effects, library_of
+from armid.inference.evidence import Expansion, expansion_of
+from armid.inference.hypothesis import Hypotheses, Hypothesis
+from armid.inference.library import Library, constant_effects, library_of
 from armid.inference.model import Fit
 from armid.inference.posterior import Posterior, posterior
 from armid.inference.search import Exploration, explore
@@ -27,8 +28,23 @@ from armid.record import Campaign
 REACH = 16.0
 # Sets and hypotheses of a smaller probability are not listed.
 LISTED = 0.01
-# A cause of an interval's width is told where it makes at least this share.
-LARGEST_CAUSES = 2
+# Names in the sentence that leads.
+MOST_TOLD = 5
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Hold what is known of one parameter, SI.
+
+    low, high: 95 % over the mixture of models. noise_low, noise_high: of noise alone, the model in force as it is.
+    causes: what makes the interval wide, with shares of its variance, the largest first.
+    """
+
+    low: float
+    high: float
+    noise_low: float
+    noise_high: float
+    causes: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,47 +59,77 @@ class Inference:
         """The most probable model."""
         return self.found.fits[self.found.ranked()[0][0]]
 
+    @cached_property
+    def in_force(self) -> Hypotheses:
+        """The most probable model of which every part has a name: it predicts records to come."""
+        return next(m for m, _ in self.found.ranked() if not any(h.kind == "unknown" for h in m))
+
     @property
     def probabilities(self) -> dict[str, Any]:
         """What is probable: effects, sets, nothing, unknown, records, drifts, and constants in tolerances."""
         post = self.posterior
         return {
-            "effects": {n: p for n, p in post.of_kind("effect").items() if p >= LISTED},
-            "effects_beside_unknown": {n: p for n, p in post.of_kind("effect", True).items() if p >= LISTED},
+            "effects": listed(post.of_kind("effect")),
+            "effects_beside_unknown": listed(post.of_kind("effect", True)),
             "sets": [{"hypotheses": sorted(name for _, name in names), "probability": p}
                      for names, p in post.sets.items() if p >= LISTED],
             "nothing": post.nothing,
             "unknown": post.probability("unknown"),
-            "records": {n: p for n, p in post.of_kind("record").items() if p >= LISTED},
-            "drifts": {n: p for n, p in post.of_kind("drift").items() if p >= LISTED},
+            "records": listed(post.of_kind("record")),
+            "drifts": listed(post.of_kind("drift")),
             "constants": {f.unknown.name.removeprefix(NAMED): f.value for f in self.best.others
                           if f.unknown.name.startswith(NAMED)},
         }  # fmt: skip
 
+    def partners(self, model: Hypotheses, hypothesis: Hypothesis) -> dict[str, float]:
+        """Return the effects that may stand in the place of one of a model, with the probability of such sets."""
+        rest, found = {h.public for h in model} - {hypothesis.public}, dict[str, float]()
+        for names, p in self.posterior.sets.items():
+            named = {n for n in names if n[0] != "unknown"}
+            other = named - rest
+            if rest < named and len(other) == 1 and other != {hypothesis.public}:
+                ((kind, name),) = other
+                if kind == "effect":
+                    found[name] = found.get(name, 0.0) + p
+        return listed(found)
+
     @cached_property
-    def intervals(self) -> dict[str, dict[str, Any]]:
-        """Of each parameter of the declared model: value, 95 % interval, that of noise alone, causes of the width."""
-        found, post = self.found, self.posterior
-        best = self.best
-        alone = Expansion(best, found.scale(), found.library, np.empty((len(best.residual), 0)))
-        alone = replace(alone, fit=replace(best, others=()))
-        told = {}
-        for name in post.parameters:
-            place = list(best.values).index(name)
-            half = NORMAL_95 * float(np.sqrt(alone.covariance[place, place]) * best.records.span[place])
-            value = best.values[name]
-            low, high = post.interval(name)
-            causes = post.causes(name, half / NORMAL_95)[:LARGEST_CAUSES]
-            told[name] = {"value": value, "low": low, "high": high, "noise_low": value - half,
-                          "noise_high": value + half, "causes": causes}  # fmt: skip
-        return told
+    def intervals(self) -> dict[str, Interval]:
+        """Of each parameter of the declared model, about the model in force."""
+        return {
+            name: replace(one, low=self.posterior.interval(name)[0], high=self.posterior.interval(name)[1],
+                          causes=tuple(self.posterior.causes(name, (one.noise_high - one.noise_low) / 2.0 / NORMAL_95)))
+            for name, one in self.of_fit(self.in_force).items() if name in self.posterior.parameters
+        }  # fmt: skip
+
+    def of_fit(self, model: Hypotheses) -> dict[str, Interval]:
+        """Return the intervals of all parameters of one model, were it true: with its constants, and of noise alone."""
+        found, fit = self.found, self.found.fits[model]
+        scale, span = found.scale(), fit.records.span
+        whole = expansion_of(fit, scale, found.library)
+        alone = Expansion(replace(fit, others=()), scale, found.library, np.empty((len(fit.residual), 0)))
+        n = fit.n_free
+        wide, narrow = (NORMAL_95 * span * np.sqrt(np.diag(e.covariance)[:n]) for e in (whole, alone))
+        return {name: Interval(v - float(w), v + float(w), v - float(a), v + float(a))
+                for (name, v), w, a in zip(fit.values.items(), wide, narrow, strict=True)}  # fmt: skip
+
+    @property
+    def sentence(self) -> str:
+        """The probabilities in one line."""
+        chances = self.probabilities
+        named = [f"{n} {p:.2f}" for n, p in chances["effects"].items()][:MOST_TOLD]
+        if len(chances["effects"]) > MOST_TOLD:
+            named.append(f"{len(chances['effects']) - MOST_TOLD} others")
+        faults = [f"{n} {p:.2f}" for kind in ("records", "drifts") for n, p in chances[kind].items()][:MOST_TOLD]
+        return "; ".join([*named, *faults, f"nothing missing {chances['nothing']:.2f}",
+                          f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip
 
     def __repr__(self) -> str:
-        chances = self.probabilities
-        named = [f"{n} {p:.2f}" for n, p in chances["effects"].items()]
-        listed = [*named[:5], *(f"{n} {p:.2f}" for n, p in chances["records"].items())]
-        return "; ".join([*listed, f"nothing missing {chances['nothing']:.2f}",
-                          f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip
+        return self.sentence
+
+
+def listed(probabilities: Mapping[str, float]) -> dict[str, float]:
+    return {name: p for name, p in probabilities.items() if p >= LISTED}
 
 
 # Threads of the linear algebra inside our own threads would only wait for each other.
@@ -133,6 +179,21 @@ def infer(
         When every candidate of the declared model diverges, for an unknown parameter, and for a prior of an unknown
         effect or outside 0 to 1.
     """
+    return inferred(library_for(model, campaign, candidates, bounds, fixed, priors, threads, told, progress))
+
+
+def library_for(
+    model: Model,
+    campaign: Campaign,
+    candidates: Mapping[str, Effect] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    priors: Mapping[str, float] | None = None,
+    threads: int = 1,
+    told: Callable[[str], None] = lambda _: None,
+    progress: Path | None = None,
+) -> Library:
+    """Return the declared model, its candidates and the train records, ready to be explored; see `infer`."""
     candidates = {**sensor_effects(model.plant), **EFFECTS} if candidates is None else candidates
     for name, p in (priors or {}).items():
         if name not in candidates:
@@ -143,11 +204,17 @@ def infer(
     if campaign.rough:
         model = replace(model, plant=model.plant.known_roughly(campaign.rough))
         candidates = {**candidates, **constant_effects(campaign.rough)}
-    data = replace(whitened(campaign.train, model.plant),
-                   estimates=None if progress is None else Estimates(progress))  # fmt: skip
+    estimates = None if progress is None else Estimates(progress)
+    if estimates:
+        told(f"going on from {len(estimates)} fits of {progress}")
+    data = replace(whitened(campaign.train, model.plant), estimates=estimates)
     library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told, within)
     library = replace(library, reach=REACH, priors=priors or {})
     posed = library.problem(())
-    library = library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
+    return library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
+
+
+def inferred(library: Library) -> Inference:
+    """Return what the train records of a library say; see `infer`."""
     found = explore(library)
     return Inference(found, posterior(found))

@@ -11,9 +11,9 @@ from scipy.linalg import block_diag
 from armid.engine import Schedule, Simulation, along, simulate
 from armid.estimation.least_squares import WeightedRecords
 from armid.inference.checks import variable_names
-from armid.inference.library import EffectKey, Library
+from armid.inference.library import Library
 from armid.inference.model import Fit, beyond
-from armid.inference.score_test import candidate_at, free_values
+from armid.inference.responses import candidate_at, free_values
 from armid.model import Array, Effect, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space
@@ -110,12 +110,11 @@ class Missing:
 def missing_from(lacking: Fit, library: Library) -> Missing:
     """Recover the missing signal at every port of a fitted model, and on what it depends there.
 
-    library: with the test signals (see `empirical.with_terms`). Each port costs a simulation for every knot of every
-    piece.
+    Each port costs a simulation for every knot of every piece.
     """
     records = library.problem(lacking.active, lacking.values)
     model, levels = records.model, [level.rms for level in records.data.levels]
-    ports = [p for p in model.plant.ports if EffectKey(f"{PROBE}{p}") in library.candidates]
+    ports = list(model.plant.ports)
     whole = segments(model, records.space, free_values(records, lacking.values), records.replays, levels, ports)
     whole = motions(model, candidate_at(records, lacking.values), whole)
     # Pieces spread evenly over all, as many as the knots allow.

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, fdtrc
 
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
-from armid.estimation.design import BOX
 from armid.estimation.information import start_changes
 from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
 from armid.inference.library import Active, EffectKey, calibrated_replays, is_finer, with_finest
@@ -61,11 +59,6 @@ class Fit:
         return max(1.0, float(np.sqrt(self.chi2 / len(self.residual))))
 
     @property
-    def dwarfs_noise(self) -> bool:
-        """Whether it leaves more than ten times the noise."""
-        return self.chi2 > DWARFED**2 * len(self.residual)
-
-    @property
     def n_free(self) -> int:
         return len(self.z)
 
@@ -95,12 +88,6 @@ class Fit:
     def independent(self) -> float:
         """How many samples of the residual are independent."""
         return self.records.data.independent(self.residual)
-
-    @property
-    def is_noise(self) -> bool:
-        """Whether the size of the residual is that of the noise: chi2 per sample not above 1 by chance of 1 %."""
-        level, n = self.records.data.levels[0], len(self.residual) - self.n_free
-        return level.known and bool(fdtrc(n, level.n_slow, self.chi2 / n) > ONLY_NOISE)
 
     @cached_property
     def has_arrived(self) -> bool:
@@ -150,23 +137,6 @@ class Fit:
         """Whether a bound holds a strength or a shape of one of its effects."""
         held = held_by_bound(self.records.space, self.x)
         return any(bool(held[self.owned_by(key)].any()) for key in self.active)
-
-    def needs(self, key: EffectKey) -> bool:
-        """Whether the strengths of one of its effects, all together, are away from their nulls by more than is open.
-
-        A Wald test; a residual that is no noise scatters with its correlation in time, see `WhitenedData.trust`, and
-        the estimate with the measured starts.
-        """
-        space, nulls = self.records.space, [self.model.parameters[n].null for n in self.values]
-        places = [i for i, n in enumerate(self.values) if key.owns(n) and nulls[i] is not None]
-        null = np.array([nulls[i] for i in places], dtype=np.float64)
-        free = np.flatnonzero(space.free)[places]
-        away = self.z[places] - (null - space.low[free]) / (space.high[free] - space.low[free])
-        weighed = self.jacobian * np.sqrt(self.records.data.trust(self.residual))[:, np.newaxis]
-        covariance = np.linalg.inv(weighed.T @ weighed + BOX * np.eye(self.n_free))
-        moved = self.answer @ self.start_slopes
-        covariance = (covariance + moved @ moved.T)[np.ix_(places, places)]
-        return not places or bool(away @ np.linalg.solve(covariance, away) > chdtri(len(places), OPEN))
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""

@@ -54,11 +54,11 @@ class Posterior:
     def probability(self, kind: str, name: str | None = None, beside_unknown: bool = False) -> float:
         """Return the probability of a hypothesis, or of any of a kind.
 
-        The name of an effect counts in sets without `unknown` alone, unless beside_unknown.
+        A name counts in sets without `unknown` alone, unless beside_unknown: what nobody knows may do what it does.
         """
         total = 0.0
         for names, weight in self.sets.items():
-            if kind == "effect" and name is not None and not beside_unknown and any(k == "unknown" for k, _ in names):
+            if name is not None and not beside_unknown and any(k == "unknown" for k, _ in names):
                 continue
             total += weight * any(k == kind and name in (None, n) for k, n in names)
         return total

@@ -1,44 +1,21 @@
 """Refit a model with one effect more, less or other, from the starts that a linear guess gives."""
 
 from collections.abc import Callable, Mapping, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
-from itertools import chain
 from typing import TypeVar
 
 import numpy as np
 
 from armid.errors import ArmidError
 from armid.estimation.least_squares import descend
-from armid.inference.library import Active, EffectKey, Library, activation_grid, declared_keys, points_within
-from armid.inference.model import Fit, beyond, decomposed, fit_from, with_own_starts
-from armid.inference.score_test import N_TRIED, Score, at_null, free_values, responses, square_beyond
+from armid.inference.library import Active, EffectKey, Library, points_within
+from armid.inference.model import Fit, fit_from, with_own_starts
+from armid.inference.responses import at_null, free_values
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
 T = TypeVar("T")
-
-
-def far_behind(fit: Fit, best: Fit) -> float:
-    return float(max(fit.independent, best.independent) * np.log(fit.chi2 / best.chi2))
-
-
-def refitted(current: Fit, found: Score, library: Library, limit: float) -> Fit:
-    """Fit the extended model, from the best two of the starts of a score that are not next to each other.
-
-    limit: chi2 that must be in reach, else the fit is given up.
-    """
-    active = (*current.active, found.key)
-    records = library.problem(active)
-    chi2 = records.chi2(np.array(found.starts[:N_TRIED]))
-    first, second = (found.starts[i] for i in np.resize(np.argsort(chi2, kind="stable")[:2], 2))
-    starts = [first, second] if np.max(np.abs(second - first)) > 0.02 else [first]
-    return fit_from(records, active, starts, rough=True, limit=limit)
-
-
-def fit_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
-    records = library.problem(active, values)
-    return fit_from(records, active, [start_of(records, values)], rough=True)
 
 
 def finished(fit: Fit, library: Library) -> Fit:
@@ -50,10 +27,6 @@ def finished(fit: Fit, library: Library) -> Fit:
     starts = continued(done, shapes)
     again = unless_diverged(lambda: accurate(fit_from(done.records, fit.active, starts), library)) if starts else None
     return done if again is None or done.chi2 < again.chi2 else again
-
-
-def finished_near(active: Active, values: Mapping[str, float], library: Library) -> Fit:
-    return finished(fit_near(active, values, library), library)
 
 
 def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
@@ -136,68 +109,3 @@ def unless_diverged(trial: Callable[[], T]) -> T | None:
         return trial()
     except ArmidError:
         return None
-
-
-# A candidate whose response correlates below this is no substitute; so many are worth a fit.
-LIKELY, MOST_SUBSTITUTES = 0.9, 8
-
-
-def change_by(fit: Fit, key: EffectKey) -> Array:
-    signals = fit.records.whole_signals(np.array([fit.candidate, at_null(fit.records, fit.candidate, key)]))
-    return np.asarray(signals[0] - signals[1])
-
-
-@dataclass(frozen=True)
-class Substitute:
-    """Hold what could stand in the place of an effect, how alike the two are, and values from which to fit it."""
-
-    place: EffectKey
-    key: EffectKey
-    correlation: float
-    values: dict[str, float]
-
-
-def substitutes(fit: Fit, library: Library) -> list[Substitute]:
-    """Return the candidates that move the records like an effect of a fit, the likest first.
-
-    A score at the model without the effect is a linear guess from parameters that the lack of it has biased; dry
-    friction can rank fourteenth there and still fit as well as the first (seen on one stroke). About the model with the
-    effect the guess is good: put in its place, a rival does nearly what it does, the parameters making up for what they
-    can. Another form of an effect stands in its place alone.
-    """
-    changes = {key: change_by(fit, key) for key in fit.active}
-    # of what parameters other than an effect's own can do, (n_samples, rank)
-    bases = {key: decomposed(fit.jacobian[:, ~fit.owned_by(key)])[0] for key in fit.active}
-    mine, others = declared_keys(fit.active), {key.public for key in library.joinable(fit.active)}
-
-    def places_of(candidate: EffectKey) -> list[Substitute]:
-        """Return the effects of the fit that a candidate moves the records like."""
-        records = library.problem((*fit.active, candidate), fit.values)
-        grid, _ = activation_grid(records, candidate)
-        near = [(key, likest(changes[key], responses(fit, records, grid, without=key), bases[key]))
-                for key in fit.active if candidate.public in others or candidate.public == key.public]  # fmt: skip
-        return [Substitute(key, candidate, best[1], fit.values | grid[best[0]].at(float(np.clip(best[2], 0.01, 1.0))))
-                for key, best in near if best is not None]  # fmt: skip
-
-    each = library.each(places_of, [key for key in library.candidates if key not in mine])
-    found = sorted(chain.from_iterable(each), key=lambda r: -r.correlation)
-    return [r for place in fit.active for r in [r for r in found if r.place == place][:MOST_SUBSTITUTES]]
-
-
-def likest(change: Array, moved: Array, basis: Array) -> tuple[int, float, float] | None:
-    """Return the activation that moves the signal most like a change, their correlation, and the amplitude that does.
-
-    None where none is near, or there is none.
-    change: (n_samples,), moved: per full strength, (n_activations, n_samples), both projected off a basis.
-    """
-    if not len(moved):
-        return None
-    wanted = beyond(basis, change)
-    slope, square = moved @ wanted, square_beyond(basis, moved)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = slope / np.sqrt(square * (wanted @ wanted))
-    correlation[~np.isfinite(correlation)] = 0.0
-    best = int(np.argmax(correlation))
-    if correlation[best] <= LIKELY:
-        return None
-    return best, float(correlation[best]), float(slope[best] / square[best])

@@ -1,25 +1,16 @@
 """The closed loop: residual, missing effect, extended model, error before and after.
 
-How it decides, in reading order:
+What is missing is inferred in `armid.inference`. Here, in reading order:
 
-close_loop       the whole way, and the verdict
-whitening        train records with their noise -> residuals whose noise is white
-candidates       the effects that may be missing, compiled together; the grid on which they are tried
-score_test       how far each candidate would bring the residual down, to first order
-fit              a model at its least-squares estimate; whether a larger one earns its parameters
-suspects         whether one record disagrees with the others, and how
-constants        whether constants within their tolerances do what an effect is to do, or a trend from record to record
-search           refits, exchanges, models with one effect more
-equivalence      effects that the records cannot tell apart
-diagnose         whether what remains is more than noise, and where
+close_loop       the model in force, the judgement on records held out, the verdict
+advice           the record to make next
+suspects         records that differ
+common_factors   which parameters the records give only together
+result           report.json
+document         what is shown; `figures`: what is drawn
 
-Beside it: missing_signal and empirical (where no effect will do), result
-(report.json), document and figures (what is shown).
-
-`WhitenedData`  the train records with their noise
-`EffectKey`     an effect in one of its forms, its shape fixed or free
-`Fit`           a model at its estimate
-`Residuals`     what a fit leaves on records, measured minus simulated
+`Judgement`  one model, and what it leaves on train and held-out records
+`Step`       one effect that was added
 """
 
 from armid.loop.close_loop import close_loop

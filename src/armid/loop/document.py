@@ -1,20 +1,19 @@
 """The document of a closed loop, and details.json: what of it is stored beside report.json."""
 
-import re
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from armid.estimation.constants import NAMED
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import SIGNIFICANCE, Finding, Residuals, time_in_words
-from armid.inference.library import SHOWN_AS
+from armid.inference.hypothesis import words
+from armid.inference.infer import Inference
 from armid.inference.missing_signal import Missing
-from armid.loop.figures import candidate_figure, figures_of, record_figure
+from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
     CARRIED,
     CARRIES_NOT,
@@ -27,11 +26,9 @@ from armid.loop.result import (
     UNEXPLAINED,
     ClosedLoop,
     Judgement,
-    candidates_of,
     record_entries,
     report_of,
 )
-from armid.loop.search import CREEPS
 from armid.loop.suspects import suspect_sentence
 from armid.report.document import (
     ERROR_NOTE,
@@ -64,7 +61,7 @@ from armid.units import shown
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
 # A shift of a parameter by more than this share of its value, and of its interval, is told.
 SHIFTED = 0.01
-MOST_TOLD, MOST_PORTS, MOST_EXACT = 3, 5, 5
+MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_NAMED, MOST_DRAWN = 3, 5, 5, 5, 6
 # A manoeuvre that separates rivals with a smaller chance is no advice.
 HOPELESS = 0.2
 # Smaller chances than this are all the same.
@@ -75,8 +72,10 @@ LEAST_SHARE = 0.005
 FIGURES = {
     "parameters": ("Parameters before and after", "Values with 95 % intervals; open marks are not to be trusted."),
     "motion": ("Measured and simulated motion", "Grey: measured. The coloured lines are the model before and after."),
-    "ranking": ("Candidates for the first effect", "Bars: fall of chi2 that the score predicts. Diamonds: that which a "
-                "full fit with this effect alone reached."),
+    "probabilities": ("How probable each is", "Of all models that were fitted: the share of those that hold it. A name "
+                      "counts only where nothing unknown stands beside it."),
+    "intervals": ("Each parameter by model", "Values with 95 % intervals by the most probable models, were each true, "
+                  "and over all of them."),
     "diagnosis": ("Where the discrepancy is", "Mean square of the residual in units of the noise's, part by part, "
                   "before and after; 1 is noise."),
     "autocorrelation": ("Correlation in time", "Autocorrelation of the whitened residual of the train records, before "
@@ -94,11 +93,8 @@ OLD = (
     "details.json is not in this folder: an earlier version of armid wrote it, so residuals, equations, candidates, "
     "settings and the command are not on this page; the same `armid close-loop` again writes them."
 )
-CANDIDATES_NOTE = (
-    "At the declared model. Fall of chi2 predicted: were the records linear in the effect. Left after projection: the "
-    "share of the effect's sensitivity (by length) that the free parameters cannot absorb. Alignment: cosine between "
-    "that and what the parameters leave of the residual; its square is the share of the residual that the effect "
-    "could remove with an amplitude out of all bounds. Reached: by a full fit with this effect alone."
+PROBABILITIES_NOTE = (
+    "Share of the posterior. A name counts only in sets without something unknown. In its place: what may stand there."
 )
 
 
@@ -128,7 +124,10 @@ def loop_document(
                                       for a in report["advice"]]  # fmt: skip
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
     advice += tuple(report.get("next_steps", ()))
+    drawn_first = tuple(f for name in ("probabilities", "intervals") for f in figures.get(name, ()))
+    chances = probability_table(report)
     sections = [
+        Section("What is missing", (chances, *drawn_first)),
         Section("Error before and after", (errors,)),
         *([residual_section(details, unit, by_record)] if details else []),
         Section("Steps", steps or (Text("No effect was added."),)),
@@ -136,8 +135,7 @@ def loop_document(
     ]
     if details:
         if "motion" in figures:
-            sections.insert(1, Section("Motion", figures["motion"]))
-        sections.append(candidates_section(details["candidates"], figures.get("ranking", ())))
+            sections.insert(2, Section("Motion", figures["motion"]))
         drawn = tuple(f for name in ("diagnosis", "autocorrelation", "missing") for f in figures.get(name, ()))
         told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
                 for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
@@ -147,7 +145,7 @@ def loop_document(
     elif figures:
         sections.append(Section("Figures", tuple(f for several in figures.values() for f in several)))
     if report.get("log"):
-        sections.append(Section("How it was searched", (log_table(report["log"]),)))
+        sections.append(Section("Models that were fitted", (log_table(report["log"]),)))
     if advice:
         tables = (advice_table(report["advice"], words),) if report["advice"] else ()
         sections.append(Section("The next record", (Sentences(advice), *tables)))
@@ -160,27 +158,52 @@ def loop_document(
         report["campaign"], "Closed loop", f"What does the declared model of {report['plant']} lack on these records?",
         answer(report, details), tuple(sections), warning="" if details else OLD,
         facts=(f"Plant {report['plant']}{records}; noise {noise:.3g} {name} rms.",),
-        main=(*steps, parameters, errors, Text(f"verdict: {report['verdict']}"),
+        main=(chances, *steps, parameters, errors, Text(f"verdict: {report['verdict']}"),
               Sentences((*shifts, *missing, *advice))),
     )  # fmt: skip
 
 
 def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return verdict, error before and after, and which parameters are to be trusted."""
+    """Return what is probable, the verdict, error before and after, and which parameters are to be trusted."""
     verdict = VERDICTS.get(report["verdict"], report["verdict"])
     effects = f" ({' + '.join(report['effects'])})" if report["effects"] else ""
-    first = f"{verdict}: {details['conclusion']}" if details else f"{verdict}{effects}."
+    second = f"{verdict}: {details['conclusion']}" if details else f"{verdict}{effects}."
     found = report["parameters"]["after"]
     sure = [f"{name} = {value_text(p)}" for name, p in found.items() if p["trusted"]]
-    unsure = [name for name, p in found.items() if p["low"] is not None and not p["trusted"]]
     exact = report.get("taken_as_exact", [])
     names = ", ".join(exact[:MOST_EXACT]) + (f" and {len(exact) - MOST_EXACT} more" if exact[MOST_EXACT:] else "")
     given = f", with {names} taken as exact (no tolerance is told)" if exact else ""
     said = [f"To be trusted{given}: {', '.join(sure)}."] if sure else []
     also = [VERDICTS.get(word, word).lower() for word in report.get("also", ())]
-    first += f" Also: {', '.join(also)}." if also else ""
-    said += details.get("doubts") or ([f"Not to be trusted: {', '.join(unsure)}."] if unsure else [])
-    return first, error_sentence(report), " ".join(said) or "No parameter was identified."
+    second += f" Also: {', '.join(also)}." if also else ""
+    said += details.get("doubts") or []
+    return (f"{chances_sentence(report)}.", second, error_sentence(report),
+            " ".join(said) or "No parameter was identified.")  # fmt: skip
+
+
+def chances_sentence(report: Mapping[str, Any]) -> str:
+    """Return the probabilities in one line: the effects, faults of records, nothing, and what nobody knows."""
+    chances = report["probabilities"]
+    named = [f"{name} {p:.2f}" for name, p in chances["effects"].items()]
+    more = [f"{len(named) - MOST_NAMED} others"] if len(named) > MOST_NAMED else []
+    faults = [f"{name} {p:.2f}" for kind in ("records", "drifts") for name, p in chances[kind].items()]
+    among = chances.get("among")
+    asked = f" (among {among[0]} of {among[1]} effects)" if among is not None and among[0] < among[1] else ""
+    return "; ".join([*named[:MOST_NAMED], *more, *faults[:MOST_NAMED], f"nothing missing {chances['nothing']:.2f}",
+                      f"something that the library does not hold {chances['unknown']:.2f}"]) + asked  # fmt: skip
+
+
+def probability_table(report: Mapping[str, Any]) -> Table:
+    """Return what may be missing, with its probability and what may stand in its place."""
+    chances = report["probabilities"]
+    others = {s["effect"]: ", ".join(s["alternatives"]) for s in report["steps"]}
+    rows = [(name, "effect", p, others.get(name, "")) for name, p in chances["effects"].items()]
+    rows += [(name, "one record", p, "") for name, p in chances["records"].items()]
+    rows += [(name, "drift from record to record", p, "") for name, p in chances["drifts"].items()]
+    rows += [("something that the library does not hold", "", chances["unknown"], ""),
+             ("nothing", "", chances["nothing"], "")]  # fmt: skip
+    columns = ["what", "kind", Column("probability", "probability", ".2f"), "in its place"]
+    return table("Probabilities", columns, rows, PROBABILITIES_NOTE)
 
 
 def error_sentence(report: Mapping[str, Any]) -> str:
@@ -216,25 +239,43 @@ def step_table(report: Mapping[str, Any]) -> Table:
 
 
 def log_table(log: list[Mapping[str, Any]]) -> Table:
-    """Return one line a round: what it reached, and the threshold that refused it."""
-    rows = []
-    for each in log:
-        leading = "; ".join(f"{' + '.join(m['effects'])} {m['chi2_per_sample']:.4g}" for m in each["leading"])
-        rows.append((each["n_effects"], each["n_tried"], leading, each["refused"] or "taken"))
-    columns = ["effects", Column("n_tried", "models fitted", ".0f"), "the best, with chi2 per sample", "outcome"]
-    return table("Rounds", columns, rows, "Train records; chi2 per sample of noise is 1.")
+    """Return one line a model that was fitted."""
+    rows = [(" + ".join(m["hypotheses"]) or "nothing", m["log_probability"], m["chi2_per_sample"]) for m in log]
+    columns = ["model", Column("log_probability", "log probability, the best 0", ".2f"),
+               Column("chi2_per_sample", "chi2 per sample", ".4g")]  # fmt: skip
+    return table("Models", columns, rows, "Train records; chi2 per sample of noise is 1.")
 
 
 def parameter_table(report: Mapping[str, Any]) -> Table:
     before, after = report["parameters"]["before"], report["parameters"]["after"]
-    rows = [(name, held_text(p), "yes" if p["trusted"] else "fixed or not determined" if p["low"] is None else "no",
-             held_text(before[name]) if name in before else "") for name, p in after.items()
-            if p["low"] is not None or not name.startswith(SHOWN_AS)]  # fmt: skip
+    rows = [
+        (
+            name,
+            held_text(p),
+            noise_text(p),
+            "yes" if p["trusted"] else "not identified" if p["low"] is None else "no",
+            ", ".join(p["causes"]),
+            held_text(before[name]) if name in before else "",
+        )
+        for name, p in after.items()
+    ]
     note = (
-        "Values with 95 % intervals; struck (~ ~) where the interval does not hold: more than noise "
-        "remains, or a bound holds it."
+        "Values with 95 % intervals over all models; of noise alone: were the model in force true. Struck (~ ~) where "
+        "the interval does not hold: a bound holds the value."
     )
-    return table("Parameters", ["parameter", "after", "trusted", "before"], rows, note)
+    columns = ["parameter", "after", "of noise alone", "trusted", "what makes it wide", "before"]
+    return table("Parameters", columns, rows, note)
+
+
+def trust_text(p: Mapping[str, Any]) -> str:
+    return "yes" if p["trusted"] else "not identified" if p["low"] is None else "no"
+
+
+def noise_text(p: Mapping[str, Any]) -> str:
+    if p["noise_low"] is None or p["noise_high"] is None:
+        return ""
+    low, high = (shown(p[end], p["unit"])[0] for end in ("noise_low", "noise_high"))
+    return f"{low:.5g} to {high:.5g}"
 
 
 def held_text(p: Mapping[str, Any]) -> str:
@@ -257,27 +298,6 @@ def residual_section(details: Mapping[str, Any], unit: str, errors: tuple[Part, 
     return Section(
         "Residual of each record", (gallery, *errors), text + records_note(len(figures), details["n_records"])
     )
-
-
-def candidates_section(candidates: Mapping[str, Any], ranking: tuple[Figure, ...]) -> Section:
-    columns = (
-        Column("effect", "effect"), Column("drop", "fall of chi2 predicted [%]", ".3g", 100.0),
-        Column("p", "chance from noise", ".2g"), Column("share", "left after projection [%]", ".3g", 100.0),
-        Column("alignment", "alignment", ".3f"), Column("reached", "fall of chi2 reached [%]", ".3g", 100.0),
-    )  # fmt: skip
-    rows = [[c[column.key] for column in columns] for c in candidates["listed"]]
-    drawn = tuple(
-        Figure(f"c{i}", f"What {c['effect']} would explain", "",
-               partial(candidate_figure, candidates["residual"], c["curve"], candidates["edges"]))
-        for i, c in enumerate(candidates["listed"]) if c["curve"] is not None
-    )  # fmt: skip
-    text = (
-        f"Train records end to end: {', '.join(candidates['files'])}. Grey: what the declared model leaves, whitened, "
-        "and projected off the sensitivities to its parameters. Blue: the part of it that the leading candidates "
-        "predict, projected alike."
-    )
-    parts: tuple[Part, ...] = table("Ranking", columns, rows, CANDIDATES_NOTE), *ranking, Gallery(drawn, wide=True)
-    return Section("Candidates", parts, text)
 
 
 def advice_table(advice: list[Mapping[str, Any]], words: list[str]) -> Table:
@@ -333,30 +353,41 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
         "records": records[:MOST_RECORDS],
         "n_records": len(records),
         "n_files": len(found.campaign.records),
-        "candidates": candidates_of(found),
+        "models": models_of(found.inference),
         "advice": [a.words for a in found.advice],
     }
+
+
+def models_of(found: Inference) -> list[dict[str, Any]]:
+    """Return the most probable models with the parameters of the declared model, were each true."""
+    chances, told = found.posterior.sets, []
+    for model, _ in found.found.ranked()[:MOST_DRAWN]:
+        own = {n: i for n, i in found.of_fit(model).items() if n in found.posterior.parameters}
+        values = found.found.fits[model].values
+        told.append(
+            {
+                "model": words(model),
+                "probability": chances.get(frozenset(h.public for h in model), 0.0),
+                "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in own.items()},
+            }
+        )
+    return told
 
 
 def conclusion(found: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
     if found.verdict == IMPLAUSIBLE:
-        return f"Nothing was searched for, as the records look wrong. {found.next_steps[0]}"
+        return f"Nothing is named, as the records look wrong. {found.next_steps[0]}"
     of_verdict = {DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful}
     if found.verdict in of_verdict:
         return of_verdict[found.verdict](found)
-    if found.term is not None:
-        return partly_empirical(found)
-    if found.after.fit.constants:
-        return constants_sentence(found)
     names = " + ".join(found.effects)
     return {
         NO_DISCREPANCY: nothing_missing(found),
         EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(found)}.",
-        PARTLY: f"With {names} the declared model does better, but a significant discrepancy remains."
-        f"{unclaimed(found)}{creeping(found)}",
-        UNEXPLAINED: f"The declared model lacks something, but no effect of the library earns its parameters: "
-        f"{tried(found)}.{creeping(found)}",
+        PARTLY: f"With {names} the declared model does better, but it lacks something that the library does not hold"
+        f"{unclaimed(found)}",
+        UNEXPLAINED: "The declared model lacks something that the library does not hold.",
     }[found.verdict]
 
 
@@ -371,22 +402,10 @@ def nothing_missing(found: ClosedLoop) -> str:
 def unclaimed(found: ClosedLoop) -> str:
     names = [s.effect for s in found.steps if not s.claimed]
     if not names:
-        return ""
+        return "."
     verb = "is" if len(names) == 1 else "are"
-    which = "No name is" if len(names) == len(found.steps) else f"{' and '.join(names)} {verb} not"
-    return f" {which} claimed: others may predict as well."
-
-
-def creeping(found: ClosedLoop) -> str:
-    """Say beside which effects the search ended as their fit creeps, "" where it did not."""
-    said = [r["refused"] for r in found.search.rounds if r["refused"].endswith(CREEPS)]
-    return f" {said[-1][0].upper()}{said[-1][1:]}." if said else ""
-
-
-def tried(found: ClosedLoop) -> str:
-    """Say how many sets of effects were tried: only of them it may be said that they do not explain the records."""
-    sizes = [len(f.active) for f in found.search.fits.values() if f.active and not f.active[-1].is_empirical]
-    return f"{len(sizes)} models of up to {max(sizes)} effects were tried" if sizes else "no candidate was worth a fit"
+    which = "no name is" if len(names) == len(found.steps) else f"{' and '.join(names)} {verb} not"
+    return f": {which} claimed."
 
 
 def remains(found: ClosedLoop) -> str:
@@ -401,24 +420,6 @@ def disagreeing_sentence(found: ClosedLoop) -> str:
     said = [suspect_sentence(s) for s in found.suspects if s.role == "train"]
     added = f"with {' + '.join(found.effects)} " if found.effects else ""
     return f"{' '.join(said)} Apart from that {added}{remains(found)}."
-
-
-def constants_sentence(found: ClosedLoop) -> str:
-    """Say by how much which constants are off."""
-    step, shares = found.steps[0], found.after.fit.constants
-    moved = sorted((n for n in step.constants), key=lambda n: -abs(shares[members(n)[0]]))
-    told = ", ".join(f"{n.removeprefix(NAMED)} {shares[members(n)[0]]:+.1%}" for n in moved[:MOST_PORTS])
-    others = f"; so would {' or '.join(step.alternatives)}" if step.alternatives else ""
-    known = found.campaign.tolerances
-    beyond = any(abs(shares[members(n)[0]]) > sum(known[each] for each in members(n)) for n in moved)
-    within = ", some beyond" if beyond else " within"
-    lead = "Constants do what an effect would" if found.after.significant else "No effect is needed"
-    return (f"{lead}: with constants off{within} their tolerances ({told}) {remains(found)} on {judged_on(found)}"
-            f"{others}.")  # fmt: skip
-
-
-def members(name: str) -> list[str]:
-    return re.split(r"[*/+]", name.removeprefix(NAMED))
 
 
 def carried_sentence(found: ClosedLoop) -> str:
@@ -438,39 +439,25 @@ def carried_sentence(found: ClosedLoop) -> str:
     if found.withdrawn is None:
         return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip
-    assert found.before.holdout is not None
-    worse = unseen.errors.joint_nrmse / found.before.holdout.errors.joint_nrmse - 1.0
+    last = found.after.holdout
+    assert last is not None
+    worse = unseen.errors.joint_nrmse / last.errors.joint_nrmse - 1.0
     names = " + ".join(s.effect for s in found.withdrawn.steps)
+    stands = f"the model with {' + '.join(found.effects)}" if found.effects else "the declared model"
     return (f"The train records ask for {names}, but the records held out are simulated {worse:.0%} worse with it "
-            f"({missed}): it is withdrawn, and the declared model stands.")  # fmt: skip
+            f"({missed}): it is withdrawn, and {stands} stands.")  # fmt: skip
 
 
 def doubtful(found: ClosedLoop) -> str:
-    if found.after.fit.constants:
-        return constants_sentence(found)
-    if found.refused is not None:
-        rivals, names = found.refused.rivals, " + ".join(found.effects)
-        lacking = f"With {names} the declared model does better, but still" if names else "The declared model"
-        return (f"{lacking} lacks something, and on these records {len(rivals) + 1} effects would do nearly as well "
-                f"({found.refused.name}, {', '.join(rivals[:6])}): none of these is named.")  # fmt: skip
+    """Say between what these records cannot decide."""
+    if not found.steps:
+        return "No single answer is probable: these records tell too little."
     said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
-    said += [f"{s.effect} cannot be told from {' or '.join(s.constants)} within tolerance"
-             for s in found.steps if s.constants]  # fmt: skip
-    names = " + ".join(found.effects)
-    said += [f"{names} fits hardly better than {' + '.join(r.names)}" for r in found.rivals]
+    said += [f"{s.effect} has a probability of {s.probability:.2f}" for s in found.steps
+             if not (s.claimed or s.alternatives)]  # fmt: skip
     rest = "a significant discrepancy remains, and" if found.after.significant else "what remains is noise, but"
     judged = "" if found.campaign.holdout else " No record was held out to judge it."
-    return f"With {names} {rest} on these records {'; '.join(said)}.{judged}"
-
-
-def partly_empirical(found: ClosedLoop) -> str:
-    assert found.term is not None
-    named = " + ".join(found.effects[:-1])
-    lacking = f"With {named} the declared model does better, but lacks" if named else "The declared model lacks"
-    dependence = found.term.dependence
-    return (f"{lacking} something that no effect of the library explains ({tried(found)}): {found.effects[-1]} is an "
-            f"empirical curve over {dependence.variable}{TIMES[dependence.factor]} at port {dependence.port}, which "
-            "claims no physical name.")  # fmt: skip
+    return f"With {' + '.join(found.effects)} {rest} on these records {'; '.join(said)}.{judged}"
 
 
 def missing_sentences(missing: Missing) -> list[str]:
@@ -530,7 +517,6 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
 def doubt_sentences(judged: Judgement) -> list[str]:
     reasons: dict[tuple[str, ...], list[str]] = {}
     for e in judged.estimates:
-        # The heights of an empirical curve mean nothing one by one.
-        if e.doubts and e.low is not None and not e.name.startswith(SHOWN_AS):
+        if e.doubts and e.low is not None:
             reasons.setdefault(e.doubts, []).append(e.name)
     return [f"Not to be trusted: {', '.join(names)} ({'; '.join(why)})." for why, names in reasons.items()]

@@ -19,7 +19,7 @@ from armid.units import shown
 LOOKS = (("before", OKABE_ITO["vermilion"], -0.12), ("after", OKABE_ITO["blue"], 0.12))
 AFTER = OKABE_ITO["blue"]
 KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}
-MOST_RECORDS, MOST_CANDIDATES, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
+MOST_RECORDS, MOST_NAMED, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
 PARAMETERS_A_ROW = 4
 # Of a title in medium letters.
 LETTERS_PER_INCH = 9.0
@@ -36,7 +36,8 @@ def figures_of(
         "motion": partial(motion_figure, found),
         "residuals": partial(residual_figure, found),
         "diagnosis": partial(diagnosis_figure, found),
-        "ranking": partial(ranking_figure, report["campaign"], details["candidates"]["listed"]),
+        "probabilities": partial(probability_figure, report["campaign"], report["probabilities"]),
+        "intervals": partial(interval_figure, report["campaign"], details["models"], report["parameters"]["after"]),
         "parameters": partial(parameter_figure, report["campaign"], report["parameters"]),
         "autocorrelation": partial(autocorrelation_figure, found),
     }
@@ -107,19 +108,6 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
     axis.margins(x=0.01)
 
 
-def candidate_figure(residual: Mapping[str, Any], predicted: Mapping[str, Any], edges: Sequence[int]) -> Any:
-    """Draw the stored projected residual and the part of it that a candidate predicts, records end to end."""
-    figure, (axis,) = small_axes(9.0, 2.5)
-    for curve, colour, width, name in ((residual, PALE, 0.7, "residual"), (predicted, AFTER, 1.3, "predicted")):
-        x, y = points(curve)
-        axis.plot(x, y, color=colour, lw=width, label=name)
-    for edge in edges[1:-1]:
-        axis.axvline(edge, color="0.4", lw=0.8, ls=":")
-    axis.set(xlabel="sample, train records end to end", ylabel="whitened residual\n[sigma]")
-    axis.legend(frameon=False, fontsize="small", loc="upper right", ncols=2)
-    return figure
-
-
 def diagnosis_figure(found: ClosedLoop) -> Any:
     before, after = found.before.diagnosis, found.after.diagnosis
     kinds = [k for k in KINDS if before.of_kind(k)]
@@ -153,18 +141,45 @@ def draw_findings(axis: Any, kind: str, before: Diagnosis, after: Diagnosis) -> 
     axis.margins(x=0.1)
 
 
-def ranking_figure(campaign: str, listed: Sequence[Mapping[str, Any]]) -> Any:
-    """Draw the predicted fall of chi2 of each candidate, as a share, and that of its full fit where there was one."""
-    best = sorted(listed, key=lambda c: -(c["drop"] or 0.0))[:MOST_CANDIDATES]
-    figure, axis = pyplot().subplots(figsize=(6.8, 0.34 * len(best) + 1.6), layout="constrained")
-    axis.barh(range(len(best)), [100.0 * (c["drop"] or 0.0) for c in best], color=GREY, label="predicted by the score")
-    fitted = [(100.0 * c["reached"], i) for i, c in enumerate(best) if c["reached"] is not None]
-    axis.plot([x for x, _ in fitted], [i for _, i in fitted], "D", color=AFTER, label="reached by a full fit")
-    axis.set_yticks(range(len(best)), [c["effect"] for c in best])
+def probability_figure(campaign: str, chances: Mapping[str, Any]) -> Any:
+    """Draw the probability of each effect and fault, of nothing and of something unknown. chances: of `report.json`."""
+    named = [(n, p, AFTER) for kind in ("effects", "records", "drifts") for n, p in chances[kind].items()]
+    named = sorted(named, key=lambda row: -row[1])[:MOST_NAMED]
+    ends = (("nothing", OKABE_ITO["green"]), ("unknown", OKABE_ITO["vermilion"]))
+    rows = [*named, *((n, chances[n], colour) for n, colour in ends)]
+    figure, axis = pyplot().subplots(figsize=(6.8, 0.34 * len(rows) + 1.3), layout="constrained")
+    axis.barh(range(len(rows)), [p for _, p, _ in rows], color=[c for *_, c in rows])
+    for i, (_, p, _) in enumerate(rows):
+        axis.text(min(p, 0.93) + 0.01, i, f"{p:.2f}", va="center", fontsize="small")
+    axis.set_yticks(range(len(rows)), [n for n, *_ in rows])
     axis.invert_yaxis()
-    axis.set_xlabel("fall of chi2 [%]")
-    axis.set_title(f"{campaign}: candidates for the first effect", fontsize="medium")
-    axis.legend(frameon=False, loc="lower right")
+    axis.set(xlim=(0.0, 1.0), xlabel="probability")
+    axis.set_title(f"{campaign}: what the declared model may lack", fontsize="medium")
+    return figure
+
+
+def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged: Mapping[str, Any]) -> Any:
+    """Draw each parameter by the most probable models and over all. models: of `details.json`."""
+    names = [n for n, p in averaged.items() if p["low"] is not None and n in models[0]["parameters"]]
+    columns = min(max(len(names), 1), PARAMETERS_A_ROW)
+    rows = -(-max(len(names), 1) // columns)
+    size = (2.6 * columns + 2.0, (0.3 * len(models) + 1.4) * rows + 0.5)
+    figure, axes = pyplot().subplots(rows, columns, figsize=size, squeeze=False, layout="constrained", sharey=True)
+    for axis in axes.flat[len(names) :]:
+        axis.set_axis_off()
+    labels = [fill(f"{m['model']} ({m['probability']:.2f})", 34) for m in models] + ["all models"]
+    for axis, name in zip(axes.flat, names, strict=False):
+        factor, unit = shown(1.0, averaged[name]["unit"])
+        each = [*(m["parameters"][name] for m in models), averaged[name]]
+        for i, p in enumerate(each):
+            ends = [[factor * (p["value"] - p["low"])], [factor * (p["high"] - p["value"])]]
+            axis.errorbar([factor * p["value"]], [i], xerr=ends, fmt="o", capsize=4,
+                          color=AFTER if i == len(models) else GREY)  # fmt: skip
+        axis.set_yticks(range(len(labels)), labels, fontsize="small")
+        axis.set(xlabel=f"{name} [{unit}]", ylim=(len(labels) - 0.5, -0.5))
+        axis.ticklabel_format(axis="x", useOffset=False)
+        axis.tick_params(axis="x", labelrotation=30, labelsize="small")
+    figure.suptitle(f"{campaign}: 95 % intervals by model, and over all", fontsize="medium")
     return figure
 
 
@@ -223,7 +238,7 @@ def correlation(residuals: Residuals) -> Array:
 
 
 def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
-    best = found.term.dependence if found.term is not None else missing.dependences[0]
+    best = missing.dependences[0]
     variables = [best.variable, *(v for v in missing.segments[0].variables if v != best.variable)][:MOST_VARIABLES]
     columns = (len(variables) + 2) // 2
     size = (4.0 * columns, 6.4)

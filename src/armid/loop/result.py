@@ -1,6 +1,6 @@
 """What the closed loop found, for programs: the result, its parameters with their doubts, and report.json."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -8,21 +8,17 @@ from typing import Any, ClassVar
 import numpy as np
 
 from armid.estimation.advice import Advice
-from armid.estimation.constants import columns_of
 from armid.estimation.identify import JointErrors, errors_by_file, errors_entry, record_errors
-from armid.estimation.information import Information, information_of
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, missed_records
 from armid.inference.checks import Diagnosis, Residuals
+from armid.inference.hypothesis import Hypotheses
+from armid.inference.infer import Inference
 from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
 from armid.inference.model import Fit
-from armid.inference.score_test import rest_of, score
-from armid.loop.empirical import Term
-from armid.loop.equivalence import EffectGroup
-from armid.loop.search import Search
 from armid.loop.suspects import Suspect
-from armid.model import Array, Model, is_late_as_a_whole
+from armid.model import EFFECTS, Array, Model
 from armid.problem.problem import Replay
 from armid.record import Campaign
 from armid.report.document import curve_entry, finite
@@ -34,31 +30,22 @@ IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAI
 )  # fmt: skip
 # Where train is noise, held-out records may be simulated worse than their noise by this factor.
 CARRIED = 1.1
-# An effect of the library that could bias a parameter by more than this share without being noticed is a doubt: on one
-# stroke 10-19 %, on four different ones up to 1.2 % (of p0; measured on the arm).
-BIASED = 0.01
-# An interval that the tolerances of constants widen by more than this factor, and beyond BIASED, rests on them.
-RESTS_ON = 2.0
 # Doubts for which an interval does not hold.
-REMAINS, HELD, CREPT = (
-    "a significant discrepancy remains", "its bound holds it", "the fit creeps and has not arrived",
-)  # fmt: skip
-# Doubt of every value where an effect delays what the motor induces with what drives it.
-LATE = "is told of all the drive, of which a part follows the motion: were the voltage alone late, it would be another"
-# Candidates whose predicted change of the residual is drawn.
-MOST_DRAWN = 4
-# Half of the 95 % interval may be this share of the value; correlations may be this strong.
-WIDEST, STRONGEST = 0.05, 0.99
+REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
+NOT_IDENTIFIED = "it was not identified: its value is declared"
+# Causes of the width of an interval that are told; models that are listed.
+MOST_CAUSES, MOST_LISTED = 2, 30
+# Of the keys of report.json: 2 came with probabilities.
+VERSION = 2
 
 
 @dataclass(frozen=True)
 class Estimate:
     """Hold one parameter.
 
-    value, low, high: SI, the 95 % interval, which counts the tolerances of the constants; None where it is fixed or not
-    determined. given_low, given_high: were the constants as declared. trusted: False where a
-    significant discrepancy remains, the bound holds it, the half width exceeds 5 % of the value, a correlation exceeds
-    0.99, an effect could bias it unseen, or it was not identified at all; doubts: these reasons in words.
+    value, low, high: SI, the 95 % interval over all models; None where it is fixed or not determined. noise_low,
+    noise_high: of noise alone, the model as it is. causes: what makes the interval wide, in words. doubts: why it is
+    not to be trusted, in words.
     """
 
     name: str
@@ -67,19 +54,14 @@ class Estimate:
     low: float | None
     high: float | None
     doubts: tuple[str, ...]
-    given_low: float | None = None
-    given_high: float | None = None
-    given_doubts: tuple[str, ...] = ()
+    noise_low: float | None = None
+    noise_high: float | None = None
+    causes: tuple[str, ...] = ()
 
     @property
     def trusted(self) -> bool:
         """Whether nothing speaks against the value and its interval."""
         return not self.doubts
-
-    @property
-    def trusted_given_constants(self) -> bool:
-        """Whether nothing would, were the constants as declared."""
-        return not self.given_doubts
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +113,8 @@ class Judgement:
 class Step:
     """Hold one turn of the loop: the effect that was added and what became of errors and parameters.
 
-    alternatives: names of the effects that it cannot be told from. empirical: whether it is a term without a name.
-    claimed: whether its name is claimed, or only a candidate, as where it does not carry over. constants: names of
-    constants that would do as well within their tolerances; where the step is such constants, those that it moves.
+    alternatives: names of the effects that may stand in its place, the most probable first. empirical: whether it is a
+    term without a name. claimed: whether its name is claimed. probability: that the machine has it.
     """
 
     effect: str
@@ -141,9 +122,8 @@ class Step:
     alternatives: tuple[str, ...]
     empirical: bool
     claimed: bool
-    constants: tuple[str, ...]
+    probability: float
     after: Judgement
-    group: EffectGroup
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,13 +141,11 @@ class ClosedLoop(Result):
     verdict: "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
     "partly_explained", "unexplained" or "cannot_tell_apart"; also: the others that hold. before, after: the declared
     model, and the model in force, with the effects that earned their place. withdrawn: what the held-out records
-    denied, None where nothing. refused: a group too big to be a finding, None where there is none. rivals: other models
-    that fit nearly as well and differ in more effects than one. next_steps: what to do beside the record that is
-    advised, in words. known_together: which parameters and constants the train records give only together, in words.
-    suspects: records that differ, and samples that are no data; error_all_records: "before" and
-    "after" -> errors on train and holdout with nothing left out. library, search: everything that was tried. missing:
-    the signal that the named effects leave unexplained, None where they leave nothing or it was not sought; term: the
-    empirical term for it, None where none earned its place.
+    denied, None where nothing. next_steps: what to do beside the record that is advised, in words. known_together:
+    which parameters and constants the train records give only together, in words. suspects: records that differ, and
+    samples that are no data; error_all_records: "before" and "after" -> errors on train and holdout with nothing left
+    out. inference: all models that were fitted, and how probable each is. missing: the signal that the model in force
+    leaves unexplained, None where it leaves nothing.
     """
 
     kind: ClassVar[Kind] = LOOP
@@ -178,17 +156,13 @@ class ClosedLoop(Result):
     after: Judgement
     steps: tuple[Step, ...]
     withdrawn: Withdrawn | None
-    refused: EffectGroup | None
-    rivals: tuple[Fit, ...]
     advice: tuple[Advice, ...]
     next_steps: tuple[str, ...]
     known_together: tuple[str, ...]
     suspects: tuple[Suspect, ...]
     error_all_records: Mapping[str, Sequence[JointErrors | None]]
-    library: Library
-    search: Search
+    inference: Inference
     missing: Missing | None
-    term: Term | None
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -219,106 +193,45 @@ class ClosedLoop(Result):
         return {e.name: e.value for e in self.after.estimates}
 
 
-Biases = Mapping[str, Sequence[tuple[float, str]]]
-
-
-def unseen_biases_of(fit: Fit, found: Iterable[tuple[str, Array]]) -> Biases:
-    """Return, for each parameter, by how much of its value which effect could bias it unseen, the strongest first.
-
-    found: public name of an effect and the biases of each free parameter, SI.
-    """
-    pairs = list(found)
-    return {
-        name: sorted(((float(own[i]) / abs(value), effect) for effect, own in pairs if value), reverse=True)
-        for i, (name, value) in enumerate(fit.values.items())
-    }
-
-
 def estimates(
-    fit: Fit, library: Library, discrepancy: bool, biases: Biases, members: Sequence[Fit]
-) -> tuple[Estimate, ...]:
+    found: Inference, model: Hypotheses, fit: Fit, discrepancy: bool, within: float
+) -> tuple[Estimate, ...]:  # fmt: skip
     """Return the parameters of the declared model and of the effects added, under their public names.
 
-    discrepancy: whether a significant one remains. biases: see `unseen_biases_of`. members: other models over which the
-    intervals of the declared model's own parameters reach; an effect that one of them does without is not trusted.
+    model: one of the inference; fit: it, as it is judged. Of the declared model's own parameters the interval of the
+    model in force counts all others. discrepancy: whether a significant one remains.
     """
-    views = [interval_view(fit, members, {})]
-    views.append(interval_view(fit, members, library.tolerances) if library.tolerances else views[0])
+    library, own = found.found.library, found.of_fit(model)
+    known = {**own, **found.intervals} if model == found.in_force else own
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
-    present = {key.public for key in fit.active}
-    late = delays_of_the_drive(fit, library) if is_late_as_a_whole(library.declared.plant) else []
-    found = []
+    told = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
         if owner is not None and owner not in active:
             continue
         public = name if owner is None else f"{owner.public}.{name.partition('.')[2]}"
-        if name not in space.free_names:
-            why = ("it was not identified: its value is declared",)
-            found.append(Estimate(public, value, unit, None, None, why, given_doubts=why))
+        if name not in known:
+            told.append(Estimate(public, value, unit, None, None, (NOT_IDENTIFIED,)))
             continue
-        i = space.free_names.index(name)
-        share, effect = next((b for b in biases.get(name, ()) if b[1] not in present), (0.0, ""))
-        rivals = [] if owner is None else sorted(
-            {n for m in members if owner.public not in m.names for n in m.names} - present
-        )  # fmt: skip
-        in_doubt = [f"{' or '.join(rivals)} would do in the place of {public.partition('.')[0]}"] if rivals else []
-        told = []
-        for intervals, strongest in views:
-            low, high = intervals[name]
-            given = 0.5 * (views[0][0][name][1] - views[0][0][name][0])
-            doubts_of = [REMAINS] if discrepancy else []
-            doubts_of += [HELD] if held[i] else []
-            doubts_of += [CREPT] if fit.crept else []
-            doubts_of += in_doubt
-            doubts_of += [f"{' and '.join(late)} {LATE}"] if late else []
-            if not max(value - low, high - value) <= WIDEST * abs(value):
-                doubts_of.append(f"half of its interval exceeds {WIDEST:.0%} of the value")
-            if strongest[i] > STRONGEST:
-                doubts_of.append(f"it is correlated with another by more than {STRONGEST}")
-            if share > BIASED:
-                size = f"{share:.1%}" if share < 1.0 else "more than itself"
-                doubts_of.append(f"{effect} could bias it by {size} without being seen on these records")
-            if 0.5 * (high - low) > max(BIASED * abs(value), RESTS_ON * given):
-                doubts_of.append("it rests on constants that are known within tolerances alone")
-            ends = (low, high) if np.isfinite(high - low) else (None, None)
-            told.append((*ends, tuple(doubts_of)))
-        (given_low, given_high, given_doubts), (low, high, doubts) = told
-        doubts = tuple(d if d in given_doubts else f"{d}, the tolerances of the constants counted" for d in doubts)
-        found.append(Estimate(public, value, unit, low, high, doubts, given_low, given_high, given_doubts))
-    return tuple(found)
+        one = known[name]
+        low, high = min(one.low, value), max(one.high, value)
+        causes = tuple(f"{words_of(cause)}, {share:.0%}" for cause, share in one.causes[:MOST_CAUSES])
+        doubts = [REMAINS] if discrepancy and model != found.in_force else []
+        doubts += [HELD] if held[space.free_names.index(name)] else []
+        if not max(value - low, high - value) <= within * abs(value):
+            wide = f"its interval reaches further than {within:.0%} from the value"
+            doubts.append(f"{wide} ({'; '.join(causes)})" if causes else wide)
+        ends = (low, high) if np.isfinite(high - low) else (None, None)
+        told.append(
+            Estimate(public, value, unit, ends[0], ends[1], tuple(doubts), one.noise_low, one.noise_high, causes)
+        )
+    return tuple(told)
 
 
-def delays_of_the_drive(fit: Fit, library: Library) -> list[str]:
-    """Return the names of the effects that follow the drive with states of their own, and act in its place."""
-    effects = {key.public: library.candidates[key.declared] for key in fit.active}
-    return sorted(n for n, e in effects.items() if (e.states or e.delays) and "drive" in e.adds)
-
-
-def interval_view(
-    fit: Fit, members: Sequence[Fit], tolerances: Mapping[str, float]
-) -> tuple[dict[str, tuple[float, float]], Array]:
-    """Return the interval of each free parameter over a model and others, and its strongest correlation."""
-    information = information_at_fit(fit, tolerances)
-    others = np.abs(information.correlation - np.diag(np.diag(information.correlation)))
-    intervals = interval_of(fit, information)
-    for member in members:
-        for name, (low, high) in interval_of(member, information_at_fit(member, tolerances)).items():
-            if name in intervals and "." not in name:
-                intervals[name] = min(low, intervals[name][0]), max(high, intervals[name][1])
-    return intervals, np.nan_to_num(others, nan=1.0).max(axis=1, initial=0.0)
-
-
-def information_at_fit(fit: Fit, tolerances: Mapping[str, float]) -> Information:
-    data, columns = fit.records.data, columns_of(fit.products(tolerances), len(fit.residual))
-    columns = columns if data.freed is None else np.hstack([columns, data.freed])
-    return information_of(fit.records, fit.z, data.trust(fit.residual), columns)
-
-
-def interval_of(fit: Fit, information: Information) -> dict[str, tuple[float, float]]:
-    return {n: (v - float(h), v + float(h))
-            for (n, v), h in zip(fit.values.items(), information.half_width, strict=True)}  # fmt: skip
+def words_of(cause: str) -> str:
+    """Return a cause of an interval's width in words."""
+    return cause if " " in cause or cause == "noise" else f"{cause}, not told from none by these records"
 
 
 def report_of(found: ClosedLoop) -> dict[str, Any]:
@@ -335,6 +248,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
         What report.json holds.
     """
     return {
+        "version": VERSION,
         "campaign": found.campaign.name,
         "plant": found.campaign.plant.name,
         "unit": found.campaign.unit,
@@ -343,6 +257,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
         "outputs": found.outputs,
         "verdict": found.verdict,
         "also": list(found.also),
+        "probabilities": found.inference.probabilities | {"among": among(found.inference.found.library)},
         "effects": list(found.effects),
         "error": {"before": errors_of(found.before), "after": errors_of(found.after)},
         "error_all_records": {
@@ -368,14 +283,20 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
         "next_steps": list(found.next_steps),
         "known_together": list(found.known_together),
         "taken_as_exact": list(found.campaign.taken_as_exact),
-        "log": list(found.search.rounds),
+        "log": log_of(found.inference),
     }  # fmt: skip
+
+
+def among(library: Library) -> list[int]:
+    """Return how many effects may be named, and how many share the prior probability."""
+    named = {key.public for key in library.candidates}
+    return [len(named), len(named | EFFECTS.keys())]
 
 
 def step_entry(step: Step) -> dict[str, Any]:
     return {
         "effect": step.effect, "port": step.port, "alternatives": list(step.alternatives), "empirical": step.empirical,
-        "claimed": step.claimed, "constants": list(step.constants), "error": errors_of(step.after),
+        "claimed": step.claimed, "probability": step.probability, "error": errors_of(step.after),
         "parameters": entries(step.after),
     }  # fmt: skip
 
@@ -396,10 +317,10 @@ def entries(judged: Judgement) -> dict[str, dict[str, Any]]:
             "low": finite(e.low),
             "high": finite(e.high),
             "trusted": e.trusted,
-            "interval_holds": e.low is not None and not {REMAINS, HELD, CREPT} & set(e.doubts),
-            "given_low": finite(e.given_low),
-            "given_high": finite(e.given_high),
-            "trusted_given_constants": e.trusted_given_constants,
+            "interval_holds": e.low is not None and not {REMAINS, HELD} & set(e.doubts),
+            "noise_low": finite(e.noise_low),
+            "noise_high": finite(e.noise_high),
+            "causes": list(e.causes),
         }
         for e in judged.estimates
     }
@@ -425,33 +346,11 @@ def of_output(replay: Replay, candidate: Array) -> dict[str, Any]:
     return errors_entry(JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)) or {}
 
 
-def candidates_of(found: ClosedLoop) -> dict[str, Any]:
-    """Return the candidates at the declared model, best first, the changes of the leading ones as curves.
-
-    drop: predicted fall of chi2 as a share of it; reached: that of the full fit with the effect alone, null where there
-    was none. Curves are whitened, in standard deviations of the noise, against the number of the sample.
-    """
-    start = found.before.fit
-    reached: dict[str, float] = {}
-    for fit in found.search.of_size(1):
-        name = fit.active[0].public
-        reached[name] = max(reached.get(name, 0.0), 1.0 - fit.chi2 / start.chi2)
-    listed: list[dict[str, Any]] = []
-    for own in found.search.scores_at(start):
-        name = own.key.public
-        if any(entry["effect"] == name for entry in listed):
-            continue
-        again = score(start, own.key, found.library) if len(listed) < MOST_DRAWN else None
-        listed.append({
-            "effect": name, "drop": finite(own.drop / start.chi2), "p": finite(own.p),
-            "reached": finite(reached.get(name)), "share": finite(own.share), "alignment": finite(own.alignment),
-            "curve": None if again is None else curve_entry(np.arange(len(again[1]), dtype=float), again[1]),
-        })  # fmt: skip
-    rest = rest_of(start)
-    edges = found.before.train.data.edges
-    return {
-        "listed": listed,
-        "residual": curve_entry(np.arange(len(rest), dtype=float), rest),
-        "edges": [int(e) for e in edges],
-        "files": [r.name for r in found.before.train.replays],
-    }
+def log_of(found: Inference) -> list[dict[str, Any]]:
+    """Return the models that were fitted, the most probable first, with what they leave."""
+    ranked = found.found.ranked()
+    return [
+        {"hypotheses": sorted(h.name for h in model), "log_probability": value - ranked[0][1],
+         "chi2_per_sample": found.found.fits[model].chi2 / len(found.found.fits[model].residual)}
+        for model, value in ranked[:MOST_LISTED]
+    ]  # fmt: skip

@@ -11,7 +11,7 @@ from armid.inference.hypothesis import Hypothesis, Proposal, expected
 from armid.inference.library import EffectKey, Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
 from armid.inference.refit import unless_diverged
-from armid.inference.score_test import free_values, responses
+from armid.inference.responses import free_values, responses
 from armid.inference.whitening import WhiteRecords
 from armid.model import EFFECTS, Array
 

@@ -1,0 +1,47 @@
+"""Which parameters and constants the records give only together."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from armid.estimation.constants import STEP, common_factors
+from armid.inference.library import ROUGHLY, Library
+from armid.inference.model import Fit, beyond, decomposed
+from armid.inference.responses import candidate_at
+from armid.inference.whitening import WhiteRecords
+from armid.model import Array
+
+
+def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
+    """Return in words which parameters of the declared model and constants the records give only together.
+
+    What the free strengths of effects make up for counts as unseen.
+    """
+    own, strengths = {}, [np.zeros(len(fit.residual))]
+    for name, value in fit.values.items():
+        owner = library.owner(name)
+        if owner is None:
+            own[name] = slope(fit, fit.records, name, value)
+        elif owner.name.startswith(ROUGHLY):
+            own[owner.name.removeprefix(ROUGHLY)] = slope(fit, fit.records, name, 1.0 + value)
+        else:
+            strengths.append(slope(fit, fit.records, name, value))
+    for key in library.candidates:
+        if key.name.startswith(ROUGHLY) and key not in fit.active:
+            records = library.problem((*fit.active, key), fit.values)
+            pairs = zip(records.replays, fit.records.replays, strict=True)
+            there = replace(records, replays=tuple(replace(r, pieces=at.pieces) for r, at in pairs))
+            own[key.name.removeprefix(ROUGHLY)] = slope(fit, there, f"{key.compiled}.error", 1.0)
+    if not own:
+        return ()
+    basis, _ = decomposed(np.column_stack(strengths))
+    found = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
+    return common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), found)
+
+
+def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:
+    """Return the change of the whitened signal by a parameter, its size taken as 1, about a fit, (n_samples,)."""
+    both = np.tile(candidate_at(records, fit.values), (2, 1))
+    both[:, records.space.index(name)] += np.array([STEP, -STEP]) * size
+    upper, lower = replace(records, data=fit.records.data).whole_signals(both)
+    return np.asarray((upper - lower) / (2.0 * STEP))
