@@ -6,7 +6,7 @@ Identifier, an algorithm of pymoo. The commands and `armid` itself call these fu
 
 import tomllib
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from inspect import signature
@@ -24,6 +24,7 @@ from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.progress import announced
 from armid.record import Campaign, read_campaign
+from armid.record.schema import Known
 from armid.registry import Registry, load_registry, name_of
 
 if TYPE_CHECKING:
@@ -315,7 +316,7 @@ def close_loop(
     model: Any, campaign: Campaign | None = None, candidates: Any = None, rng: np.random.Generator | None = None,
     bounds: Bounds | None = None, fixed: Mapping[str, float] | None = None, threads: int = 1,
     told: Callable[[str], None] = lambda _: None, *, without: Named = (), curve: bool = True,
-    progress: Path | None = None, **given: Any,
+    progress: Path | None = None, priors: Mapping[str, Any] | None = None, within: float | None = None, **given: Any,
 ) -> "ClosedLoop":  # fmt: skip
     """Find what a declared model lacks on the train records; `armid.close_loop("folder")` is enough.
 
@@ -329,6 +330,11 @@ def close_loop(
         Effects to look for; None: all that apply.
     without : names
         Effects not to look for.
+    priors : mapping
+        What is known before the records, as [priors] of campaign.toml: effect -> probability, parameter -> (mean,
+        standard deviation), SI.
+    within : float
+        A parameter is trusted whose 95 % interval is within this share of its value on either side; None: 0.05.
     **given
         effects, plugins, window, fix, plant: see `opened`.
 
@@ -351,10 +357,33 @@ def close_loop(
         if all(refusals):
             warnings.warn(f"effect '{name}' is not looked for: {refusals[0]}", stacklevel=2)
     values = {**(fixed or {}), **there.fixed}
+    chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
+    campaign = with_known(there.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
+    share = {} if within is None else {"within": positive(within, "within")}
     found: ClosedLoop = run(
-        there.model, there.campaign, kept, rng, there.bounds, values, threads, told, curve, progress
+        there.model, campaign, kept, rng, there.bounds, values, threads, told, curve, progress, chances, **share
     )
     return found
+
+
+def with_known(campaign: Campaign, told: Mapping[str, Sequence[float]]) -> Campaign:
+    """Return a campaign with what is known of parameters of its plant; told: name -> (mean, deviation), SI."""
+    names = [p.name for p in campaign.plant.parameters]
+    for name, pair in told.items():
+        if name not in names:
+            raise ArmidError(f"priors: parameter {quoted(name)} is not in the plant, {nearest(name, names)}")
+        if len(pair) != 2 or not all(map(isfinite, pair)) or not pair[1] > 0.0:
+            raise ArmidError(
+                f"priors: '{name}' is {quoted(list(pair))}, (mean, standard deviation above 0) is expected"
+            )
+    known = {name: Known(mean=float(mean), sd=float(sd)) for name, (mean, sd) in told.items()}
+    return replace(campaign, known={**campaign.known, **known})
+
+
+def positive(value: float, where: str) -> float:
+    if not (isfinite(value) and value > 0.0):
+        raise ArmidError(f"{where} is {value:g}: a number above 0 is expected")
+    return value
 
 
 def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[str, Effect]:

@@ -226,17 +226,26 @@ PROGRESS = "progress.jsonl"
 @out_option("Folder for report.html, report.md, report.json and the figures.", required=True)
 @click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]")
 @click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
-@click.option("--no-curve", is_flag=True, help="Try no empirical curve where no effect will do.")
+@click.option("--no-curve", is_flag=True, help="Do not recover the missing signal where no effect will do.")
+@click.option(
+    "--within",
+    type=float,
+    default=0.05,
+    show_default=True,
+    metavar="SHARE",
+    help="Trust a parameter whose 95 % interval is within this share of its value.",
+)
 @seed_option
 @click.option("--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations.")
 def close_loop_command(
-    campaign: Path, out: Path, candidates: str, without: str, no_curve: bool, seed: int, threads: int, **problem: Any
-) -> None:
+    campaign: Path, out: Path, candidates: str, without: str, no_curve: bool, within: float, seed: int, threads: int,
+    **problem: Any,
+) -> None:  # fmt: skip
     """Find the effects that the declared model lacks, and report the error before and after.
 
-    Identifies the declared model on the train records, tells whether what remains is more than noise, names the effect
-    that is missing (or says that it cannot), adds it and identifies again, until nothing earns its parameters. Records
-    held out are simulated after the last decision. --bounds and --fix may name parameters of candidates too; searches
+    Tells how probable each missing effect, each fault of a record and something without a name is, from the train
+    records; takes the most probable model of which every part has a name; and simulates the records held out after the
+    last decision. Steps that they deny are withdrawn. --bounds and --fix may name parameters of candidates too; searches
     start from evenly spread points, so that nothing is random. Every verdict exits with 0. What is cut off goes on with
     the same command, from the fits that DIR/progress.jsonl holds until then.
     """
@@ -250,7 +259,8 @@ def close_loop_command(
     try:
         with status_line() as show_status:
             found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
-                               without=without, curve=not no_curve, progress=kept, **given(**problem))  # fmt: skip
+                               without=without, curve=not no_curve, progress=kept, within=within,
+                               **given(**problem))  # fmt: skip
         show_and_save(found, out)
     except BaseException:
         if kept.exists():

@@ -101,10 +101,12 @@ class Expansion:
         """Prior density of each free parameter along its range, at the estimate, (n_free,)."""
         fit, space = self.fit, self.fit.records.space
         found = np.ones(fit.n_free)
+        places, _, deviations = fit.records.rows
+        found[places] = fit.records.span[places] / deviations / np.sqrt(2.0 * np.pi)
         for i, (name, value) in enumerate(fit.values.items()):
             low, high = space.low[space.free][i], space.high[space.free][i]
             is_shape = self.library.owner(name) is not None and fit.model.parameters[name].null is None
-            if is_shape and low > 0.0 and high > 5.0 * low:  # log-uniform
+            if is_shape and i not in places and low > 0.0 and high > 5.0 * low:  # log-uniform
                 found[i] = (high - low) / (max(value, low) * np.log(high / low))
         return found
 
@@ -113,6 +115,17 @@ class Expansion:
         """Prior precision of all unknowns."""
         n_others = self.fit.columns.shape[1] + self.doubts.shape[1]
         return np.concatenate([2.0 * np.pi * self.density[self.kept] ** 2, np.ones(n_others)])
+
+    @cached_property
+    def gradient(self) -> Array:
+        """Of half the sum of squares by the unknowns, less what priors of parameters pull back, (n_unknowns,)."""
+        found = self.scale.weight * (self.unknowns.T @ self.fit.residual)
+        places, means, deviations = self.fit.records.rows
+        if len(places):
+            pull = np.zeros(self.fit.n_free)
+            pull[places] = (self.fit.x[places] - means) * self.fit.records.span[places] / deviations**2
+            found[: int(self.kept.sum())] -= pull[self.kept]
+        return np.asarray(found)
 
     @cached_property
     def factor(self) -> tuple[Array, bool]:
@@ -137,16 +150,14 @@ class Expansion:
         """Return Gram matrix and slopes of columns beyond the unknowns, and how the unknowns answer to each column."""
         mixed, answer = self.beyond(columns)
         gram = self.scale.weight * columns @ columns.T - mixed.T @ answer
-        gradient = self.scale.weight * (self.unknowns.T @ self.fit.residual)
-        slope = self.scale.weight * columns @ self.fit.residual - answer.T @ gradient
+        slope = self.scale.weight * columns @ self.fit.residual - answer.T @ self.gradient
         return gram, slope, answer
 
     def squares(self, columns: Array) -> tuple[Array, Array, Array]:
         """Return what `products` does, of the Gram matrix its diagonal."""
         mixed, answer = self.beyond(columns)
         square = self.scale.weight * np.einsum("ij,ij->i", columns, columns) - np.einsum("ij,ij->j", mixed, answer)
-        gradient = self.scale.weight * (self.unknowns.T @ self.fit.residual)
-        slope = self.scale.weight * columns @ self.fit.residual - answer.T @ gradient
+        slope = self.scale.weight * columns @ self.fit.residual - answer.T @ self.gradient
         return np.maximum(square, 0.0), slope, answer
 
     @cached_property
@@ -240,6 +251,8 @@ def log_evidence(about: Expansion) -> float:
     # A strength counts with its own prior, below; the density along its box cancels there.
     found = scale.log_likelihood(fit.chi2) + 0.5 * fit.n_free * LOG_2PI - 0.5 * determinant
     found += float(np.sum(np.log(density)))
+    _, means, deviations = fit.records.rows
+    found -= 0.5 * float(np.sum(((fit.x[fit.records.rows[0]] - means) / deviations) ** 2))
     found -= 0.5 * float(sum(f.value**2 + f.unknown.lost(f.value) for f in fit.others))
     found -= 0.5 * fit.records.data.log_cover
     for key in fit.active:

@@ -161,7 +161,7 @@ def infer(
     bounds, fixed : mapping of parameter to (low, high) or value, SI
         Of the model or of a candidate; a bound is a wall, a declared range of a strength is a size to expect.
     priors : mapping of effect to probability
-        What is known before the records.
+        What is known before the records; those that the campaign tells count too.
     threads : int
         Among which candidates are shared; the result does not depend on it.
     told : callable
@@ -209,7 +209,9 @@ def library_for(
         told(f"going on from {len(estimates)} fits of {progress}")
     data = replace(whitened(campaign.train, model.plant), estimates=estimates)
     library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told, within)
-    library = replace(library, reach=REACH, priors=priors or {})
+    chances = {**campaign.chances, **(priors or {})}
+    known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
+    library = replace(library, reach=REACH, priors=chances, known=known)
     posed = library.problem(())
     return library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
 

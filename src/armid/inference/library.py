@@ -107,7 +107,9 @@ class Library:
     candidates: as registered. bundles: keys that are compiled together. overrides, bounds, fixed: as `space_of` takes
     them, of the declared model and of candidates alike. tolerances: of the constants, relative. misfit: rms residual of
     the best model so far in units of the noise, at least 1. say: called with a sentence before something that takes
-    long.
+    long. priors: probabilities of effects before the records. known: mean and deviation of parameters, SI, likewise.
+    reach: by which factor strengths that scale with the machine may exceed their declared range. widened: ranges of
+    strengths of the declared model that were too narrow.
     """
 
     declared: Model
@@ -122,6 +124,7 @@ class Library:
     tolerances: Mapping[str, float] = field(default_factory=dict)
     misfit: float = 1.0
     priors: Mapping[str, float] = field(default_factory=dict)
+    known: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     reach: float = 1.0
     widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     _models: dict[Active, Model] = field(default_factory=dict)
@@ -160,7 +163,7 @@ class Library:
                 replays = self.replays(model, space, near or {}, self.misfit, on_one=bool(active))
             else:
                 replays = tuple(with_finest(same[0], same) for same in zip(*alone, strict=True))
-            self._problems[key] = WhiteRecords(replays, space, self.data)
+            self._problems[key] = WhiteRecords(replays, space, self.data, self.known)
         return self._problems[key]
 
     def about(self, replays: Sequence[Replay], misfit: float) -> "Library":
@@ -190,7 +193,7 @@ class Library:
     ) -> tuple[Replay, ...]:  # fmt: skip
         """Return the train records ready to be simulated, as finely as a residual so many times the noise asks for."""
         noise = [level.innovation for level in self.data.levels]
-        hidden = HIDDEN * misfit**2 / len(self.data.kept)
+        hidden = HIDDEN * misfit**2 / len(self.data.sound)
         return calibrated_replays(self.data.records, model, space, near, on_one, noise, hidden)
 
     def compiled_model(self, active: Active) -> Model:

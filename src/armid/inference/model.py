@@ -103,7 +103,7 @@ class Fit:
     @cached_property
     def jacobian(self) -> Array:
         """Whitened derivatives of the signal by z, (n_samples, n_free); most models of a search are never asked."""
-        return self.records.with_all_samples().residual_and_slopes(self.z)[1]
+        return self.records.plain.residual_and_slopes(self.z)[1]
 
     @cached_property
     def columns(self) -> Array:
@@ -129,7 +129,7 @@ class Fit:
 
         Without columns where records start at rest, or where their starts are fitted.
         """
-        changes = list(start_changes(self.records.with_all_samples(), self.z))
+        changes = list(start_changes(self.records.plain, self.z))
         return np.column_stack(changes) if changes else np.empty((len(self.residual), 0))
 
     @property
@@ -188,7 +188,7 @@ def fit_from(
             raise ArmidError("each start of a fit diverged: other bounds are expected")
         make = partial(descend, records, list(good), tolerance, limit=limit)
         z = make() if kept is None else kept.recalled((tried, chi2, tolerance, limit), make)
-    return Fit(tuple(active), records, z, records.with_all_samples().residuals(z)[0], rough=rough)
+    return Fit(tuple(active), records, z, records.plain.residuals(z)[0], rough=rough)
 
 
 def with_standard_accuracy(fit: Fit) -> Fit:

@@ -113,10 +113,10 @@ def freed(
     cost = cost_of(base, unknowns, values, z)
     for _ in range(MOST_TURNS):
         records = moved(base, unknowns, values)
-        columns = columns_about(base, unknowns, values, z, kept)
-        posed = ProjectedRecords((), base.space, records=records, columns=columns, values_known=values)
+        columns = columns_about(base.plain, unknowns, values, z, kept)
+        posed = ProjectedRecords((), base.space, records=records, columns=records.padded(columns), values_known=values)
         new_z = descend(posed, [z], tolerance, limit=limit) if len(z) else z
-        residual = records.residuals(new_z)[0] + columns @ values
+        residual = records.plain.residuals(new_z)[0] + columns @ values
         best = np.linalg.solve(np.eye(len(unknowns)) + columns.T @ columns, columns.T @ residual)
         step, best_cost, share = np.clip(best - values, -FARTHEST, FARTHEST), np.inf, 1.0
         while share > 0.05:  # a step of a late record may be too long
@@ -134,7 +134,7 @@ def freed(
         raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
     records = moved(base, unknowns, values)
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
-    return replace(fit, records=records, z=z, residual=records.with_all_samples().residuals(z)[0], base=base,
+    return replace(fit, records=records, z=z, residual=records.plain.residuals(z)[0], base=base,
                    others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
 
 

@@ -5,8 +5,8 @@ the sensor's signal at rest, pooled over the records and applied to residuals an
 with a standard deviation of 1: every test then counts samples.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -25,10 +25,6 @@ from armid.record.noise import correlation_sum, new_share
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 LEAST_NOISE = 5e-5
 MOST_TERMS, FEWEST_FOR_COLOUR, LAGS = 8, 50, 500
-# A single manoeuvre is left out of fits in so many blocks of time.
-BLOCKS = 5
-# Motions that correlate above this are one trajectory.
-ALIKE = 0.98
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,18 +166,14 @@ class Cover:
 class WhitenedData:
     """Hold records with their noise, the outputs of one file as a record each.
 
-    levels: noise of each record. kept: which of all samples enter fits, (n_samples,). sound: 0 where a sample is no
-    data, else 1, (n_samples,). estimates: where those of fits are kept, None: nowhere. freed: what the largest size of
-    each fault that was undone in the records does to the whitened signal, (n_samples, n_faults): its size is as unknown
-    as a parameter; None for none. cover: of a signal without a form; None for none.
+    levels: noise of each record. sound: 0 where a sample is no data, else 1, (n_samples,). estimates: where those of
+    fits are kept, None: nowhere. cover: of a signal without a form; None for none.
     """
 
     records: tuple[Record, ...]
     levels: tuple[NoiseLevel, ...]
-    kept: NDArray[np.bool_]
     sound: Array
     estimates: Estimates | None = None
-    freed: Array | None = None
     cover: Cover | None = None
 
     @property
@@ -218,51 +210,6 @@ class WhitenedData:
         white = white if self.sound.all() else white * self.sound
         return white if self.cover is None else self.cover.white(white)
 
-    @property
-    def n_manoeuvres(self) -> int:
-        """How many manoeuvres there are, repeats not counted."""
-        return len({r.manoeuvre_file for r in self.records})
-
-    def parts(self) -> list[NDArray[np.int64]]:
-        """Return what is left out in turn, as numbers of samples: one manoeuvre with its repeats, or blocks of time.
-
-        A repeat stays with its original: left in, it would tell what was left out.
-        """
-        names = [r.manoeuvre_file for r in self.records]
-        pairs = list(zip(self.by_record(np.arange(self.edges[-1])), names, strict=True))
-        whole = [np.concatenate([x for x, n in pairs if n == name]) for name in dict.fromkeys(names)]
-        return whole if len(whole) > 1 else self.blocks(whole[0])
-
-    def blocks(self, part: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-        """Return a part in blocks of time, each with all outputs there."""
-        outputs = np.repeat([r.output for r in self.records], np.diff(self.edges))[part]
-        each = [np.array_split(part[outputs == name], BLOCKS) for name in dict.fromkeys(outputs.tolist())]
-        return [np.concatenate(block) for block in zip(*each, strict=True)]
-
-    def groupings(self) -> list[list[NDArray[np.int64]]]:
-        """Return what may be left out in turn: by manoeuvre, by motions that are alike, by the constants of a record.
-
-        Each grouping is a list of parts, as numbers of samples. One that joins nothing, or everything, is none.
-        """
-        places = self.by_record(np.arange(self.edges[-1]))
-        found = [self.parts()]
-        # of each file the first output
-        files = dict(reversed({r.file: r for r in reversed(self.records)}.items()))
-        alike = dict(zip(files, alike_motions(list(files.values())), strict=True))
-        # but for the constants of a record's own start
-        set_for = [str(sorted(c for c in r.constants.items() if not c[0].startswith("start_"))) for r in self.records]
-        for labels in ([str(alike[r.file]) for r in self.records], set_for):
-            names = list(dict.fromkeys(labels))
-            if 1 < len(names) < len(found[0]):
-                found.append([np.concatenate([x for x, n in zip(places, labels, strict=True) if n == name])
-                              for name in names])  # fmt: skip
-        return found
-
-    def without(self, part: NDArray[np.int64]) -> "WhitenedData":
-        kept = self.kept.copy()
-        kept[part] = False
-        return replace(self, kept=kept)
-
     def independent(self, residual: Array) -> float:
         """Return how many samples of a whitened residual are independent: sum over records of n/(1 + 2 sum rho).
 
@@ -292,29 +239,12 @@ class WhitenedData:
         return np.concatenate(found)
 
 
-def alike_motions(records: Sequence[Record]) -> list[int]:
-    """Return the number of the first record whose measured motion each is like."""
-    labels: list[int] = []
-    for i, record in enumerate(records):
-        earlier = (k for k in range(i) if labels[k] == k and records[k].output == record.output)
-        like = (k for k in earlier if correlated(records[k].measured, record.measured) > ALIKE)
-        labels.append(next(like, i))
-    return labels
-
-
-def correlated(a: Array, b: Array) -> float:
-    n = min(len(a), len(b))
-    if n < 2 or max(len(a), len(b)) > 1.05 * n or min(np.ptp(a[:n]), np.ptp(b[:n])) == 0.0:
-        return 0.0
-    return float(np.corrcoef(a[:n], b[:n])[0, 1])
-
-
 def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
     """Return records with their noise; others: records of the same sensors whose rests tell of their noise too."""
     each = tuple(one for r in records for one in r.each)
     levels = noise_levels(each, plant, others)
     sound = np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
-    return WhitenedData(each, levels, np.ones(len(sound), dtype=np.bool_), sound)
+    return WhitenedData(each, levels, sound)
 
 
 def soundness(record: Record, reach: int) -> Array:
@@ -344,17 +274,43 @@ def with_samples(replay: Replay, values: Array) -> Replay:
 
 @dataclass(frozen=True, eq=False)
 class WhiteRecords(LeastSquaresProblem):
-    """Give least squares the whitened residuals of the samples that are kept."""
+    """Give least squares the whitened residuals, and behind them a row for each parameter that is known beforehand.
+
+    known: parameter -> mean and standard deviation of what is known, SI; the row is (value - mean)/deviation.
+    """
 
     data: WhitenedData
+    known: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @cached_property
+    def rows(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Places of the known parameters among the free ones, their means and deviations, SI."""
+        names = [n for n in self.space.free_names if n in self.known]
+        places = np.array([self.space.free_names.index(n) for n in names], dtype=np.int64)
+        pairs = np.array([self.known[n] for n in names]).reshape(len(names), 2)
+        return places, pairs[:, 0], pairs[:, 1]
+
+    @cached_property
+    def measured(self) -> Array:
+        _, means, deviations = self.rows
+        return np.append(self.weighted([r.measured for r in self.replays]), means / deviations)
+
+    def signals(self, Z: Array) -> Array:
+        places, _, deviations = self.rows
+        found = self.weighted(self.simulated(Z))
+        return np.hstack([found, self.values(Z)[:, places] / deviations]) if len(places) else found
 
     def weighted(self, signals: Sequence[Array]) -> Array:
-        return self.data.white(signals)[..., self.data.kept]
+        return self.data.white(signals)
 
     def whole_signals(self, candidates: Array) -> Array:
         return self.data.white(signals_of(self.replays, candidates))
 
-    def with_all_samples(self) -> "WhiteRecords":
-        if self.data.kept.all():
-            return self
-        return replace(self, data=replace(self.data, kept=np.ones_like(self.data.kept)))
+    def padded(self, columns: Array) -> Array:
+        """Return columns of the samples, (n_samples, n), with zeros in the rows of known parameters."""
+        return np.vstack([columns, np.zeros((len(self.rows[0]), columns.shape[1]))])
+
+    @property
+    def plain(self) -> "WhiteRecords":
+        """The problem of the samples alone."""
+        return replace(self, known={}) if self.known else self

@@ -97,7 +97,7 @@ def close_loop(
     progress : Path, optional
         File in which estimates are kept as they are made: a second start goes on from them.
     priors : mapping of effect to probability
-        What is known before the records.
+        What is known before the records; those that the campaign tells count too.
     within : float
         A parameter is trusted whose 95 % interval is within this share of its value on either side.
 

@@ -60,8 +60,8 @@ def fault_of(what: OfRecord, name: str, fit: Fit, found: Inference) -> Suspect:
     value, half = size_of(name, fit, found)
     output = record.output if fault.kind in OF_SENSOR and len(plant.outputs) > 1 else ""
     low, high = what.largest * (value - half), what.largest * (value + half)
-    return Suspect(record.file, record.role, fault.kind, FREED, what.largest * value, fault.unit(record, plant), low, high,
-                   output=output)  # fmt: skip
+    unit = fault.unit(record, plant)
+    return Suspect(record.file, record.role, fault.kind, FREED, what.largest * value, unit, low, high, output=output)
 
 
 def drift_of(what: OfParameter, name: str, fit: Fit, found: Inference) -> Suspect:

@@ -20,7 +20,7 @@ from armid.model.parameter import resolve, warn_if_far
 from armid.record.reader import NAME, SUFFIX, campaign_path, gravity_of, read_record, record_path
 from armid.record.record import Record, RecordWarning
 from armid.record.resample import with_window
-from armid.record.schema import CampaignSheet, Override, RecordSheet, load_toml, unknown_name, validated
+from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, load_toml, unknown_name, validated
 from armid.record.table import write_table
 from armid.report.result import Shown
 from armid.units import DEGREE
@@ -45,6 +45,7 @@ class Campaign(Shown):
     declared beforehand. parameters: qualified name -> Override. constants: those of the campaign, SI; each record's
     manoeuvre holds all that apply to it. gyro_range: [rad/s], None when not given. tolerances: constant -> relative
     half-range within which it is known. rough: those of a tenth or more, with parameters of the plant that are fixed.
+    chances: effect -> its probability before the records. known: parameter of the plant -> what is known of it before.
     taken_as_exact: constants of which neither the plant nor the campaign says how well they are known.
     """
 
@@ -60,6 +61,8 @@ class Campaign(Shown):
     tolerances: Mapping[str, float] = field(default_factory=dict)
     rough: Mapping[str, float] = field(default_factory=dict)
     taken_as_exact: tuple[str, ...] = ()
+    chances: Mapping[str, float] = field(default_factory=dict)
+    known: Mapping[str, Known] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
@@ -158,6 +161,8 @@ def read_campaign(
         if name in sheet.effects[:i]:
             raise ArmidError(f"{where}: effect '{name}' is declared twice, each effect once is expected")
     declared = plants[sheet.plant]
+    chances, known = priors_of(sheet.priors, declared, effects, where)
+    sheet = with_known_constants(sheet, known, declared, where)
     entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
     places = [f"{where}, record {quoted(entry.file)}" for entry in entries]
     paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
@@ -196,6 +201,8 @@ def read_campaign(
         taken_as_exact=tuple(c.name for c in plant.constants if c.tolerance is None and c.name in sized
                              and not {c.name, DEFAULT} & {*sheet.tolerances, *set_by_records(plant)}),
         unmeasured=tuple(o for o in whole.outputs if o.name not in recorded),
+        chances=chances,
+        known={name: one for name, one in known.items() if name in {p.name for p in plant.parameters} - fixed.keys()},
     )  # fmt: skip
 
 
@@ -335,6 +342,41 @@ def tolerances_of(
         otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT, usual or 0.0)
         found[name] = told.get(name, otherwise)
     return {name: tolerance for name, tolerance in found.items() if tolerance > 0.0}
+
+
+def priors_of(
+    told: Mapping[str, Any], plant: Plant, effects: Mapping[str, Effect], where: str
+) -> tuple[dict[str, float], dict[str, Known]]:
+    """Return the probabilities of effects, and what is known of parameters and constants, before the records."""
+    chances, known = dict[str, float](), dict[str, Known]()
+    values = {*(p.name for p in plant.parameters), *(c.name for c in plant.constants)}
+    for name, prior in told.items():
+        place = f"{where}, priors.{name}"
+        if isinstance(prior, float):
+            if name not in effects:
+                raise unknown_name("effect", name, effects, f"{where}, priors")
+            chances[name] = prior
+        elif name not in values:
+            raise unknown_name("parameter or constant", name, values, f"{where}, priors")
+        else:
+            known[name] = validated(Known, prior, place)
+    return chances, known
+
+
+def with_known_constants(
+    sheet: CampaignSheet, known: Mapping[str, Known], plant: Plant, where: str
+) -> CampaignSheet:  # fmt: skip
+    """Return a sheet whose known constants have the mean as value and the standard deviation as tolerance."""
+    constants, tolerances = dict(sheet.constants), dict(sheet.tolerances)
+    for name in known.keys() & {c.name for c in plant.constants}:
+        one = known[name]
+        if name in constants or name in tolerances:
+            raise ArmidError(f"{where}: constant '{name}' stands in priors and in constants or tolerances, one place "
+                             "is expected")  # fmt: skip
+        if one.mean == 0.0:
+            raise ArmidError(f"{where}, priors.{name}: a mean other than 0 is expected of a constant")
+        constants[name], tolerances[name] = one.mean, one.sd / abs(one.mean)
+    return replace(sheet, constants=constants, tolerances=tolerances)
 
 
 def set_by_records(plant: Plant) -> set[str]:

@@ -6,6 +6,7 @@ library, whose import alone would take a tenth of the time in which the program 
 
 import tomllib
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -59,6 +60,7 @@ def tested(kind: Kind, test: Callable[[Any], bool]) -> Kind:
 
 above_zero = tested(number, lambda value: value > 0.0)
 share = tested(number, lambda value: 0.0 <= value < 1.0)
+probability = tested(number, lambda value: 0.0 < value < 1.0)
 text = tested(any_text, bool)
 
 
@@ -80,6 +82,18 @@ def one_of(*words: str) -> Kind:
 
 def table_of(inner: Kind) -> Kind:
     return lambda value: {name: part(inner, v, f".{name}") for name, v in any_table(value).items()}
+
+
+def one_kind(*kinds: Kind) -> Kind:
+    """Return the kind of what is of the first of several kinds that fits."""
+
+    def kind(value: object) -> Any:
+        for each in kinds[:-1]:
+            with suppress(KindError):
+                return each(value)
+        return kinds[-1](value)
+
+    return kind
 
 
 def list_of(inner: Kind, shortest: int = 0, longest: float = float("inf")) -> Kind:
@@ -106,6 +120,10 @@ MOST_RECORDS = 10_000
 HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'")
 CONSTANTS = key(table_of(number), "a finite number in SI")
 TOLERANCES = key(table_of(share), "a share from 0 to below 1")
+PRIORS = key(
+    table_of(one_kind(probability, any_table)),
+    "the probability of an effect, between 0 and 1, or { mean, sd } of a parameter or constant, SI",
+)
 LOST = key(share, "a share from 0 to below 1")
 INPUTS = key(table_of(text), "the name of a column")
 BOUND = key(number, "a finite number in SI")
@@ -142,6 +160,7 @@ class CampaignSheet:
     parameters: Mapping[str, dict[str, Any]] = field(default_factory=dict, metadata=PARAMETERS)
     constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
     tolerances: Mapping[str, float] = field(default_factory=dict, metadata=TOLERANCES)
+    priors: Mapping[str, Any] = field(default_factory=dict, metadata=PRIORS)
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
     hold: str = field(default="linear", metadata=HOLD)
     most_lost: float = field(default=0.05, metadata=LOST)
@@ -156,6 +175,14 @@ class Override:
     low: float | None = field(default=None, metadata=BOUND)
     high: float | None = field(default=None, metadata=BOUND)
     fixed: float | None = field(default=None, metadata=BOUND)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """Declare what is known of a value before the records: a normal distribution, SI."""
+
+    mean: float = field(metadata=BOUND)
+    sd: float = field(metadata=key(above_zero, "a standard deviation above 0, SI"))
 
 
 SheetT = TypeVar("SheetT", bound="DataclassInstance")

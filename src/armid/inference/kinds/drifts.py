@@ -51,7 +51,7 @@ class OfParameter:
         if self.product is not None:
             return np.asarray(LARGEST * self.product.slope * order_of(records))
         place = list(fit.values).index(self.name)
-        return np.asarray(LARGEST * records.residual_and_slopes(z)[1][:, place] * order_of(records))
+        return np.asarray(LARGEST * records.plain.residual_and_slopes(z)[1][:, place] * order_of(records))
 
 
 def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:

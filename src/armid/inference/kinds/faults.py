@@ -226,13 +226,3 @@ def moved_by(base: WhiteRecords, index: int, z: Array, fault: Fault, value: floa
                    for i, x, y in zip(inside, before, after, strict=True)]  # fmt: skip
     levels = [base.data.levels[i].rms for i in inside]
     return max(float(np.sqrt(np.mean(c**2))) / rms for c, rms in zip(changes, levels, strict=True))
-
-
-def without_record(base: WhiteRecords, index: int) -> WhiteRecords:
-    data, out = base.data, of_file(base, index)
-    left = [i for i in range(len(data.records)) if i not in out]
-    samples = np.repeat([i in left for i in range(len(data.records))], np.diff(data.edges))
-    fewer = replace(data, records=tuple(data.records[i] for i in left), levels=tuple(data.levels[i] for i in left),
-                    kept=data.kept[samples], sound=data.sound[samples],
-                    freed=None if data.freed is None else data.freed[samples])  # fmt: skip
-    return replace(base, replays=tuple(base.replays[i] for i in left), data=fewer)

@@ -71,7 +71,7 @@ def propose(fit: Fit, known: list[Hypothesis], library: Library) -> list[Proposa
 def proposal(fit: Fit, hypothesis: Hypothesis) -> Proposal | None:
     what: OfRecord = hypothesis.means
     if what.fault.kind == "label":
-        before, after = (r.residuals(fit.z)[0] for r in (fit.records, what.moved(fit.records, 1.0)))
+        before, after = (r.plain.residuals(fit.z)[0] for r in (fit.records, what.moved(fit.records, 1.0)))
         column, scales = before - after, np.array([1.0])
     else:
         column = what.largest * column_of(fit.records, what.index, fit.z, what.fault, 0.0)
