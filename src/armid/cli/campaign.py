@@ -244,8 +244,8 @@ def close_loop_command(
     """Find the effects that the declared model lacks, and report the error before and after.
 
     Tells how probable each missing effect, each fault of a record and something without a name is, from the train
-    records; takes the most probable model of which every part has a name; and simulates the records held out after the
-    last decision. Steps that they deny are withdrawn. --bounds and --fix may name parameters of candidates too; searches
+    records. Takes the most probable model of which every part has a name. Simulates the records held out after the last
+    decision, and withdraws steps that they deny. --bounds and --fix may name parameters of candidates too. Searches
     start from evenly spread points, so that nothing is random. Every verdict exits with 0. What is cut off goes on with
     the same command, from the fits that DIR/progress.jsonl holds until then.
     """

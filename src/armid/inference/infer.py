@@ -18,6 +18,7 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.library import Library, constant_effects, library_of
 from armid.inference.model import Fit
 from armid.inference.posterior import Posterior, posterior
+from armid.inference.prediction import predicting_best
 from armid.inference.search import Exploration, explore
 from armid.inference.whitening import whitened
 from armid.model import EFFECTS, Effect, Model
@@ -28,6 +29,8 @@ from armid.record import Campaign
 REACH = 16.0
 # Sets and hypotheses of a smaller probability are not listed.
 LISTED = 0.01
+# Where something unknown is as probable as this, what models predict decides which one is put in force.
+PREDICTS = 0.5
 # Names in the sentence that leads.
 MOST_TOLD = 5
 
@@ -61,8 +64,11 @@ class Inference:
 
     @cached_property
     def in_force(self) -> Hypotheses:
-        """The most probable model of which every part has a name: it predicts records to come."""
-        return next(m for m, _ in self.found.ranked() if not any(h.kind == "unknown" for h in m))
+        """The most probable model of which every part has a name; where none is right, the one that predicts best."""
+        named = [m for m, _ in self.found.ranked() if not any(h.kind == "unknown" for h in m)]
+        if self.posterior.probability("unknown") < PREDICTS:
+            return named[0]
+        return predicting_best(named, self.found.fits, self.found.library)
 
     @property
     def probabilities(self) -> dict[str, Any]:
