@@ -118,13 +118,15 @@ class Expansion:
 
     @cached_property
     def gradient(self) -> Array:
-        """Of half the sum of squares by the unknowns, less what priors of parameters pull back, (n_unknowns,)."""
+        """Of half the sum of squares by the unknowns, less what their priors pull back, (n_unknowns,)."""
         found = self.scale.weight * (self.unknowns.T @ self.fit.residual)
         places, means, deviations = self.fit.records.rows
         if len(places):
             pull = np.zeros(self.fit.n_free)
             pull[places] = (self.fit.x[places] - means) * self.fit.records.span[places] / deviations**2
             found[: int(self.kept.sum())] -= pull[self.kept]
+        first = int(self.kept.sum())
+        found[first : first + len(self.fit.others)] -= [f.value for f in self.fit.others]
         return np.asarray(found)
 
     @cached_property

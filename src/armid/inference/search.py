@@ -55,7 +55,7 @@ class Exploration:
     """Hold every model that was fitted.
 
     fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. completed: models at
-    their estimates with all unknowns freed.
+    their estimates with all unknowns freed, and the weight of a square at which they were.
     """
 
     library: Library
@@ -65,7 +65,7 @@ class Exploration:
     constants: list[Unknown] = field(default_factory=list)
     fits: dict[Hypotheses, Fit] = field(default_factory=dict)
     forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
-    completed: set[Hypotheses] = field(default_factory=set)
+    completed: dict[Hypotheses, float] = field(default_factory=dict)
     _evidence: dict[tuple[int, Scale], float] = field(default_factory=dict)
     _scale: dict[int, Scale] = field(default_factory=dict)
 
@@ -113,7 +113,8 @@ def explore(library: Library, most: int = MOST_EXPANDED) -> Exploration:
     library, declared = with_scales(library)
     found = Exploration(library, effects.hypotheses(library))
     found.constants = constants_of(declared.records, declared.z, library.tolerances)
-    found.fits[frozenset()] = with_constants(declared, found.constants)
+    found.fits[frozenset()] = declared
+    found.fits[frozenset()] = with_constants(declared, found.constants, found.scale().weight)
     found.faults = records.hypotheses(declared.records)
     found.drifts = drifts.hypotheses(declared, library)
     while len(found.forecasts) < most:
@@ -157,7 +158,7 @@ def next_model(found: Exploration) -> Hypotheses | None:
     if is_significant(found.fits[best]) and found.fits[best].records.data.cover is None:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         sizes = range(1, len(best) + 1)
-        near = [m for n in sizes for m in [m for m in plain if len(m) == n][:BEAM]] + near
+        near += [m for n in sizes for m in [m for m in plain if len(m) == n][:BEAM]]
     return next((m for m in near if m not in found.forecasts and len(m) < MOST_EFFECTS), None)
 
 
@@ -166,12 +167,12 @@ def is_outdone(model: Hypotheses, value: float, ranked: Sequence[tuple[Hypothese
     return any(less < model and more > value for less, more in ranked)
 
 
-def with_constants(fit: Fit, constants: Sequence[Unknown]) -> Fit:
+def with_constants(fit: Fit, constants: Sequence[Unknown], weight: float) -> Fit:
     """Return a fit with all its further unknowns freed again, the constants that have a tolerance among them."""
     kept = [f.unknown for f in fit.others if not f.unknown.name.startswith(NAMED)]
     if not (kept or constants):
         return replace(fit, rough=False)
-    again = unless_diverged(lambda: freed(fit, fit.base or fit.records, [*kept, *constants]))
+    again = unless_diverged(lambda: freed(fit, fit.base or fit.records, [*kept, *constants], weight))
     return replace(again or fit, rough=False)
 
 
@@ -202,8 +203,10 @@ def expand(found: Exploration, model: Hypotheses) -> None:
             trials += trial_of(found, model, held, ahead_held[i], limit)
     trials += [t for f in leading(beside) for t in trial_of(found, model, about, f, limit)]
     trials += drops(found, model, fit)
-    forms = effects.propose_forms(fit, found.known, library)
-    trials += swaps(found, model, fit, scale, [*proposals, *forms])
+    ranked = found.ranked()
+    if found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
+        forms = effects.propose_forms(fit, found.known, library)
+        trials += swaps(found, model, fit, scale, [*proposals, *forms])
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
         found.take(key, again)
@@ -242,21 +245,21 @@ def drops(found: Exploration, model: Hypotheses, fit: Fit) -> list[Trial]:
     for hypothesis in sorted(model):
         key = model - {hypothesis}
         if hypothesis.kind == "effect" and key not in found.fits:
-            trials.append((key, partial(without, fit, hypothesis, found.library)))
+            trials.append((key, partial(without, fit, hypothesis, found.library, found.scale().weight)))
     return trials
 
 
-def without(fit: Fit, hypothesis: Hypothesis, library: Library) -> Fit | None:
+def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -> Fit | None:
     active = tuple(k for k in fit.active if k.declared != hypothesis.means)
-    return near(fit, active, fit.values, library)
+    return near(fit, active, fit.values, library, weight)
 
 
-def near(fit: Fit, active: tuple[EffectKey, ...], values: dict[str, float], library: Library) -> Fit | None:
-    """Return the model with some effects fitted from near, its other unknowns as a fit has them."""
+def near(
+    fit: Fit, active: tuple[EffectKey, ...], values: dict[str, float], library: Library, weight: float
+) -> Fit | None:
+    """Return the model with some effects fitted from near, its other unknowns from where a fit has them."""
     posed = effects.beside(fit, active, library)
-    start = start_of(posed, values)
-    again = unless_diverged(lambda: fit_from(posed, active, [start], rough=True))
-    return None if again is None else replace(again, others=fit.others, base=effects.base_of(fit, active, library))
+    return effects.fitted(fit, posed, active, [start_of(posed, values)], library, weight)
 
 
 def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal]) -> list[Trial]:
@@ -276,10 +279,8 @@ def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposa
         forms = [one for one in each if one[1].hypothesis.name == hypothesis.name]
         for _, proposal, variant, strength in [*forms, *each[:N_SWAPPED]]:
             other = model - {hypothesis} | {proposal.hypothesis}
-            if other in found.fits:  # a rival must not lose by the width of a sign alone
-                complete(found, other)
-            else:
-                trials[other] = partial(swapped, fit, key, proposal, variant, strength, found.library)
+            if not is_complete(found, other):  # a known rival may have been fitted from afar
+                trials[other] = partial(swapped, fit, key, proposal, variant, strength, found.library, scale.weight)
     return list(trials.items())
 
 
@@ -308,7 +309,7 @@ def likest(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, 
 
 
 def swapped(
-    fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library
+    fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library, weight: float
 ) -> Fit | None:
     """Return the model with one effect in the place of another, its shapes free where those of the other are."""
     new: EffectKey = proposal.hypothesis.means
@@ -317,7 +318,9 @@ def swapped(
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     values |= grid[variant].at(float(np.clip(strength, 0.01, library.reach)))
     is_free = key.free_shape and bool(library.fixed_shapes(new))
-    each = [near(fit, (*active, k), values, library) for k in (new, replace(new, free_shape=True))[: 1 + is_free]]
+    each = [
+        near(fit, (*active, k), values, library, weight) for k in (new, replace(new, free_shape=True))[: 1 + is_free]
+    ]
     return min((f for f in each if f is not None), key=lambda f: f.chi2, default=None)
 
 
@@ -357,7 +360,7 @@ def pairs(
         values_of = dict(about.fit.values) | one.grid[variants[i]].at(float(np.clip(first, 0.01, found.library.reach)))
         values_of |= two.grid[variants[k]].at(float(np.clip(second, 0.01, found.library.reach)))
         active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
-        yield key, near(about.fit, active, values_of, found.library)
+        yield key, near(about.fit, active, values_of, found.library, about.scale.weight)
 
 
 def finish(found: Exploration) -> None:
@@ -374,7 +377,7 @@ def finish_all(found: Exploration) -> None:
     """Bring all models that may count to their estimates, all unknowns freed."""
     while True:
         ranked = found.ranked()
-        todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and m not in found.completed
+        todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(found, m)
                 and not is_outdone(m, value, ranked)]  # fmt: skip
         if not todo:
             return
@@ -382,13 +385,19 @@ def finish_all(found: Exploration) -> None:
             complete(found, model)
 
 
+def is_complete(found: Exploration, model: Hypotheses) -> bool:
+    """Tell whether a model is at its estimate for about the weight that a square has by now."""
+    known = found.completed.get(model, 0.0)
+    return 0.5 < known / found.scale().weight < 2.0
+
+
 def complete(found: Exploration, model: Hypotheses) -> None:
     """Bring a model to its estimate, with its shapes, its constants and its further unknowns freed."""
-    if model in found.completed:
+    if is_complete(found, model):
         return
-    found.completed.add(model)
+    weight = found.completed[model] = found.scale().weight
     if model or found.constants:
-        again = unless_diverged(partial(completed, found.fits[model], found.library, found.constants))
+        again = unless_diverged(partial(completed, found.fits[model], found.library, found.constants, weight))
         found.fits[model] = again or replace(found.fits[model], rough=False)
 
 
@@ -397,7 +406,7 @@ def estimated(fit: Fit, library: Library) -> Fit:
     return settled(fit) if fit.others else finished(fit, library)
 
 
-def completed(fit: Fit, library: Library, constants: Sequence[Unknown]) -> Fit:
+def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:
     """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls."""
     if fit.records.data.cover is not None:
         return replace(fit, rough=False)
@@ -407,7 +416,7 @@ def completed(fit: Fit, library: Library, constants: Sequence[Unknown]) -> Fit:
             wide = unless_diverged(partial(reshaped, done, key, library))
             if wide is not None and wide.chi2 < done.chi2 * (1.0 - 2.0 / len(done.residual)):
                 done = wide
-    return with_constants(done, constants)
+    return with_constants(done, constants, weight)
 
 
 def reshaped(fit: Fit, key: EffectKey, library: Library) -> Fit:

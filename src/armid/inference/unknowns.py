@@ -20,8 +20,8 @@ from armid.model import Array
 
 # Step of the differences, and the farthest step of a turn, in prior standard deviations.
 STEP, FARTHEST = 1e-2, 3.0
-# Turns at most, and the fall of the sum of squares at which they end.
-MOST_TURNS, SETTLED = 8, 0.02
+# Turns at most, those of a rough fit, and the fall of the sum of squares at which they end.
+MOST_TURNS, MOST_ROUGH, SETTLED = 8, 3, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +88,27 @@ class ProjectedRecords(LeastSquaresProblem):
         return self.cover.white(self.records.signals(Z))
 
 
+def projected(fit: Fit, posed: WhiteRecords, weight: float) -> LeastSquaresProblem:
+    """Return a problem whose further unknowns are those of a fit, with the columns that they have there.
+
+    posed: the records with the values that the unknowns have in the fit. weight: of each square, see `evidence.Scale`.
+    The problem itself where there are none.
+    """
+    if not fit.others:
+        return posed
+    return about_known(posed, fit.columns, np.array([f.value for f in fit.others]), weight)
+
+
+def about_known(records: WhiteRecords, columns: Array, values: Array, weight: float) -> ProjectedRecords:
+    """Return records whose further unknowns take their best values, about known ones.
+
+    A square that counts less than 1 leaves the priors more to say: their deviations shrink with its root.
+    """
+    root = np.sqrt(weight)
+    return ProjectedRecords((), records.space, records=records, columns=records.padded(root * columns),
+                            values_known=values / root)  # fmt: skip
+
+
 def moved(records: WhiteRecords, unknowns: Sequence[Unknown], values: Sequence[float] | Array) -> WhiteRecords:
     """Return records with the values of some unknowns."""
     for unknown, value in zip(unknowns, values, strict=True):
@@ -97,12 +118,12 @@ def moved(records: WhiteRecords, unknowns: Sequence[Unknown], values: Sequence[f
 
 
 def freed(
-    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], limit: float = np.inf, rough: bool = False
+    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], weight: float, limit: float = np.inf, rough: bool = False
 ) -> Fit:  # fmt: skip
-    """Return a fit with some unknowns freed, from where it stands.
+    """Return a fit with some unknowns freed, from where it stands: min weight |r|^2 + |v|^2.
 
-    base: the records of the fit before any of the unknowns was moved. limit: as of `descend`. rough: the columns of the
-    unknowns that the fit holds already stay as they are.
+    base: the records of the fit before any of the unknowns was moved. weight: of each square, see `evidence.Scale`.
+    limit: as of `descend`. rough: the columns of the unknowns that the fit holds already stay as they are.
     Raises ArmidError where it diverges.
     """
     known = {f.unknown.name: f.value for f in fit.others}
@@ -110,17 +131,17 @@ def freed(
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
     columns = np.empty((len(fit.residual), 0))
     tolerance = ROUGHLY if rough else 1e-6
-    cost = cost_of(base, unknowns, values, z)
-    for _ in range(MOST_TURNS):
+    cost = cost_of(base, unknowns, values, z, weight)
+    for _ in range(MOST_ROUGH if rough else MOST_TURNS):
         records = moved(base, unknowns, values)
         columns = columns_about(base.plain, unknowns, values, z, kept)
-        posed = ProjectedRecords((), base.space, records=records, columns=records.padded(columns), values_known=values)
+        posed = about_known(records, columns, values, weight)
         new_z = descend(posed, [z], tolerance, limit=limit) if len(z) else z
         residual = records.plain.residuals(new_z)[0] + columns @ values
-        best = np.linalg.solve(np.eye(len(unknowns)) + columns.T @ columns, columns.T @ residual)
+        best = np.linalg.solve(np.eye(len(unknowns)) / weight + columns.T @ columns, columns.T @ residual)
         step, best_cost, share = np.clip(best - values, -FARTHEST, FARTHEST), np.inf, 1.0
         while share > 0.05:  # a step of a late record may be too long
-            best_cost = cost_of(base, unknowns, values + share * step, new_z)
+            best_cost = cost_of(base, unknowns, values + share * step, new_z, weight)
             if best_cost < cost:
                 break
             share *= 0.5
@@ -138,11 +159,11 @@ def freed(
                    others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
 
 
-def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array) -> float:
+def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, weight: float) -> float:
     """Return the sum of squares, the priors and the samples that are left out counted."""
     residual = moved(base, unknowns, values).residuals(z)[0]
     lost = sum(u.lost(float(v)) for u, v in zip(unknowns, values, strict=True))
-    total = float(residual @ residual) + float(values @ values) + lost
+    total = float(residual @ residual) + float(values @ values) / weight + lost
     return total if np.isfinite(total) else np.inf
 
 

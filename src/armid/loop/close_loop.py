@@ -176,7 +176,9 @@ def path_of(found: Inference) -> list[Hypotheses]:
         less = [model - {h} for h in sorted(model) if h.kind == "effect"]
         for one in (m for m in less if m not in found.found.fits):
             (gone,) = model - one
-            again = unless_diverged(partial(without, found.found.fits[model], gone, found.found.library))
+            again = unless_diverged(
+                partial(without, found.found.fits[model], gone, found.found.library, found.found.scale().weight)
+            )
             found.found.take(one, again)
         model = max((m for m in less if m in found.found.fits), key=found.found.log_posterior)
         path.insert(0, model)

@@ -80,12 +80,12 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
 
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
     """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
-    base, what, again = fit.base or fit.records, hypothesis.means, fit
+    base, what, again, weight = fit.base or fit.records, hypothesis.means, fit, about.scale.weight
     for _ in range(2):
         unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again.values),
                           column=partial(what.column, again))  # fmt: skip
         others = [f.unknown for f in fit.others if f.unknown.name != unknown.name]
-        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], limit, rough=True))  # noqa: B023
+        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, rough=True))  # noqa: B023
         if tried is None:
             return None
         again = tried

@@ -12,6 +12,7 @@ from armid.inference.library import EffectKey, Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
 from armid.inference.refit import unless_diverged
 from armid.inference.responses import free_values, responses
+from armid.inference.unknowns import freed, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import EFFECTS, Array
 
@@ -92,14 +93,36 @@ def refit(
 
     begun: where its first steps led; the fit goes on from there.
     """
-    posed = beside(fit, (*fit.active, key), library)
+    active = (*fit.active, key)
+    posed = beside(fit, active, library)
     if begun is None:
         starts = np.array(starts_of(fit, about, ahead, posed, library))
-        best = starts[np.argsort(posed.chi2(starts), kind="stable")[:2]]
+        order = np.argsort(projected(fit, posed, about.scale.weight).chi2(starts), kind="stable")
+        best = starts[order[:2]]
     else:
         best = begun[np.newaxis]
-    again = unless_diverged(lambda: fit_from(posed, (*fit.active, key), list(best), rough=True, limit=limit))
-    return None if again is None else replace(again, others=fit.others, base=base_of(fit, again.active, library))
+    return fitted(fit, posed, active, list(best), library, about.scale.weight, limit)
+
+
+def fitted(
+    fit: Fit, posed: WhiteRecords, active: tuple[EffectKey, ...], starts: list[Array], library: Library,
+    weight: float, limit: float = np.inf,
+) -> Fit | None:  # fmt: skip
+    """Return a model with other effects fitted roughly, its further unknowns those of a fit, free to move from there.
+
+    Held where they are, constants that stand in for the new effect would leave nothing for it to explain.
+    posed: the problem with the values that the further unknowns have in the fit.
+    """
+    if not fit.others:
+        return unless_diverged(lambda: fit_from(posed, active, starts, rough=True, limit=limit))
+    base = base_of(fit, active, library)
+    assert base is not None
+    chi2 = projected(fit, posed, weight).chi2(np.array(starts))
+    if not np.isfinite(chi2).any():
+        return None
+    z = starts[int(np.argmin(chi2))]
+    near = Fit(active, posed, z, posed.plain.residuals(z)[0], base=base, others=fit.others)
+    return unless_diverged(lambda: freed(near, base, [f.unknown for f in fit.others], weight, limit, rough=True))
 
 
 def base_of(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords | None:
@@ -111,13 +134,16 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
     """Return where the first steps of a fit from the best start lead: the sum of squares, and the candidate."""
     key = ahead.proposal.hypothesis.means
     posed = beside(fit, (*fit.active, key), library)
-    starts = np.array(starts_of(fit, about, ahead, posed, library))
-    chi2 = posed.chi2(starts)
+    starts, projection = (
+        np.array(starts_of(fit, about, ahead, posed, library)),
+        projected(fit, posed, about.scale.weight),
+    )
+    chi2 = projection.chi2(starts)
     best = starts[int(np.argmin(chi2))]
     if not np.isfinite(chi2.min()):
         return np.inf, best
-    z = descend(posed, [best], ROUGHLY, most=N_STEPS)
-    return float(posed.chi2(z)[0]), z
+    z = descend(projection, [best], ROUGHLY, most=N_STEPS)
+    return float(projection.chi2(z)[0]), z
 
 
 def starts_of(

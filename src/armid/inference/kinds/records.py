@@ -89,7 +89,7 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     if what.fault.kind == "label":
         return unless_diverged(lambda: relabelled(fit, what, limit))
     unknowns = [*(f.unknown for f in fit.others), unknown]
-    again = unless_diverged(lambda: freed(fit, base, unknowns, limit, rough=True))
+    again = unless_diverged(lambda: freed(fit, base, unknowns, about.scale.weight, limit, rough=True))
     if again is None:
         return None
     size = again.others[-1].value * what.largest
