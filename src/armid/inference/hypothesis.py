@@ -72,4 +72,5 @@ def log_prior(model: Hypotheses) -> float:
 
 def words(hypotheses: Sequence[Hypothesis] | Hypotheses) -> str:
     """Return a model in words."""
-    return " + ".join(sorted(h.name for h in hypotheses)) or "nothing"
+    named = (f"something at {h.name}" if h.kind == "unknown" else h.name for h in hypotheses)
+    return " + ".join(sorted(named)) or "nothing"

@@ -19,6 +19,7 @@ from armid.inference.library import Library, constant_effects, library_of
 from armid.inference.model import Fit
 from armid.inference.posterior import Posterior, posterior
 from armid.inference.prediction import predicting_best
+from armid.inference.scales import with_scales
 from armid.inference.search import Exploration, explore
 from armid.inference.whitening import whitened
 from armid.model import EFFECTS, Effect, Model
@@ -185,10 +186,10 @@ def infer(
         When every candidate of the declared model diverges, for an unknown parameter, and for a prior of an unknown
         effect or outside 0 to 1.
     """
-    return inferred(library_for(model, campaign, candidates, bounds, fixed, priors, threads, told, progress))
+    return inferred(*prepared(model, campaign, candidates, bounds, fixed, priors, threads, told, progress))
 
 
-def library_for(
+def prepared(
     model: Model,
     campaign: Campaign,
     candidates: Mapping[str, Effect] | None = None,
@@ -198,8 +199,8 @@ def library_for(
     threads: int = 1,
     told: Callable[[str], None] = lambda _: None,
     progress: Path | None = None,
-) -> Library:
-    """Return the declared model, its candidates and the train records, ready to be explored; see `infer`."""
+) -> tuple[Library, Fit]:
+    """Return the declared model with its candidates and the train records, and its fit; see `infer`."""
     candidates = {**sensor_effects(model.plant), **EFFECTS} if candidates is None else candidates
     for name, p in (priors or {}).items():
         if name not in candidates:
@@ -219,10 +220,10 @@ def library_for(
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
     library = replace(library, reach=REACH, priors=chances, known=known)
     posed = library.problem(())
-    return library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
+    return with_scales(library.about(with_fitted_starts(posed.replays, posed.space), library.misfit))
 
 
-def inferred(library: Library) -> Inference:
+def inferred(library: Library, declared: Fit) -> Inference:
     """Return what the train records of a library say; see `infer`."""
-    found = explore(library)
+    found = explore(library, declared)
     return Inference(found, posterior(found))

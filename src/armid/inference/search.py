@@ -29,7 +29,6 @@ from armid.inference.library import EffectKey, Library
 from armid.inference.model import Fit, fit_from
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
-from armid.inference.scales import with_scales
 from armid.inference.unknowns import Unknown, constants_of, freed
 from armid.model import Array
 
@@ -108,9 +107,8 @@ class Exploration:
         return True
 
 
-def explore(library: Library, most: int = MOST_EXPANDED) -> Exploration:
-    """Return the models that the train records ask for, from the declared one on."""
-    library, declared = with_scales(library)
+def explore(library: Library, declared: Fit, most: int = MOST_EXPANDED) -> Exploration:
+    """Return the models that the train records ask for, from the declared one on; declared: its fit."""
     found = Exploration(library, effects.hypotheses(library))
     found.constants = constants_of(declared.records, declared.z, library.tolerances)
     found.fits[frozenset()] = declared

@@ -10,12 +10,13 @@ from threadpoolctl import threadpool_limits
 
 from armid.estimation.constants import moved_record
 from armid.estimation.identify import JointErrors, campaign_errors
+from armid.estimation.least_squares import held_by_bound
 from armid.estimation.mends import Suspicion
 from armid.estimation.screen import AS_GOOD, given_twice, screen
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.hypothesis import Hypotheses, Hypothesis
-from armid.inference.infer import Inference, inferred, library_for
+from armid.inference.infer import Inference, inferred, prepared
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.missing_signal import Missing, missing_from
 from armid.inference.model import Fit, with_standard_accuracy
@@ -110,14 +111,17 @@ def close_loop(
     ArmidError
         When every candidate of the declared model diverges, for an unknown parameter, and for a bad prior.
     """
-    library = library_for(model, campaign, candidates, bounds, fixed, priors, threads, told, progress)
+    library, declared = prepared(model, campaign, candidates, bounds, fixed, priors, threads, told, progress)
     space = library.space(library.declared, ())
     screened = screen(replace(campaign, records=campaign.train), library.declared, space)
-    gross = [s for s in screened if s.kind in GROSS]
+    # Nobody is accused while a limit holds a parameter of the declared model: the limit may be what is wrong.
+    is_held = bool(held_by_bound(declared.records.space, declared.x).any())
+    gross = [s for s in screened if s.kind in GROSS and not is_held]
+    screened = tuple(s for s in screened if s in gross or s.kind not in GROSS)
     # What a whole campaign has wrong needs no search.
     if any(not s.record and s.kind != "input" for s in gross):
         library = replace(library, candidates={}, bundles=())
-    found = inferred(library)
+    found = inferred(library, declared)
     best = found.found.fits[found.in_force]
     # One record, or an input, is accused only where the model at which the search ends does not do as well.
     implausible = bool(gross) and not all(does_as_well(best, s) for s in gross)

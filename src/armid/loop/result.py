@@ -12,7 +12,7 @@ from armid.estimation.identify import JointErrors, errors_by_file, errors_entry,
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, missed_records
 from armid.inference.checks import Diagnosis, Residuals
-from armid.inference.hypothesis import Hypotheses
+from armid.inference.hypothesis import Hypotheses, words
 from armid.inference.infer import Inference
 from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
@@ -350,7 +350,7 @@ def log_of(found: Inference) -> list[dict[str, Any]]:
     """Return the models that were fitted, the most probable first, with what they leave."""
     ranked = found.found.ranked()
     return [
-        {"hypotheses": sorted(h.name for h in model), "log_probability": value - ranked[0][1],
+        {"hypotheses": sorted(words([h]) for h in model), "log_probability": value - ranked[0][1],
          "chi2_per_sample": found.found.fits[model].chi2 / len(found.found.fits[model].residual)}
         for model, value in ranked[:MOST_LISTED]
     ]  # fmt: skip
