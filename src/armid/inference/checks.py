@@ -34,6 +34,8 @@ INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
 MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
 # Products of columns whose share of the largest is below this are rounding.
 DEPENDENT = 1e-11
+# Share of the samples of a record over which lines are drawn where they are no data.
+MOST_BRIDGED = 0.05
 # Shares of the largest speed and of its largest change, up to which it is a rest and an even speed.
 STILL, EVEN = 0.02, 0.1
 
@@ -206,6 +208,11 @@ def is_significant(fit: Fit) -> bool:
     seen = train_residuals(fit)
     whole = next(size_tests(seen), None)
     return (whole is not None and whole.p < CERTAIN) or seen.diagnosis.significant
+
+
+def is_certain(fit: Fit) -> bool:
+    """Tell whether what a model leaves on train is more than noise beyond doubt."""
+    return train_residuals(fit).diagnosis.p < CERTAIN
 
 
 def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -> Residuals | None:
@@ -398,7 +405,8 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     coloured = not seen.doubted and not all(level.is_white for level in seen.data.levels)
     hum = mains_hum(seen)
     white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
-    left = spectra(seen.raw if coloured else white, seen, hum)
+    raw = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else white
+    left = spectra(raw, seen, hum)
     rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.records], seen, hum) if coloured else {}
     flat = 1.0 if seen.data.known else float(np.mean(np.concatenate(seen.renewed) ** 2))
     for band, values in sorted(left.items()):
@@ -411,6 +419,14 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
         high = BANDS_HZ[band + 1]
         where = f"{BANDS_HZ[band]:g} to {high:g} Hz" if np.isfinite(high) else f"above {BANDS_HZ[band]:g} Hz"
         yield Finding("frequency", where, ratio, chance(ratio, free, known))
+
+
+def bridged(signal: Array, replay: Replay) -> Array:
+    """Return a signal with straight lines over the few samples that are no data: a jump in slow noise would ring."""
+    times, spacing = replay.times, replay.record.spacing
+    even = np.arange(times[0], times[-1] + 0.5 * spacing, spacing)
+    is_nearly_whole = len(times) < len(even) < (1.0 + MOST_BRIDGED) * len(times)
+    return np.interp(even, times, signal) if is_nearly_whole else signal
 
 
 def mains_hum(seen: Residuals) -> list[tuple[float, float]]:

@@ -95,11 +95,6 @@ class Fit:
         falls = promised_fall(self.jacobian.T @ self.jacobian, self.jacobian.T @ self.residual, self.z)
         return falls <= ROUGHLY * self.chi2
 
-    @property
-    def crept(self) -> bool:
-        """Whether it holds several named effects and has not arrived: a single one may creep for want of another."""
-        return sum(not key.is_empirical for key in self.active) > 1 and not self.has_arrived
-
     @cached_property
     def jacobian(self) -> Array:
         """Whitened derivatives of the signal by z, (n_samples, n_free); most models of a search are never asked."""
@@ -132,11 +127,11 @@ class Fit:
         changes = list(start_changes(self.records.plain, self.z))
         return np.column_stack(changes) if changes else np.empty((len(self.residual), 0))
 
-    @property
-    def is_at_a_bound(self) -> bool:
-        """Whether a bound holds a strength or a shape of one of its effects."""
+    def is_at_a_limit(self, key: EffectKey) -> bool:
+        """Whether a limit holds a strength of one of its effects; a shape may be as sharp as it can be."""
         held = held_by_bound(self.records.space, self.x)
-        return any(bool(held[self.owned_by(key)].any()) for key in self.active)
+        return any(is_held and key.owns(name) and self.model.parameters[name].null is not None
+                   for name, is_held in zip(self.values, held, strict=True))  # fmt: skip
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
-from armid.inference.checks import is_significant
+from armid.inference.checks import is_certain
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses
 from armid.inference.search import Exploration
@@ -116,8 +116,8 @@ def posterior(found: Exploration) -> Posterior:
     own = tuple(n for n in found.declared.values if library.owner(n) is None)
     ranked, atoms = found.ranked(), []
     top = ranked[0][1]
-    # What the best model leaves beyond noise has a covariance of its own: nobody knows what it is.
-    left = frozenset({("unknown", "output")} if is_significant(found.fits[ranked[0][0]]) else ())
+    # What the best model leaves beyond doubt has a covariance of its own: nobody knows what it is.
+    left = frozenset({("unknown", "output")} if is_certain(found.fits[ranked[0][0]]) else ())
     for model, value in ranked:
         if value < top + NEGLIGIBLE:
             continue
@@ -149,7 +149,7 @@ def beside(
     names = frozenset(h.public for h in model) | left
     for ahead in found.forecasts.get(model, ()):
         hypothesis = ahead.proposal.hypothesis
-        if model | {hypothesis} in found.fits:
+        if model | {hypothesis} in found.fits or model | {hypothesis} in found.refused:
             continue
         weight = value + hypothesis.log_prior
         for i, k in np.argwhere(ahead.log_factor + weight > top + NEGLIGIBLE):

@@ -45,6 +45,8 @@ N_BESIDE = 2
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
 # In log units: a fit that is so far behind the best is given up.
 HOPELESS = 60.0
+# A model is brought to its estimate at most so often in turn.
+MOST_COMPLETED = 4
 # Models of each size that are expanded outside the window where more than noise is left.
 BEAM = 3
 
@@ -54,7 +56,8 @@ class Exploration:
     """Hold every model that was fitted.
 
     fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. completed: models at
-    their estimates with all unknowns freed, and the weight of a square at which they were.
+    their estimates with all unknowns freed, and the weight of a square at which they were. refused: models
+    that diverge, are hopeless, or hold a fault that hardly moves its record.
     """
 
     library: Library
@@ -65,6 +68,7 @@ class Exploration:
     fits: dict[Hypotheses, Fit] = field(default_factory=dict)
     forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
     completed: dict[Hypotheses, float] = field(default_factory=dict)
+    refused: set[Hypotheses] = field(default_factory=set)
     _evidence: dict[tuple[int, Scale], float] = field(default_factory=dict)
     _scale: dict[int, Scale] = field(default_factory=dict)
 
@@ -208,6 +212,8 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
         found.take(key, again)
+        if again is None and key not in found.fits:
+            found.refused.add(key)
     for key, again in pairs(found, model, about, ahead):
         found.take(key, again)
 
@@ -390,11 +396,14 @@ def is_complete(found: Exploration, model: Hypotheses) -> bool:
 
 
 def complete(found: Exploration, model: Hypotheses) -> None:
-    """Bring a model to its estimate, with its shapes, its constants and its further unknowns freed."""
-    if is_complete(found, model):
-        return
-    weight = found.completed[model] = found.scale().weight
-    if model or found.constants:
+    """Bring a model to its estimate, with its shapes, its constants and its further unknowns freed.
+
+    Where that makes it the best, a square weighs more than before, and constants are freed once more.
+    """
+    for _ in range(MOST_COMPLETED):
+        if is_complete(found, model) or not (model or found.constants):
+            return
+        weight = found.completed[model] = found.scale().weight
         again = unless_diverged(partial(completed, found.fits[model], found.library, found.constants, weight))
         found.fits[model] = again or replace(found.fits[model], rough=False)
 

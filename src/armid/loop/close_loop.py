@@ -201,14 +201,14 @@ def judge(found: Inference, model: Hypotheses, campaign: Campaign, within: float
 
 def steps_of(found: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement]) -> tuple[Step, ...]:
     """Return a step for each effect of the model in force; a model of faults alone is a step without an effect."""
-    steps, candidates = [], found.found.library.candidates
+    steps, candidates, fit = [], found.found.library.candidates, found.found.fits[found.in_force]
     for model, last, after in zip(path[1:], path, judged[1:], strict=False):
         hypothesis = next((h for h in sorted(model - last) if h.kind == "effect"), None)
         if hypothesis is None:
             continue
         p = found.posterior.probability("effect", hypothesis.name)
         names = tuple(found.partners(found.in_force, hypothesis))
-        settled = not after.fit.is_at_a_bound and not after.fit.crept
+        settled = fit.has_arrived and not fit.is_at_a_limit(hypothesis.means)
         port = ", ".join(candidates[hypothesis.means].adds)
         steps.append(Step(hypothesis.name, port, names, False, p >= CLAIMED and settled, p, after))
     return tuple(steps)

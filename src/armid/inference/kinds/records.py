@@ -17,6 +17,8 @@ from armid.model import Array
 
 # Faults that a campaign is expected to have, of all that may be wrong in its records.
 EXPECTED = 0.15
+# What moves its record by less than this many times its noise is no fault.
+MOVES = 0.7
 # Prior deviations of a size, as shares of the largest plausible one.
 SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
 
@@ -94,7 +96,7 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
         return None
     size = again.others[-1].value * what.largest
     moves = moved_by(base, what.index, again.z, what.fault, size)
-    return again if moves > 0.0 else None
+    return again if moves >= MOVES else None
 
 
 def relabelled(fit: Fit, what: OfRecord, limit: float) -> Fit:
