@@ -30,8 +30,6 @@ S = TypeVar("S")
 T = TypeVar("T")
 # What the names of empirical terms begin with (no effect of a library may), and how reports show them.
 UNNAMED, SHOWN_AS = "unnamed_", "unnamed:"
-# How much wider a range becomes that a strength has reached the end of.
-FURTHER = 16.0
 # What the names of constants that are known roughly begin with, which are looked for as effects are.
 ROUGHLY, CONSTANT = "error_of_", "constant:"
 # More than the library holds: a model that grew for ever would take for ever to compile.
@@ -129,6 +127,7 @@ class Library:
     widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
+    _schedules: dict[EffectKey, "Schedules"] = field(default_factory=dict)
 
     def joinable(self, active: Active) -> list[EffectKey]:
         return [k for k in self.candidates if k.public not in {other.public for other in active}]
@@ -147,22 +146,23 @@ class Library:
 
         near: values about which the engine is calibrated when the problem is asked for first; a box may reach to
         masses a thousand times too light, which would ask for steps that nothing else needs. Where each candidate was
-        calibrated alone, with the same compiled model, the finest of the schedules found there serves.
+        calibrated alone, with the same compiled model, the finest of the schedules found there serves from then on.
         """
         key = frozenset(active)
         if key not in self._problems:
             model = self.compiled_model(active)
             space = self.space(model, active)
-            known = [self._problems.get(frozenset((k,))) or self._problems.get(frozenset((k.declared,)))
-                     for k in active]  # fmt: skip
-            # Where all samples are cut alike, the schedule does not depend on the candidates' states.
-            alone = [p.replays for p in known if p is not None and p.replays[0].model is model
-                     and all(c.schedule.rough is None for r in p.replays for c in r.calibrations)]  # fmt: skip
-            if len(alone) < max(len(active), 2):
+            known = [self._schedules.get(k.declared) for k in active]
+            alone = [s for s in known if s is not None and s.serves(model, self.misfit)]
+            if active and len(alone) == len(active):
+                replays = scheduled_replays(self.data.records, model, alone)
+            else:
                 # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
                 replays = self.replays(model, space, near or {}, self.misfit, on_one=bool(active))
-            else:
-                replays = tuple(with_finest(same[0], same) for same in zip(*alone, strict=True))
+            if len(active) == 1:
+                self._schedules[active[0].declared] = Schedules(
+                    model, self.misfit, {r.record.file: r.calibrations for r in replays}
+                )
             self._problems[key] = WhiteRecords(replays, space, self.data, self.known)
         return self._problems[key]
 
@@ -242,26 +242,6 @@ class Library:
                  if p.null == 0.0 and p.fixed is None and powers_of(p.unit))  # fmt: skip
         return frozenset(names) - {*self.bounds, *self.fixed, *self.overrides}
 
-    def reaching_further(self, active: Active, names: Iterable[str]) -> "Library":
-        """Return the library with wider ranges of some strengths of effects, itself where no range may be widened.
-
-        May be: what is in units of an effort whose size is that of the drive in the records, once, and not where the
-        user gave the range. A machine that runs at the speed at which friction takes all of its drive has strengths
-        about that size.
-        """
-        if not self.declared.plant.scales_from_records:
-            return self
-        relative = {f"{k.compiled}.{p.name}" for k in active for p in self.candidates[k.declared].parameters
-                    if "effort" in p.unit and p.null is not None and p.fixed is None}  # fmt: skip
-        wanted = relative.intersection(names) - {*self.bounds, *self.fixed, *self.overrides}
-        if not wanted:
-            return self
-        declared = self.compiled_model(active).parameters
-        wider = {n: (FURTHER * declared[n].low, FURTHER * declared[n].high) for n in wanted}
-        moved = {self.owner(n) for n in wanted}
-        posed = {keys: p for keys, p in self._problems.items() if not declared_keys(keys) & moved}
-        return replace(self, bounds={**self.bounds, **wider}, _problems=posed)
-
     def log_odds(self, effect: str, default: float) -> float:
         """Return the log prior odds of an effect: what the user knows of it, else the default."""
         given = self.priors.get(effect)
@@ -293,6 +273,29 @@ class Library:
 
     def each(self, work: Callable[[S], T], items: Iterable[S]) -> list[T]:
         return side_by_side(work, items, self.threads)
+
+
+@dataclass(frozen=True, eq=False)
+class Schedules:
+    """Hold how finely a candidate alone is simulated on each file, found for a misfit."""
+
+    model: Model
+    misfit: float
+    by_file: Mapping[str, tuple[Calibration, ...]]
+
+    def serves(self, model: Model, misfit: float) -> bool:
+        return self.model is model and self.misfit <= FURTHER_ERROR * misfit
+
+
+def scheduled_replays(records: Sequence[Record], model: Model, known: Sequence[Schedules]) -> tuple[Replay, ...]:
+    """Return records ready to be simulated, each piece on the finest of some schedules."""
+    ready: list[Replay] = []
+    # of the records of one file the first holds the others
+    for record in reversed({r.file: r for r in reversed(records)}.values()):
+        each = zip(*(s.by_file[record.file] for s in known), strict=True)
+        finest = tuple(max(c, key=lambda one: one.schedule.substeps) for c in each)
+        ready += Replay(record, model, tuple(p.until_window_end() for p in record.pieces), finest).each
+    return tuple(ready)
 
 
 def library_of(
@@ -485,6 +488,8 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
 
+# A schedule serves until the residual is so many times smaller than that for which it was found.
+FURTHER_ERROR = 2.0
 # From this ratio of its bounds on, points along a range are even in the logarithm.
 WIDE = 5.0
 
