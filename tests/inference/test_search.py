@@ -7,10 +7,9 @@ import pytest
 
 from armid.inference import infer, search
 from armid.inference.hypothesis import Hypothesis
-from armid.inference.infer import library_for
 from armid.inference.library import EffectKey, Library
 from armid.inference.refit import best_along
-from armid.inference.search import BEAM, MOST_EFFECTS, WINDOW, Exploration, explore, is_outdone, next_model
+from armid.inference.search import BEAM, MOST_EFFECTS, WINDOW, Exploration, is_outdone, next_model
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
@@ -30,7 +29,7 @@ def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, monkeypatch):
     effect, shape, expected, within = SHAPES[name]
     campaign = read_campaign(stand(*MANOEUVRES, "--effect", *effect))
     monkeypatch.setattr(Library, "joinable", lambda _, active: [] if active else [EffectKey(name)])
-    found = explore(library_for(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in SHAPES}))
+    found = infer(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in SHAPES}).found
     best, _ = found.ranked()[0]
     assert {h.public for h in best} == {("effect", name)}
     fit = found.fits[best]
@@ -45,7 +44,7 @@ def test_another_form_of_an_effect_takes_its_place(stand):
     found = infer(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in ("flux_saturation", "coulomb")})
     best = {h.name: h.form for h in found.found.ranked()[0][0]}
     assert best == {"coulomb": "", "flux_saturation": ""}
-    assert {h.form for model in found.found.fits for h in model if len(model) == 2} > {"", "arctangent"} - {""}
+    assert "arctangent" in {h.form for model in found.found.fits for h in model if len(model) == 2}
     assert found.probabilities["effects"]["flux_saturation"] > 0.95
 
 
@@ -120,7 +119,7 @@ def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch
     order = []
     while (one := next_model(exploration(posteriors, order, True, monkeypatch))) is not None:
         order.append("".join(sorted(h.name for h in one)))
-    assert order == [*"abcdefg"[:BEAM], "xy"]
+    assert sorted(order) == sorted([*"abcdefg"[:BEAM], "xy"])
     assert next_model(exploration(posteriors, ["xy"], False, monkeypatch)) is None
     large = "abcdefgh"
     assert len(large) == MOST_EFFECTS
