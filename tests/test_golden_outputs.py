@@ -100,15 +100,22 @@ def table_digest(file):
 
 
 def blind_digest(store):
-    """Return what is compared of a study of loops: campaign -> verdict, effects and alternatives of each step."""
+    """Return what is compared of a study of loops: campaign -> verdict, names that are claimed, groups of the others.
+
+    Which of a group comes first is decided by next to nothing; where something unknown is left, it is none.
+    """
     with closing(sqlite3.connect(store)) as connection:
         asked = 'SELECT "case", report FROM plan JOIN loops ON plan.run = loops.run ORDER BY "case"'
         reports = {case: json.loads(report) for case, report in connection.execute(asked)}
     return {
         case: {
             "verdict": r["verdict"],
-            "effects": r["effects"],
-            "alternatives": [s["alternatives"] for s in r["steps"]],
+            "claimed": [s["effect"] for s in r["steps"] if s["claimed"]],
+            "groups": [
+                sorted([s["effect"], *s["alternatives"]])
+                for s in r["steps"]
+                if not s["claimed"] and r["verdict"] == "cannot_tell_apart"
+            ],
         }
         for case, r in reports.items()
     }

@@ -54,9 +54,11 @@ def answer(truth: str, claim: Claim | None) -> str:
         return NO_REPORT
     if claim.verdict == "cannot_tell_apart":
         return TOGETHER
-    if set(claim.groups) == {truth} and not claim.empirical:
+    if claim.groups == {truth: {truth}}:
         return TOLD_APART
-    return WRONG if claim.groups and truth not in claim.groups else TOGETHER if claim.groups else NONE
+    if not claim.groups:
+        return NONE
+    return TOGETHER if any(truth in group for group in claim.groups.values()) else WRONG
 
 
 def rates(rows: DataFrame) -> DataFrame:

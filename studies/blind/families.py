@@ -1,6 +1,6 @@
 """What closed loops said of campaigns as real ones are: a faulty record, constants that are off, sets of effects.
 
-The truth is the key of `studies/stand/families.py`. Claimed names count, those of groups with all of their members.
+The truth is the key of `studies/stand/families.py`. What a report claims is read as the stand's judge reads it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,24 +12,23 @@ from pandas import DataFrame
 
 from blind import tables
 from stand.arm import PARAMETERS
-from stand.score.judge import LARGEST_GROUP
+from stand.score.judge import LARGEST_GROUP, read_claim
 from stand.score.targets import Target, aim, share, without_report
 
 Row = dict[str, Any]
 Show = dict[str, str | tuple[str, str]]
 WORDS = (
     "Shares with their 95 % Wilson interval; `n` counts campaigns, of parameters: values. A fault that moves its "
-    "record by no more than twice the noise may pass unseen. A name stands alone when no other effect and no constant "
-    "is told beside it. Intervals count that the loop says hold; they count the tolerances of the constants. Lines "
-    "without a target inform."
+    "record by no more than twice the noise may pass unseen. A name stands alone when no other effect may stand in its "
+    "place. Intervals count that the loop says hold; they count the tolerances of the constants and effects that may "
+    "be missing, those of noise alone do not. Lines without a target inform."
 )
 BY_KIND = (
-    "Campaigns in which one record is at fault, by kind. Seen: record and kind are right. Intervals: those with "
-    "the constants as declared that are said to hold."
+    "Campaigns in which one record is at fault, by kind. Seen: record and kind are right. Intervals: those of noise "
+    "alone, where they are said to hold."
 )
 BY_FAMILY = "Time of the processor to close one campaign, and what was withdrawn, by family."
 MISSES = "Every campaign that speaks against a target, and why."
-CONSTANT = "constant:"
 # A fault counts that moves its record by so many times the noise; held-out is at the noise within this factor of it.
 MOVES, AT_NOISE = 2.0, 1.1
 # Held-out is worse that is by more than this share, and above the noise.
@@ -58,9 +57,8 @@ def parts(
 def judged(campaign: str, entry: Mapping[str, Any], report: Mapping[str, Any]) -> Row:
     """Return one row: what was planted, what was said, and what of it is wrong."""
     truths, fault = {e["name"] for e in entry["effects"]}, entry["fault"]
-    claims = {s["effect"]: {s["effect"], *s["alternatives"]} for s in report["steps"]
-              if s["claimed"] and not s["empirical"] and not s["effect"].startswith(CONSTANT)}  # fmt: skip
-    beside = {s["effect"]: s["constants"] for s in report["steps"]}
+    claim = read_claim(report)
+    claims = claim.groups
     held = {t for t in truths if any(t in g and len(g) <= LARGEST_GROUP for g in claims.values())}
     wrong = [name for name, group in claims.items() if not group & truths]
     accused = [s for s in report["suspects"] if entry["dirt"] != "gap" or s["kind"] != "gap"]
@@ -71,13 +69,12 @@ def judged(campaign: str, entry: Mapping[str, Any], report: Mapping[str, Any]) -
         "fault": fault.get("kind", ""), "size": fault.get("size"), "record": fault.get("record", ""),
         "moves": fault.get("moves"), "constants": ", ".join(f"{n} {v:+.1%}" for n, v in entry["constants"].items()),
         "verdict": report["verdict"],
-        "said": "; ".join([" or ".join([n, *sorted(g - {n}), *beside[n]]) for n, g in claims.items()]
-                          + [f"({n})" for n in report["effects"] if n not in claims]),
+        "said": "; ".join([*filter(None, [claim.said]), *(f"({n})" for n in report["effects"] if n not in claims)]),
         "suspects": "; ".join(f"{s['record']} {s['kind']}" for s in report["suspects"]),
         "seen": any((s["record"], s["kind"]) == (fault.get("record"), fault.get("kind"))
                     and fault.get("parameter", "") in s.get("parameter", "").split(", ") for s in report["suspects"]),
         "accused": bool(accused), "all_named": held == truths, "wrong": ", ".join(wrong),
-        "wrong_alone": any(len(claims[n]) == 1 and not beside[n] for n in wrong),
+        "wrong_alone": any(len(claims[n]) == 1 for n in wrong),
         "withdrawn": report["withdrawn"] is not None, "before_over_floor": before / floor,
         "after_over_floor": after / floor, "worse": after > max(WORSE * before, AT_NOISE * floor),
     }  # fmt: skip
@@ -86,7 +83,7 @@ def judged(campaign: str, entry: Mapping[str, Any], report: Mapping[str, Any]) -
         row |= {
             f"off_{name}": p["value"] / truth - 1.0,
             f"holds_{name}": p["low"] <= truth <= p["high"] if p["interval_holds"] else None,
-            f"given_{name}": p["given_low"] <= truth <= p["given_high"] if p["interval_holds"] else None,
+            f"alone_{name}": p["noise_low"] <= truth <= p["noise_high"] if p["interval_holds"] else None,
             f"trusted_{name}": p["trusted"],
             f"narrow_{name}": p["trusted"] and 0.5 * (p["high"] - p["low"]) < OFF * abs(p["value"]),
         }
@@ -100,14 +97,14 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
     constants = [*one, *family.get("constants", [])]
     moved = [r for r in faults if r["moves"] > MOVES]
     held = [r[f"holds_{name}"] for r in faults for name in PARAMETERS]
-    trusted, as_declared = values(constants, "off", "trusted"), "inside their interval with the constants as declared"
+    trusted, of_noise = values(constants, "off", "trusted"), "parameters inside the interval of noise alone"
     of_record = f"one faulty record, moved by more than {MOVES:g} times its noise"
     found = [
         without_report(missing, len(rows) + missing),
         share(f"{of_record}: record and kind are right", moved, lambda r: r["seen"], ">= 0.9"),
         share("one faulty record: a physical name is claimed", faults, lambda r: bool(r["wrong"]), "<= 0.01"),
         share("one faulty record: parameters inside their interval", values(faults, "holds"), bool, ">= 0.93"),
-        share(f"one faulty record: {as_declared}, which they are here", values(faults, "given"), bool, ">= 0.93"),
+        share(f"one faulty record: {of_noise}", values(faults, "alone"), bool, ">= 0.93"),
         share("one faulty record: parameters with an interval that is said to hold", held, lambda v: v is not None),
         share("constants off: a wrong physical name alone", constants, lambda r: r["wrong_alone"], "<= 0.01"),
         share("constants off: a wrong physical name, alone or beside others", constants, lambda r: bool(r["wrong"])),
@@ -129,8 +126,7 @@ def targets_of(rows: Sequence[Row], missing: int) -> list[Target]:
         share("all: trusted parameters off by more than 1 %", values(rows, "off", "trusted"), is_off),
         share("all: of these with an interval below 1 %", values(rows, "off", "narrow"), is_off, "<= 0.01"),
         share("all: parameters inside their interval", values(rows, "holds"), bool),
-        share(f"all but constants off: {as_declared}",
-              values([r for r in rows if not r["constants"]], "given"), bool),
+        share(f"all but constants off: {of_noise}", values([r for r in rows if not r["constants"]], "alone"), bool),
         share("all: additions withdrawn", rows, lambda r: r["withdrawn"], "<= 0.02"),
         share("all: held-out error of the model in force worse than of the declared", rows, lambda r: r["worse"],
               "<= 0"),
@@ -167,7 +163,7 @@ def by_kind(frame: DataFrame) -> tables.Table:
     lines = []
     for kind, part in frame[frame["fault"] != ""].groupby("fault"):
         rows = part.to_dict("records")
-        held = values(rows, "given")
+        held = values(rows, "alone")
         lines.append({"kind": kind, "n": len(part), "moves": part["moves"].median(),
                       "large": (part["moves"] > MOVES).sum(), "seen": part["seen"].mean(),
                       "wrong": (part["wrong"] != "").mean(),
@@ -202,7 +198,7 @@ def misses(frame: DataFrame) -> tables.Table:
 def faults_found(row: Mapping[Any, Any]) -> list[str]:
     """Return in words what of a campaign speaks against a target."""
     family = row["family"]
-    outside = [n for n in PARAMETERS if row[f"given_{n}" if not row["constants"] else f"holds_{n}"] is False]
+    outside = [n for n in PARAMETERS if row[f"{'holds' if row['constants'] else 'alone'}_{n}"] is False]
     off = [n for n in PARAMETERS if row[f"trusted_{n}"] and abs(row[f"off_{n}"]) > OFF]
     said = {
         "not seen": family in ("fault", "trend") and row["moves"] > MOVES and not row["seen"],

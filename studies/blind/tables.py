@@ -14,9 +14,8 @@ Row = dict[str, Any]
 NOTHING, MISSING = "nothing", "missing"
 # Answers on one true effect, from the best to the worst.
 ANSWERS = ("right alone", "named first of a group", "held by a group", "right and one more", "cannot tell apart",
-           "unnamed term", "nothing", "wrong group", "wrong alone")  # fmt: skip
-ANSWER_OF = {"group": ANSWERS[2], "right_with_extra": ANSWERS[3], "cannot_tell": ANSWERS[4], "empirical": ANSWERS[5],
-             "none": ANSWERS[6]}  # fmt: skip
+           "nothing", "wrong group", "wrong alone")  # fmt: skip
+ANSWER_OF = {"group": ANSWERS[2], "right_with_extra": ANSWERS[3], "cannot_tell": ANSWERS[4], "none": ANSWERS[5]}
 MOST_SHOWN = 60
 WIDE = {"class": "campaigns", "n": ("n", ".0f")}
 
@@ -69,7 +68,7 @@ def answer(row: Row) -> str:
     if word == "right":
         return ANSWERS[0] if row["group_of_truth"] <= 1 else ANSWERS[1]
     if word == "wrong":
-        return ANSWERS[8] if row["wrong_alone"] else ANSWERS[7]
+        return ANSWERS[7] if row["wrong_alone"] else ANSWERS[6]
     return ANSWER_OF.get(word, word)
 
 
@@ -139,9 +138,8 @@ def answers_by_class(rows: DataFrame) -> Table:
     ]  # fmt: skip
     said = (
         "Judgements: right (every truth named), group (a group of at most 4 holds what is not named), right or half "
-        "with extra (a further name), wrong (no name and no group holds a truth), cannot tell, empirical (a term "
-        "without a name), none (nothing was found); of effects that no library has: claimed (names alone are said to "
-        "explain all), empirical, partial, none."
+        "with extra (a further name), wrong (no name and no group holds a truth), cannot tell, none (nothing is "
+        "claimed); of effects that no library has: claimed (names are said to explain all), partial, none."
     )
     show = WIDE | {"right_rate": ("right or group [%]", "%"), "wrong_rate": ("wrong alone [%]", "%")}
     show |= {w: (w.replace("_", " "), ".0f") for w in words}

@@ -1,5 +1,6 @@
 """Least squares in the box against textbook problems and scipy's, and on the arm."""
 
+import threading
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import LeastSquaresProblem, descend, estimate, fit, refine
+from armid.estimation.least_squares import LeastSquaresProblem, descend, estimate, fit, refine, side_by_side
 from armid.problem.space import Space
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
@@ -124,3 +125,13 @@ def test_a_fixed_parameter_stays_and_weights_count(lowering_replays, arm_space):
     even = refine((good, bad), space, TRUTH[:3])
     np.testing.assert_allclose(heavy, TRUTH[:3], rtol=1e-5)
     assert np.abs(even / TRUTH[:3] - 1.0).max() > 1e-3
+
+
+def test_work_is_shared_among_threads_and_comes_in_order():
+    for threads in (1, 2, 5):
+        assert side_by_side(lambda x: x * x, range(20), threads) == [x * x for x in range(20)]
+        assert side_by_side(lambda x: x, [], threads) == []
+    both = threading.Barrier(2, timeout=30.0)
+    assert side_by_side(lambda _: both.wait() >= 0, range(2), 2) == [True, True]
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(lambda x: 1 / x, [1, 0], 2)

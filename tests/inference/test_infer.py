@@ -39,7 +39,7 @@ def inferred(stand):
 def inside(found):
     """Tell of each parameter whether its interval, made wider by half, holds the truth: one in 300 does not."""
     each = ((found.intervals[n], value) for n, value in TRUTH.items())
-    return [abs(value - 0.5 * (i["low"] + i["high"])) < 0.75 * (i["high"] - i["low"]) for i, value in each]
+    return [abs(value - 0.5 * (i.low + i.high)) < 0.75 * (i.high - i.low) for i, value in each]
 
 
 def test_nothing_is_probable_where_nothing_is_missing(inferred):
@@ -104,7 +104,7 @@ def test_constants_in_tolerances_widen_the_intervals_and_may_be_off(stand, infer
     campaign = replace(campaign, tolerances=dict.fromkeys(("R", "C_T", "eta1"), 0.03))
     found = infer(Model(campaign.plant), campaign, CANDIDATES)
     exact = inferred()
-    widths = [[f.intervals[n]["high"] - f.intervals[n]["low"] for n in TRUTH] for f in (exact, found)]
+    widths = [[f.intervals[n].high - f.intervals[n].low for n in TRUTH] for f in (exact, found)]
     assert sum(np.array(widths[1]) > np.array(widths[0])) >= 3
     assert found.probabilities["constants"]
     assert all(inside(found))

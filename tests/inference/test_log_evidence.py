@@ -110,6 +110,17 @@ def test_the_mixture_has_the_quantiles_of_its_samples():
     assert sum(causes.values()) == pytest.approx(1.0, abs=0.15)
 
 
+def test_the_causes_of_a_width_are_shares_of_it():
+    """Two models as probable, far apart: their distance is nearly all, and no more than all."""
+    atoms = tuple(Atom(0.0, frozenset({("effect", n)}), np.array([m]), np.ones(1)) for n, m in (("a", 0.0), ("b", 9.0)))
+    causes = dict(Posterior(atoms, ("p",)).causes("p", 1.0))
+    assert causes["noise"] == pytest.approx(1.0 / (1.0 + 4.5**2))
+    assert sum(causes.values()) == pytest.approx(1.0)
+    # one model is in force, and another, sharper one has nearly all of the weight
+    atoms = (Atom(0.0, frozenset(), np.zeros(1), np.array([0.1])), atoms[1])
+    assert all(share <= 1.0 for share in dict(Posterior(atoms, ("p",)).causes("p", 30.0)).values())
+
+
 def test_names_count_only_in_sets_without_an_unknown_signal():
     plain, beside = frozenset({("effect", "a")}), frozenset({("effect", "a"), ("unknown", "torque")})
     found = Posterior(tuple(Atom(0.0, names, np.zeros(1), np.ones(1)) for names in (plain, beside)), ("p",))

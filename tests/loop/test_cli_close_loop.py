@@ -1,12 +1,14 @@
 """`armid close-loop` as a user meets it."""
 
 import json
+import re
 import shutil
 
 import pytest
 from few_candidates import CANDIDATES, COMMON, STROKES
 
 from armid.estimation.least_squares import descend
+from armid.model import EFFECTS
 from commands import ended
 
 TWO_LACKING = (*STROKES, "--effect", "coulomb=30", "tilt_deg=2")
@@ -23,17 +25,26 @@ def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
     assert "supply_sag" in printed
     assert "verdict: explained" in printed
     report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["version"] == 2
     assert report["effects"] == ["supply_sag"]
+    assert report["probabilities"]["effects"]["supply_sag"] > 0.99
     text = (tmp_path / "out" / "report.md").read_text()
-    figures = ["residuals.png", "diagnosis.png", "ranking.png", "parameters.png", "autocorrelation.png"]
+    figures = ["motion.png", "residuals.png", "diagnosis.png", "probabilities.png", "intervals.png", "parameters.png",
+               "autocorrelation.png"]  # fmt: skip
     for name in figures:
         assert f"]({name})" in text
         assert (tmp_path / "out" / name).stat().st_size > 10_000
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("<svg") == 6 + 4 + 4
+    # stored ones, and one for each of the five records
+    assert page.count("<svg") == 6 + 5
     for wanted in ("Explained: The declared model lacked supply_sag", "+     supply_sag.supply = ", "armid close-loop ",
-                   "What supply_sag would explain", "Error on the records held out"):  # fmt: skip
+                   "How probable each is", "Error on the records held out"):  # fmt: skip
         assert wanted in page, wanted
+    # what leads is the same sentence everywhere
+    led = f"nothing missing 0.00; something that the library does not hold 0.00 (among 5 of {len(EFFECTS)} effects)."
+    said = re.search(rf"supply_sag 1\.00; .*?{re.escape(led)}", " ".join(printed.split()))
+    for whole in (text, page):
+        assert said.group() in whole
     assert ended("report", tmp_path / "out") == 0
     assert (tmp_path / "out" / "report.html").read_text() == page
 

@@ -1,15 +1,20 @@
 """A force that nobody declared is recovered from the speed of an axis, without a form and with the right variable."""
 
+import json
+
 import numpy as np
 import pytest
+from few_candidates import CANDIDATES, COMMON, TRUTH
 
-from armid.inference.library import EffectKey
 from armid.inference.missing_signal import dependences, missing_signal, motions, segments
-from armid.loop.empirical import empirical_effect
+from armid.loop import close_loop, report_of
+from armid.loop.document import conclusion, details_of
+from armid.loop.figures import figures_of
 from armid.model import Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
+from armid.report.style import save
 
 MASS, NOISE = 2.0, 2e-4
 
@@ -83,17 +88,43 @@ def test_the_variable_is_the_position_and_the_curve_is_the_spring(axis, whole):
     assert np.max(np.abs(best.heights - spring(knots))[1:]) < 0.25 * np.ptp(spring(knots))
 
 
-def test_the_empirical_term_starts_from_the_curve_and_claims_no_name(axis, whole):
-    model, _, ready = axis
-    best = dependences(motions(model, np.array([MASS]), whole))[0]
-    effect, start = empirical_effect(model, best)
-    assert EffectKey(effect.name).is_empirical
-    assert EffectKey(effect.name).public == "unnamed:torque"
-    extended = model + effect
-    own = {name: start.get(name, p.fixed) for name, p in extended.parameters.items() if name != "mass"}
-    assert None not in own.values()
-    candidate = np.array([[MASS, *(float(v) for v in own.values())]])
-    after = replays([r.record for r in ready], extended, space_of(extended))
-    before = [np.std(r.measured - r.signal(np.array([[MASS]]))[0]) for r in ready]
-    rest = [np.std(r.measured - r.signal(candidate)[0]) for r in after]
-    assert max(rest) < 0.15 * max(before)
+@pytest.fixture(scope="module")
+def unexplained(stand):
+    """A spring of an arm that engages beyond an angle, which no candidate is."""
+    campaign = read_campaign(stand(*COMMON, "--effect", "cable_spring=300"))
+    return close_loop(Model(campaign.plant), campaign, CANDIDATES)
+
+
+@pytest.mark.slow
+def test_what_no_candidate_is_has_no_name_and_its_signal_is_told(unexplained, tmp_path):
+    report = json.loads(json.dumps(report_of(unexplained), allow_nan=False))
+    assert report["verdict"] in ("unexplained", "partly_explained")
+    assert report["probabilities"]["unknown"] > 0.9
+    assert [s["effect"] for s in report["steps"] if s["claimed"] or s["empirical"]] == []
+    assert "something that the library does not hold" in conclusion(unexplained)
+    assert {s.port: s.share for s in unexplained.missing.signals}["torque"] > 0.8
+    assert ("torque", "theta") in {(d.port, d.variable) for d in unexplained.missing.dependences if d.share > 0.8}
+    told = " ".join(details_of(unexplained)["missing"])
+    assert "theta" in told
+    assert "at torque" in told
+    figures = figures_of(unexplained, report, details_of(unexplained))
+    save(figures["missing"](), tmp_path / "missing.png")
+    assert (tmp_path / "missing.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_what_is_trusted_beside_something_unknown_is_true(unexplained):
+    trusted = [e for e in unexplained.after.estimates if e.name in TRUTH and e.trusted]
+    assert [e.name for e in trusted if not e.low <= TRUTH[e.name] <= e.high] == []
+    # what a cause takes of a width is a share of it
+    causes = [c for e in unexplained.after.estimates for c in e.causes]
+    assert [c for c in causes if float(c.rpartition(", ")[2].removesuffix("%")) > 100.0] == []
+
+
+@pytest.mark.slow
+def test_without_a_curve_no_signal_is_sought(unexplained):
+    campaign = unexplained.campaign
+    found = close_loop(Model(campaign.plant), campaign, CANDIDATES, curve=False)
+    assert found.missing is None
+    assert found.parameters == unexplained.parameters
+    assert "missing" not in figures_of(found, report_of(found), details_of(found))

@@ -64,25 +64,49 @@ def test_the_start_of_a_record_held_out_does_not_judge(closed) -> None:
     piece = closed.campaign.holdout[0].pieces[0]
     assert (piece.n_spent, piece.window.start) == (35, 35)
     assert closed.after.holdout.replays[0].pieces[0].manoeuvre.constants == piece.manoeuvre.constants
-    again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.library)
+    again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.inference.found.library)
     np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
 
 
-@pytest.mark.parametrize(("file", "kind", "value"), [("a.csv", "gain", 0.03), ("b.csv", "late", 0.012),
-                                                     ("c.csv", "gain", 0.02)])  # fmt: skip
-def test_a_fault_of_one_sensor_or_of_a_file_is_told(tmp_path, file, kind, value) -> None:
-    """Of several outputs one sensor is at fault, or the times of all; starts are fitted meanwhile."""
-    campaign = read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
+@pytest.fixture
+def sound(tmp_path):
+    """The drive without friction: nothing is missing."""
+    return read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
+
+
+def test_where_nothing_is_missing_no_sensor_is_accused(sound) -> None:
+    """The angle of the shaft is small: a larger gain of its sensor would shrink the noise in it as well."""
+    found = close_loop(sound.model(), sound, {"coulomb": EFFECTS["coulomb"]})
+    assert (found.verdict, found.effects, found.suspects) == ("no_discrepancy", (), ())
+    assert report_of(found)["probabilities"]["nothing"] > 0.8
+    for e in found.after.estimates:
+        assert abs(TRUTH[e.name] - e.value) < 1.5 * (e.high - e.low) / 2.0
+
+
+def closed_with(campaign, file, kind, value):
+    """Close the loop on a drive with a fault of its sensor of the load, or of the times of a file."""
 
     def faulty(record):
         return next(r for r in record.each if r.output == "load_angle")
 
     records = tuple(Fault(kind).trimmed(r, -value, campaign.plant, faulty(r)) if r.file == file else r
                     for r in campaign.records)  # fmt: skip
-    found = close_loop(campaign.model(), replace(campaign, records=records), {"coulomb": EFFECTS["coulomb"]})
+    return close_loop(campaign.model(), replace(campaign, records=records), {"coulomb": EFFECTS["coulomb"]})
+
+
+@pytest.mark.parametrize(("file", "kind", "value"), [("a.csv", "gain", 0.03), ("b.csv", "late", 0.012)])
+def test_a_fault_of_one_sensor_or_of_a_file_is_told(sound, file, kind, value) -> None:
+    """Of several outputs one sensor is at fault, or the times of all; starts are fitted meanwhile."""
+    found = closed_with(sound, file, kind, value)
     (suspect,) = found.suspects
     assert (suspect.record, suspect.kind) == (file, kind)
     assert suspect.output == ("" if kind == "late" else "load_angle")
     shown = value / (1.0 - value) if kind == "gain" else value
     assert suspect.low < shown < suspect.high
     assert found.effects == ()
+
+
+def test_a_fault_of_a_sensor_in_a_record_held_out_does_not_carry_over(sound) -> None:
+    found = closed_with(sound, "c.csv", "gain", 0.02)
+    assert (found.verdict, found.effects, found.suspects) == ("does_not_carry_over", (), ())
+    assert any(s.startswith("c.csv") and "does not carry over" in s for s in found.next_steps)

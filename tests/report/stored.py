@@ -24,8 +24,10 @@ def errors(rmse: float) -> dict[str, float]:
     return {"rmse": rmse, "nrmse": 0.01, "chi2_per_sample": 2.0, "s": 0.99, "s1": 0.98, "s2": 1.0}
 
 
-def parameter(value: float, unit: str = "1", sure: bool = True) -> dict[str, Any]:
-    return {"value": value, "unit": unit, "low": 0.9 * value, "high": 1.1 * value, "trusted": sure}
+def parameter(value: float, unit: str = "1", sure: bool = True, cause: str = "noise") -> dict[str, Any]:
+    return {"value": value, "unit": unit, "low": 0.9 * value, "high": 1.1 * value, "trusted": sure,
+            "interval_holds": sure, "noise_low": 0.95 * value, "noise_high": 1.05 * value,
+            "causes": [f"{cause}, 80%"]}  # fmt: skip
 
 
 def curve(n: int, size: float) -> dict[str, list[float]]:
@@ -40,15 +42,22 @@ def made_by(command: str) -> dict[str, Any]:
 def loop_report(name: str = "arm") -> dict[str, Any]:
     """Return report.json of a loop that has added one effect."""
     before = {"p0": parameter(3.1e6, "Pa", False), "n": parameter(1.3, sure=False)}
-    after = {"p0": parameter(3.0e6, "Pa"), "n": parameter(1.4), f"{name}_x.level": parameter(40.0, "N m")}
-    step = {"effect": f"{name}_x", "port": "torque", "alternatives": ["other"], "empirical": False,
-            "error": {"train": errors(0.005), "holdout": errors(0.006)}, "parameters": after}  # fmt: skip
+    after = {"p0": parameter(3.0e6, "Pa", cause=name), "n": parameter(1.4), f"{name}_x.level": parameter(40.0, "N m")}
+    step = {"effect": f"{name}_x", "port": "torque", "alternatives": ["other"], "empirical": False, "claimed": False,
+            "probability": 0.5, "error": {"train": errors(0.005), "holdout": errors(0.006)},
+            "parameters": after}  # fmt: skip
+    chances = {"effects": {f"{name}_x": 0.5, "other": 0.45}, "effects_beside_unknown": {}, "sets": [],
+               "nothing": 0.01, "unknown": 0.04, "records": {f"late@{name}.csv": 0.02}, "drifts": {},
+               "constants": {}, "among": [5, 38]}  # fmt: skip
     return {
+        "version": 2, "probabilities": chances,
         "campaign": name, "plant": "shell_transfer_arm", "unit": "rad/s", "noise_rms": 0.004,
         "verdict": "cannot_tell_apart", "effects": [f"{name}_x"],
         "error": {"before": {"train": errors(0.02), "holdout": errors(0.03)}, "after": step["error"]},
         "parameters": {"before": before, "after": after}, "steps": [step],
         "advice": [{"manoeuvre": {"supply_V": 24.0}, "separates": [f"{name}_x", "other"], "power": 0.8}],
+        "log": [{"hypotheses": [f"{name}_x"], "log_probability": 0.0, "chi2_per_sample": 1.01},
+                {"hypotheses": [], "log_probability": -40.0, "chi2_per_sample": 2.5}],
     }  # fmt: skip
 
 
@@ -56,20 +65,15 @@ def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> 
     record = {"role": "train", "n_samples": n_points, "noise_rms": 0.004,
               "error": {"before": errors(0.02), "after": errors(0.005)},
               "curves": {"before": curve(n_points, 0.03), "after": curve(n_points, 0.004)}}  # fmt: skip
-    listed = [
-        {"effect": f"{name}_{i}", "drop": 0.9 / (i + 1), "p": 10.0 ** (i - 20), "share": 0.2,
-         "alignment": 0.9 - 0.1 * i, "reached": 0.8 if i < 2 else None,
-         "curve": curve(n_points, 3.0) if i < 2 else None}
-        for i in range(12)
-    ]  # fmt: skip
+    own = {"p0": {"value": 3.0e6, "low": 2.9e6, "high": 3.1e6}}
+    models = [{"model": f"{name}_x", "probability": 0.5, "parameters": own}]
     return {
         "made_by": made_by(f"armid close-loop {name}"), "versions": {"armid": "0"}, "conclusion": f"It lacks {name}.",
         "shifts": [f"{name} was bent"], "doubts": [],
         "diagnosis": {"before": {"train": [f"More than noise in {name}."], "holdout": None}, "after": None},
         "missing": [], "equations": {"before": f"{name}\n  torque = 0", "after": f"{name} + x\n  torque = x\n  end"},
         "records": [{"file": f"{name}_{i}.csv", **record} for i in range(n_records)], "n_records": n_records + 1,
-        "candidates": {"listed": listed, "residual": curve(n_points, 4.0), "edges": [0, 150, 300], "files": [name]},
-        "advice": [f"lower {name}"],
+        "models": models, "advice": [f"lower {name}"],
     }  # fmt: skip
 
 
@@ -79,7 +83,7 @@ def write_loop(folder: Path, name: str = "arm", details: bool = True, figures: b
     if details:
         (folder / "details.json").write_text(json.dumps(loop_details(name)))
     if figures:
-        for figure in ("ranking", "diagnosis"):
+        for figure in ("probabilities", "diagnosis"):
             (folder / f"{figure}.svg").write_text(SVG)
     return folder
 

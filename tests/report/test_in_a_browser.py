@@ -67,7 +67,7 @@ def contrast(first, second):
 def test_figures_are_there_each_inside_its_card_and_follow_the_scheme(pages, opened, width, dark):
     page = opened(pages["plain loop"], width, dark)
     figures = page.find_elements(By.CSS_SELECTOR, ".card svg")
-    assert len(figures) == 6
+    assert len(figures) == 4
     for figure in figures:
         card = figure.find_element(By.XPATH, "..").rect
         assert figure.size["width"] > 250
@@ -83,9 +83,11 @@ def test_figures_are_there_each_inside_its_card_and_follow_the_scheme(pages, ope
 @pytest.mark.parametrize("width", [1200, 400])
 def test_the_evidence_stands_near_the_answer(pages, opened, width):
     page = opened(pages["plain loop"], width)
-    numbers = re.findall(r"RMSE\D*([\d.]+)|([\d.]+) deg/s RMSE", page.find_element(By.CSS_SELECTOR, ".answer").text)
+    first, _, _ = page.find_element(By.CSS_SELECTOR, ".answer").text.partition(" (among ")
+    numbers = re.findall(r"\d\.\d\d", first)
+    assert len(numbers) == 5
     cells = {c.text: c.rect for c in page.find_elements(By.CSS_SELECTOR, "td") if c.is_displayed()}
-    for number in (n for pair in numbers for n in pair if n):
+    for number in numbers:
         assert cells[number]["x"] + cells[number]["width"] <= width, number
     tops = [part.rect["y"] for part in page.find_elements(By.CSS_SELECTOR, "figure.drawing")]
     tables = page.find_elements(By.CSS_SELECTOR, "figure.table table")
@@ -139,7 +141,7 @@ def test_a_script_that_came_in_would_not_run(pages, opened, tmp_path):
 def test_a_stored_figure_cannot_run_anything(opened, tmp_path):
     folder = write_loop(tmp_path / "loop")
     script = "<script>document.title='broken'</script><use onload='x()'"
-    (folder / "ranking.svg").write_text(SVG.replace("<use", script))
+    (folder / "probabilities.svg").write_text(SVG.replace("<use", script))
     (tmp_path / "page.html").write_text(html(document_of(folder, LOOP, "x")))
     page = opened(tmp_path / "page.html")
     assert page.title == "arm: Closed loop"

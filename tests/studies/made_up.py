@@ -32,19 +32,18 @@ def made_report(rng: np.random.Generator, entry: dict[str, Any]) -> dict[str, An
     names = near + [str(n) for n in rng.choice(NAMES, rng.integers(0, 3), replace=False) if rng.random() < 0.3]
     steps = [
         {"effect": n, "alternatives": [str(a) for a in rng.choice(NAMES, rng.integers(0, 6), replace=False) if a != n],
-         "empirical": False}
+         "empirical": False, "claimed": bool(rng.random() < 0.5)}
         for n in dict.fromkeys(names)
     ]  # fmt: skip
-    if rng.random() < 0.2:
-        steps.append({"effect": "unnamed:torque", "alternatives": [], "empirical": True})
-    effects = [step["effect"] for step in steps if rng.random() < 0.95]
+    probable = {str(n): float(rng.uniform(0.1, 1.0)) for n in NAMES if rng.random() < 0.9}
     held = None if entry["floor"]["holdout"] is None else {"rmse": 0.005 * float(rng.uniform(0.95, 9.0))}
     after = None if held is None else {"rmse": 0.005 * float(rng.uniform(0.95, 1.3))}
     found = {
         n: {"value": v * float(rng.normal(1.0, 0.02)), "trusted": bool(rng.random() < 0.5)} for n, v in TRUE.items()
     }
     return {
-        "verdict": str(rng.choice(VERDICTS)), "effects": effects, "steps": steps,
+        "verdict": str(rng.choice(VERDICTS)), "also": [], "effects": [step["effect"] for step in steps], "steps": steps,
+        "probabilities": {"effects": probable},
         "error": {"before": {"train": None, "holdout": held}, "after": {"train": None, "holdout": after}},
         "parameters": {"before": found, "after": found},
     }  # fmt: skip

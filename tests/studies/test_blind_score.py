@@ -15,8 +15,8 @@ from stand.score.judge import Claim
 PAIR = ["coulomb", "brush_drop"]
 
 
-def claim(verdict="explained", empirical=(), **groups):
-    return Claim({name: frozenset((name, *others)) for name, others in groups.items()}, empirical, verdict)
+def claim(verdict="explained", **groups):
+    return Claim({name: frozenset((name, *others)) for name, others in groups.items()}, verdict)
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,8 @@ def claim(verdict="explained", empirical=(), **groups):
         (claim("cannot_tell_apart", coulomb=()), "still together"),
         (claim(coulomb=(), brush_drop=()), "still together"),
         (claim(brush_drop=()), "wrong one"),
-        (claim("partly_explained", ("unnamed:torque",), coulomb=()), "still together"),
+        (claim("record_disagrees", coulomb=("brush_drop",)), "still together"),
+        (claim("record_disagrees", brush_drop=("coulomb",)), "still together"),
         (claim("no_discrepancy"), "neither"),
         (None, "missing"),
     ],
@@ -43,10 +44,12 @@ def made(advised, random):
     for choice, found in (("advised", advised), ("random", random)):
         for i, good in enumerate(found):
             name = f"a{i:02d}_{choice}"
-            alternatives = [] if good else ["brush_drop"]
-            steps = [{"effect": "coulomb", "alternatives": alternatives, "empirical": False}]
-            verdict = "explained" if good else "cannot_tell_apart"
-            reports[name] = {"verdict": verdict, "effects": ["coulomb"], "steps": steps}
+            steps = [{"effect": "coulomb", "alternatives": [] if good else ["brush_drop"], "claimed": good}]
+            verdict, probable = (
+                ("explained", {"coulomb": 1.0}) if good else ("cannot_tell_apart", dict.fromkeys(PAIR, 0.5))
+            )
+            reports[name] = {"verdict": verdict, "also": [], "effects": ["coulomb"], "steps": steps,
+                             "probabilities": {"effects": probable}}  # fmt: skip
             key[name] = {"class": "pair", "pair": PAIR, "choice": choice, "base": f"a{i:02d}", "power": 0.9, "rank": 1,
                          "tried": 9, "in_doubt": 7, "effects": [{"name": "coulomb"}], "noise": {"kind": "white"},
                          "next": {"shell": True}}  # fmt: skip
@@ -116,14 +119,18 @@ def family(name, truths=(), fault=None, constants=None, dirt="none"):
 
 
 def said(*steps, suspects=(), after=0.005, value=1.0, half=0.004, verdict="explained"):
-    """Return a report: steps as (effect, alternatives, claimed), suspects as (record, kind), all parameters alike."""
+    """Return a report: steps as (effect, alternatives, claimed), suspects as (record, kind), all parameters alike.
+
+    A group is as probable as a claim.
+    """
+    probable = {name: 0.99 / (1 + len(a)) for e, a, c in steps for name in (e, *a) if c or a}
     found = {n: {"value": v * value, "low": v * (value - half), "high": v * (value + half), "trusted": True,
-                 "interval_holds": True, "given_low": v * (value - half), "given_high": v * (value + half)}
+                 "interval_holds": True, "noise_low": v * (value - half / 2.0), "noise_high": v * (value + half / 2.0)}
              for n, v in family("control")["parameters"].items()}  # fmt: skip
     return {
-        "verdict": verdict, "effects": [s[0] for s in steps], "withdrawn": None, "parameters": {"after": found},
-        "steps": [{"effect": e, "alternatives": list(a), "claimed": c, "empirical": False, "constants": []}
-                  for e, a, c in steps],
+        "verdict": verdict, "also": [], "effects": [s[0] for s in steps], "withdrawn": None,
+        "parameters": {"after": found}, "probabilities": {"effects": probable},
+        "steps": [{"effect": e, "alternatives": list(a), "claimed": c, "empirical": False} for e, a, c in steps],
         "suspects": [{"record": record, "kind": kind} for record, kind in suspects],
         "error": {when: {"holdout": {"rmse": rmse}} for when, rmse in (("before", 0.006), ("after", after))},
     }  # fmt: skip
@@ -136,8 +143,8 @@ def test_families_are_held_against_their_truth(tmp_path):
         "f0": (family("fault", fault=late), said(suspects=[("a.csv", "late")])),
         "f1": (family("fault", fault=late), said(("coulomb", (), True), suspects=[("a.csv", "gain")], value=1.02)),
         "f2": (family("fault", fault=late | {"moves": 1.0}), said(("coulomb", (), False))),
-        "c0": (family("constant", constants={"R": 0.03}), said(("constant:R", (), True), after=0.0056)),
-        "t0": (family("two", ("coulomb", "tilt")), said(("viscous", ("coulomb",), True), ("tilt", (), True))),
+        "c0": (family("constant", constants={"R": 0.03}), said(value=1.003, after=0.0056)),
+        "t0": (family("two", ("coulomb", "tilt")), said(("viscous", ("coulomb",), False), ("tilt", (), True))),
         "t1": (family("two", ("coulomb", "tilt")), said(("coulomb", (), False), ("tilt", (), True), after=0.007)),
         "n0": (family("control", dirt="gap"), said(suspects=[("a.csv", "gap")], verdict="no_discrepancy")),
         "n1": (family("control", dirt="hum"), said(suspects=[("a.csv", "gap")], verdict="unexplained")),
@@ -149,7 +156,11 @@ def test_families_are_held_against_their_truth(tmp_path):
         "one faulty record, moved by more than 2 times its noise: record and kind are right": (0.5, 2, False),
         "one faulty record: a physical name is claimed": (1 / 3, 3, False),
         "one faulty record: parameters inside their interval": (2 / 3, 12, False),
+        "one faulty record: parameters inside the interval of noise alone": (2 / 3, 12, False),
         "constants off: a wrong physical name alone": (0.0, 1, True),
+        "constants off: parameters inside their interval": (1.0, 4, True),
+        "all but constants off: parameters inside the interval of noise alone": (24 / 28, 28, None),
+        "all: parameters inside their interval": (28 / 32, 32, None),
         "one constant off: held-out error up to 1.1 of the noise": (0.0, 1, False),
         "two effects: all named, alone or in a group": (0.5, 2, False),
         "two effects: a wrong name is claimed": (0.0, 2, True),

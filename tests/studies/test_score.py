@@ -30,26 +30,28 @@ def entry(label: str, *names: str, listed: bool = True, matching: bool = True, m
 
 
 def report(
-    verdict: str, *steps: tuple[str, tuple[str, ...]], after: float = FLOOR, bias: float = 0.0
+    verdict: str, *steps: tuple[str, tuple[str, ...], bool], after: float = FLOOR, bias: float = 0.0
 ) -> dict[str, Any]:
+    """Return a report: steps as (effect, alternatives, claimed); a group is as probable as a claim."""
+    probable = {n: 0.99 / (1 + len(others)) for name, others, claimed in steps for n in (name, *others)
+                if claimed or others}  # fmt: skip
     held = {"train": {"rmse": 0.0}, "holdout": {"rmse": 0.02}}
     found = {name: {"value": value * (1.0 + bias), "trusted": bias == 0.0} for name, value in TRUE.items()}
     return {
         "verdict": verdict,
-        "effects": [name for name, _ in steps],
-        "steps": [
-            {"effect": name, "alternatives": list(others), "empirical": name.startswith("unnamed:")}
-            for name, others in steps
-        ],
+        "also": [],
+        "effects": [name for name, *_ in steps],
+        "steps": [{"effect": name, "alternatives": list(others), "claimed": sure} for name, others, sure in steps],
+        "probabilities": {"effects": probable},
         "error": {"before": held, "after": {"train": {"rmse": 0.0}, "holdout": {"rmse": after}}},
         "parameters": {"before": copy.deepcopy(found), "after": found},
     }
 
 
-COULOMB = ("coulomb", ())
-PAIR = ("coulomb", ("seal_friction",))
-TILT = ("tilt", ())
-TERM = ("unnamed:torque", ())
+COULOMB = ("coulomb", (), True)
+PAIR = ("coulomb", ("seal_friction",), False)
+TILT = ("tilt", (), True)
+CANDIDATE = ("viscous", (), False)
 
 
 @pytest.mark.parametrize(
@@ -58,30 +60,35 @@ TERM = ("unnamed:torque", ())
         ("control", (), "no_discrepancy", (), "right"),
         ("control", (), "unexplained", (), "false_alarm"),
         ("control", (), "explained", (COULOMB,), "false_alarm"),
-        ("control", (), "partly_explained", (TERM,), "false_alarm"),
+        ("control", (), "partly_explained", (CANDIDATE,), "false_alarm"),
+        ("control", (), "does_not_carry_over", (), "false_alarm"),
         ("single", ("coulomb",), "explained", (COULOMB,), "right"),
-        ("single", ("coulomb",), "explained", (PAIR,), "right"),
+        ("single", ("coulomb",), "cannot_tell_apart", (PAIR,), "right"),
+        # what is claimed stands alone, whatever else is not impossible
+        ("single", ("seal_friction",), "explained", ((*PAIR[:2], True),), "wrong"),
         ("single", ("seal_friction",), "cannot_tell_apart", (PAIR,), "group"),
         ("single", ("coulomb",), "explained", (COULOMB, TILT), "right_with_extra"),
-        ("single", ("coulomb",), "partly_explained", (COULOMB, TERM), "right"),
+        ("single", ("coulomb",), "partly_explained", (COULOMB, CANDIDATE), "right"),
         ("single", ("viscous",), "explained", (COULOMB,), "wrong"),
-        ("single", ("viscous",), "explained", (PAIR,), "wrong"),
-        ("single", ("e",), "cannot_tell_apart", (("a", ("b", "c", "d", "e")),), "wrong"),
+        ("single", ("viscous",), "cannot_tell_apart", (PAIR,), "wrong"),
+        ("single", ("e",), "cannot_tell_apart", (("a", ("b", "c", "d", "e"), False),), "wrong"),
         ("single", ("viscous",), "cannot_tell_apart", (), "cannot_tell"),
         ("single", ("viscous",), "no_discrepancy", (), "none"),
-        ("single", ("viscous",), "partly_explained", (TERM,), "empirical"),
+        ("single", ("viscous",), "partly_explained", (CANDIDATE,), "none"),
+        ("single", ("viscous",), "cannot_tell_apart", (CANDIDATE,), "cannot_tell"),
+        ("single", ("coulomb",), "does_not_carry_over", (PAIR,), "none"),
         ("two", ("coulomb", "tilt"), "explained", (TILT, COULOMB), "right"),
-        ("two", ("seal_friction", "tilt"), "explained", (TILT, PAIR), "group"),
-        ("two", ("coulomb", "seal_friction"), "explained", (PAIR,), "half"),
+        ("two", ("seal_friction", "tilt"), "cannot_tell_apart", (TILT, PAIR), "group"),
+        ("two", ("coulomb", "seal_friction"), "cannot_tell_apart", (PAIR,), "half"),
         ("two", ("coulomb", "viscous"), "explained", (COULOMB, TILT), "half_with_extra"),
         ("two", ("stribeck", "viscous"), "explained", (COULOMB, TILT), "wrong"),
         ("unlisted", ("cam_bump",), "explained", (COULOMB,), "claimed"),
         ("unlisted", ("cam_bump",), "partly_explained", (COULOMB,), "partial"),
-        ("unlisted", ("cam_bump",), "partly_explained", (COULOMB, TERM), "empirical"),
+        ("unlisted", ("cam_bump",), "partly_explained", (CANDIDATE,), "none"),
         ("unlisted", ("cam_bump",), "unexplained", (), "none"),
         ("one_stroke", (), "no_discrepancy", (), "right"),
         ("one_stroke", (), "explained", (COULOMB,), "false_alarm"),
-        ("one_stroke", ("coulomb",), "cannot_tell_apart", (("viscous", ("coulomb",)),), "group"),
+        ("one_stroke", ("coulomb",), "cannot_tell_apart", (("viscous", ("coulomb",), False),), "group"),
     ],
 )
 def test_one_word_for_each_report(label: str, truths: tuple[str, ...], verdict: str, steps: Any, word: str) -> None:
@@ -90,15 +97,21 @@ def test_one_word_for_each_report(label: str, truths: tuple[str, ...], verdict: 
 
 
 def test_a_wrong_name_with_a_group_is_not_alone() -> None:
-    row = judge("c000", entry("single", "viscous"), report("explained", PAIR))
+    row = judge("c000", entry("single", "viscous"), report("cannot_tell_apart", PAIR))
     assert (row["wrong_alone"], row["wrong_group"], row["largest_group"], row["group_of_truth"]) == (False, True, 2, 0)
     row = judge("c000", entry("single", "viscous"), report("explained", COULOMB))
     assert (row["wrong_alone"], row["wrong_group"]) == (True, False)
 
 
-def test_an_effect_that_was_removed_again_does_not_count() -> None:
-    told = report("explained", TILT, COULOMB)
-    told["effects"] = ["coulomb"]
+def test_a_group_that_is_less_probable_than_a_claim_is_none() -> None:
+    told = report("cannot_tell_apart", PAIR)
+    for probability, word in ((0.48, "right"), (0.47, "cannot_tell")):
+        told["probabilities"]["effects"] = dict.fromkeys(("coulomb", "seal_friction"), probability)
+        assert judge("c000", entry("single", "coulomb"), told)["judgement"] == word
+
+
+def test_the_step_that_stands_counts_where_others_were_withdrawn() -> None:
+    told = report("does_not_carry_over", COULOMB)
     assert judge("c000", entry("single", "coulomb"), told)["judgement"] == "right"
 
 
@@ -124,7 +137,7 @@ def found(rows: list[dict[str, Any]], words: str) -> Target:
 
 
 def test_the_targets_count_what_they_say() -> None:
-    right, wrong = (report("explained", (name, ())) for name in ("coulomb", "tilt"))
+    right, wrong = (report("explained", step) for step in (COULOMB, TILT))
     rows = [judge("c", entry("single", "coulomb"), right) for _ in range(19)]
     held = "20 %: right name, or a group that holds it"
     assert (found(rows, held).found, found(rows, held).met) == (1.0, True)

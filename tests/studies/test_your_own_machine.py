@@ -57,7 +57,7 @@ def test_the_plant_keeps_the_contract(plugin):
 
 @pytest.mark.slow
 def test_a_late_voltage_is_no_late_torque(folder, plugin):
-    """Told as one, for want of a port at the winding, it gives another inertia, which is not trusted then."""
+    """Told as one, for want of a port at the winding, it would give another inertia, of which nobody may be sure."""
     boom = load_registry([plugin]).plants["boom"]
     for name in ("controller_delay", "drive_lag"):
         points = list(check_effect(EFFECTS[name], {"boom": boom}))
@@ -83,8 +83,8 @@ def test_a_late_voltage_is_no_late_torque(folder, plugin):
         found = close_loop(Model(plant), campaign, {n: EFFECTS[n] for n in ("controller_delay", "output_lag")})
         assert [s.effect for s in found.steps] == ["controller_delay"]
         inertia = found.after.estimates[0]
-        assert (inertia.low < truth["inertia"] < inertia.high) == (plant is boom)
-        assert any("were the voltage alone late" in d for d in inertia.doubts) == (plant is torque_alone)
+        assert inertia.low < truth["inertia"] < inertia.high
+        assert abs(inertia.value / truth["inertia"] - 1.0) < 0.01 or plant is torque_alone
 
 
 def test_what_is_read(folder, plugin):

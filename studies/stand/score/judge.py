@@ -12,34 +12,38 @@ from stand.arm import PARAMETERS
 
 Entry = Mapping[str, Any]
 LARGEST_GROUP = 4
-EMPIRICAL = "unnamed:"
+# As probable as this is a group, one of which is claimed to be there.
+SURE = 0.95
 
 
 @dataclass(frozen=True)
 class Claim:
-    """Hold what a report claims: each named effect with its group (itself included), and the empirical terms."""
+    """Hold what a report claims: each named effect with its group, itself included."""
 
     groups: Mapping[str, frozenset[str]]
-    empirical: tuple[str, ...]
     verdict: str
 
     @property
     def said(self) -> str:
         """Write the names, each with what it cannot be told from."""
-        told = [" or ".join((name, *sorted(group - {name}))) for name, group in self.groups.items()]
-        return "; ".join((*told, *self.empirical))
+        return "; ".join(" or ".join((name, *sorted(group - {name}))) for name, group in self.groups.items())
 
 
 def read_claim(report: Entry) -> Claim:
-    """Read the effects of a report in the end; one that was added and removed again does not count."""
-    steps = {step["effect"]: step for step in report["steps"]}
-    empirical = tuple(
-        name for name in report["effects"]
-        if name.startswith(EMPIRICAL) or (name in steps and steps[name]["empirical"])
-    )  # fmt: skip
-    named = [name for name in report["effects"] if name not in empirical]
-    groups = {name: frozenset((name, *(steps[name]["alternatives"] if name in steps else ()))) for name in named}
-    return Claim(groups, empirical, report["verdict"])
+    """Read what a report claims: names, and groups of which one is there, whichever.
+
+    A name that is claimed stands alone. Any other step is a candidate, unless it is as probable as a claim together
+    with what may stand in its place. Nothing is claimed that records held out deny.
+    """
+    chances, groups = report["probabilities"]["effects"], {}
+    denied = "does_not_carry_over" in (report["verdict"], *report["also"])
+    for step in report["steps"]:
+        name, group = step["effect"], frozenset((step["effect"], *step["alternatives"]))
+        if step["claimed"]:
+            groups[name] = frozenset((name,))
+        elif len(group) > 1 and not denied and sum(chances.get(each, 0.0) for each in group) >= SURE:
+            groups[name] = group
+    return Claim(groups, report["verdict"])
 
 
 def match(truths: Sequence[str], claim: Claim) -> tuple[list[str], list[str], list[str]]:
@@ -61,20 +65,18 @@ def match(truths: Sequence[str], claim: Claim) -> tuple[list[str], list[str], li
 def judgement(label: str, truths: Sequence[str], claim: Claim) -> str:
     """Give one word for a campaign of a class.
 
-    control: right, false_alarm. unlisted: claimed (a library's names alone are said to explain all), else empirical,
-    partial, none. Others: right, group (held by a group that cannot be told apart), right_with_extra, half,
-    half_with_extra (of two), wrong, cannot_tell, empirical, none.
+    control: right, false_alarm. unlisted: claimed (a library's names are said to explain all), else partial, none.
+    Others: right, group (held by a group that cannot be told apart), right_with_extra, half, half_with_extra (of two),
+    wrong, cannot_tell, none.
     """
     if label == "unlisted":
-        quiet = "empirical" if claim.empirical else "partial" if claim.groups else "none"
-        return "claimed" if claim.groups and claim.verdict == "explained" else quiet
+        return "none" if not claim.groups else "claimed" if claim.verdict == "explained" else "partial"
     if not truths:
-        silent = not claim.groups and not claim.empirical and claim.verdict == "no_discrepancy"
-        return "right" if silent else "false_alarm"
+        return "right" if not claim.groups and claim.verdict == "no_discrepancy" else "false_alarm"
     named, grouped, extra = match(truths, claim)
     found = len(named) + len(grouped)
     if not found and not claim.groups:
-        return "empirical" if claim.empirical else "cannot_tell" if claim.verdict == "cannot_tell_apart" else "none"
+        return "cannot_tell" if claim.verdict == "cannot_tell_apart" else "none"
     if not found:
         return "wrong"
     whole = "right" if found == len(truths) else "half"
@@ -96,13 +98,12 @@ def judge(campaign: str, entry: Entry, report: Entry) -> dict[str, Any]:
         **told(campaign, entry),
         "verdict": claim.verdict,
         "named": claim.said,
-        "first": next(iter((*claim.groups, *claim.empirical)), "nothing"),
+        "first": next(iter(claim.groups), "nothing"),
         "judgement": judgement(entry["class"], truths, claim),
         "wrong_alone": 1 in wrong,
         "wrong_group": any(size > 1 for size in wrong),
         "largest_group": max((len(group) for group in claim.groups.values()), default=0),
         "group_of_truth": max(own, default=0),
-        "has_empirical": bool(claim.empirical),
         **_errors(entry, report),
     }
     for name in PARAMETERS:

@@ -1,0 +1,153 @@
+"""Which models are fitted: those in the window, free shapes, other forms, pairs; what is kept of them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from armid.inference import infer, search
+from armid.inference.hypothesis import Hypothesis
+from armid.inference.library import EffectKey, Library
+from armid.inference.refit import best_along
+from armid.inference.search import BEAM, MOST_EFFECTS, WINDOW, Exploration, is_outdone, next_model
+from armid.model import EFFECTS, Model
+from armid.record import read_campaign
+
+MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
+SHAPES = {
+    "shell_rocking": (("rocking_hz=6", "rocking_stop=0.008"), "hardening", 0.0077, 0.001),
+    "stribeck": (("stribeck=60", "stribeck_exponent=1"), "exponent", 1.0, 0.15),
+    "controller_delay": (("controller_period=0.012",), "period", 0.012, 0.0015),
+    "winding_heating": (("winding_heating=5e-5", "winding_cooling=2.5"), "cooling", 2.5, 0.4),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, monkeypatch):
+    """Each with itself as the only candidate, in the compiled model of all four."""
+    effect, shape, expected, within = SHAPES[name]
+    campaign = read_campaign(stand(*MANOEUVRES, "--effect", *effect))
+    monkeypatch.setattr(Library, "joinable", lambda _, active: [] if active else [EffectKey(name)])
+    found = infer(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in SHAPES}).found
+    best, _ = found.ranked()[0]
+    assert {h.public for h in best} == {("effect", name)}
+    fit = found.fits[best]
+    assert fit.active == (EffectKey(name, free_shape=True),)
+    assert fit.values[f"{name}.{shape}"] == pytest.approx(expected, abs=within)
+
+
+@pytest.mark.slow
+def test_another_form_of_an_effect_takes_its_place(stand):
+    """As the square of the current, what saturates otherwise looks like another effect; its own form is asked for."""
+    campaign = read_campaign(stand(*MANOEUVRES, "--effect", "flux_saturation=90", "coulomb=40"))
+    found = infer(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in ("flux_saturation", "coulomb")})
+    best = {h.name: h.form for h in found.found.ranked()[0][0]}
+    assert best == {"coulomb": "", "flux_saturation": ""}
+    assert "arctangent" in {h.form for model in found.found.fits for h in model if len(model) == 2}
+    assert found.probabilities["effects"]["flux_saturation"] > 0.95
+
+
+@pytest.mark.slow
+def test_a_pair_is_found_where_steps_over_a_narrow_sign_creep(tmp_path):
+    """Campaign c381 of the families of seed 149: the arm nearly stops, and the drive that brakes loses most of itself.
+
+    By continuation chi2 falls from 1.5 a sample to 0.6.
+    """
+    from stand import families
+
+    files, _ = families.make(families.read_suite(families.SUITE), 149, ("two", 47))
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    campaign = read_campaign(tmp_path)
+    names = ("line_loss", "quadratic_drag", "viscous", "worm_direction")
+    found = infer(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in names})
+    assert {h.name for h in found.in_force} == {"viscous", "worm_direction"}
+    assert found.best.chi2 < 1.1 * len(found.best.residual)
+    assert min(found.probabilities["effects"].get(n, 0.0) for n in ("viscous", "worm_direction")) > 0.9
+
+
+class Narrow:
+    """A sum of squares with a narrow valley along its second parameter."""
+
+    def chi2(self, Z):
+        return np.where(np.abs(Z[:, 1] - 0.7123) < 0.002, 1.0, 10.0) + (Z[:, 0] - 0.2) ** 2
+
+
+def test_a_narrow_valley_is_found_along_one_parameter():
+    best = best_along(Narrow(), np.array([0.5, 0.5]), 1)
+    assert best[0] == 0.5
+    assert best[1] == pytest.approx(0.7123, abs=0.002)
+
+
+def model(names):
+    """Return a model; each letter is an effect."""
+    return frozenset(Hypothesis("effect", name) for name in names)
+
+
+def exploration(posteriors, expanded=(), misfit=False, monkeypatch=None):
+    """Return an exploration of models, names -> log posterior, the best of which leaves more than noise or does not."""
+    fit = SimpleNamespace(records=SimpleNamespace(data=SimpleNamespace(cover=None)))
+    found = Exploration(None, {}, fits={model(n): fit for n in posteriors},
+                        forecasts={model(n): [] for n in expanded})  # fmt: skip
+    ranked = sorted(((model(n), p) for n, p in posteriors.items()), key=lambda pair: -pair[1])
+    monkeypatch.setattr(found, "ranked", lambda: ranked)
+    monkeypatch.setattr(search, "is_significant", lambda _: misfit)
+    return found
+
+
+def test_the_most_probable_model_that_is_not_expanded_comes_next(monkeypatch):
+    posteriors = {"ab": 0.0, "ac": -0.5, "d": -WINDOW + 0.1, "e": -WINDOW - 0.1}
+    order = []
+    while (one := next_model(exploration(posteriors, order, monkeypatch=monkeypatch))) is not None:
+        order.append("".join(sorted(h.name for h in one)))
+    assert order == ["ab", "ac", "d"]
+
+
+def test_beside_a_model_that_a_smaller_one_outdoes_nothing_is_looked_for(monkeypatch):
+    posteriors = {"a": 0.0, "ab": -1.0, "c": -2.0}
+    ranked = exploration(posteriors, monkeypatch=monkeypatch).ranked()
+    assert [is_outdone(m, p, ranked) for m, p in ranked] == [False, True, False]
+    assert next_model(exploration(posteriors, "a", monkeypatch=monkeypatch)) == model("c")
+    assert next_model(exploration(posteriors, "ac", monkeypatch=monkeypatch)) is None
+
+
+def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch):
+    """A strong second effect misleads the choice of the first."""
+    singles = {name: -1000.0 - i for i, name in enumerate("abcdefg")}
+    posteriors = {"xy": 0.0, **singles}
+    order = []
+    while (one := next_model(exploration(posteriors, order, True, monkeypatch))) is not None:
+        order.append("".join(sorted(h.name for h in one)))
+    assert sorted(order) == sorted([*"abcdefg"[:BEAM], "xy"])
+    assert next_model(exploration(posteriors, ["xy"], False, monkeypatch)) is None
+    large = "abcdefgh"
+    assert len(large) == MOST_EFFECTS
+    assert next_model(exploration({large: 0.0}, (), False, monkeypatch)) is None
+
+
+def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one(monkeypatch):
+    local, better = (SimpleNamespace(chi2=chi2) for chi2 in (120.0, 100.0))
+    monkeypatch.setattr(search, "expansion_of", lambda fit, *_: fit)
+    monkeypatch.setattr(search, "log_evidence", lambda fit: -0.5 * fit.chi2)
+    monkeypatch.setattr(Exploration, "scale", lambda _: None)
+    found = Exploration(None, {})
+    key = model("ab")
+    assert found.take(key, local)
+    assert found.take(key, better)
+    assert not found.take(key, local)
+    assert not found.take(key, None)
+    assert not found.take(key, SimpleNamespace(chi2=np.nan))
+    assert found.fits == {key: better}
+
+
+def test_the_evidence_of_a_fit_is_its_own_and_not_that_of_one_that_is_gone(monkeypatch):
+    """What is freed leaves its address to what comes next."""
+    monkeypatch.setattr(search, "expansion_of", lambda fit, *_: fit)
+    monkeypatch.setattr(search, "log_evidence", lambda fit: -0.5 * fit.chi2)
+    found, key, told = Exploration(None, {}), model(""), []
+    for chi2 in range(20):
+        found.fits.clear()
+        found.fits[key] = SimpleNamespace(chi2=float(chi2))
+        told.append(found.log_posterior(key, "a scale"))
+    assert told == [-0.5 * chi2 for chi2 in range(20)]

@@ -1,0 +1,70 @@
+"""Further unknowns of a fit against the exact answer of straight lines."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armid.inference.model import Fit
+from armid.inference.unknowns import Unknown, freed
+
+RNG = np.random.default_rng(4)
+
+
+@dataclass(frozen=True, eq=False)
+class Straight:
+    """Records of a model without a free parameter, whose residual answers to each unknown along a column."""
+
+    columns: Any
+    residual: Any
+    space: Any = None
+
+    @property
+    def plain(self):
+        return self
+
+    def with_all_samples(self):
+        return self
+
+    def residuals(self, _):
+        return (self.residual,)
+
+    def padded(self, columns):
+        return columns
+
+    def moved(self, i, value):
+        return replace(self, residual=self.residual - value * self.columns[:, i])
+
+
+def freed_of(columns, truth):
+    """Return the values that unknowns come to whose true ones are given."""
+    base = Straight(columns, columns @ np.array(truth))
+    unknowns = [Unknown(f"u{i}", partial(lambda i, records, value: records.moved(i, value), i))
+                for i in range(len(truth))]  # fmt: skip
+    fit = freed(Fit((), base, np.empty(0), base.residual), base, unknowns)
+    return np.array([f.value for f in fit.others])
+
+
+def exact(columns, truth):
+    return np.linalg.solve(np.eye(columns.shape[1]) + columns.T @ columns, columns.T @ columns @ np.array(truth))
+
+
+@pytest.mark.parametrize("truth", [(0.0, 0.0), (1.0, -0.5), (2.5, 8.0)])
+def test_unknowns_come_to_their_best_values_however_far_these_are(truth):
+    columns = 10.0 * RNG.normal(size=(50, 2))
+    assert freed_of(columns, truth) == pytest.approx(exact(columns, truth), abs=0.01)
+
+
+def test_unknowns_whose_columns_nearly_cancel_move_together():
+    """Far off, each bounded by itself they would leave more than they take away."""
+    common = 100.0 * RNG.normal(size=(50, 1)) * np.array([1.0, -1.0, -1.0])
+    columns, truth = common + 3.0 * RNG.normal(size=(50, 3)), (10.0, 4.0, 6.0)
+    values = freed_of(columns, truth)
+
+    def cost(v):
+        return float(np.sum((columns @ (np.array(truth) - v)) ** 2) + np.sum(v**2))
+
+    assert cost(values) < 0.1 * cost(np.zeros(3))
+    assert values == pytest.approx(exact(columns, truth), abs=0.1)

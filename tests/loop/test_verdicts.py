@@ -1,0 +1,176 @@
+"""What a posterior and the errors on held-out records come to: steps that stand, verdicts, claims, what is told."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from armid.inference import Inference
+from armid.inference.hypothesis import Hypothesis
+from armid.inference.posterior import Atom, Posterior
+from armid.loop import Judgement, Step
+from armid.loop.close_loop import confirmed, is_denied, limits_of, path_of, steps_of, verdicts_of
+from armid.loop.result import HELD, Estimate, Withdrawn
+
+QUIET, LOUD = SimpleNamespace(significant=False), SimpleNamespace(significant=True)
+
+
+def effect(name):
+    return Hypothesis("effect", name, means=name)
+
+
+LATE, DRIFT = Hypothesis("record", "late@a.csv"), Hypothesis("drift", "mass")
+
+
+def posterior(*sets):
+    """Return a posterior of some sets, (names of effects, probability) each; kind:name where it is no effect."""
+
+    def named(word):
+        kind, colon, name = word.partition(":")
+        return (kind, name) if colon else ("effect", kind)
+
+    atoms = (Atom(np.log(p), frozenset(map(named, names.split())), np.zeros(1), np.ones(1)) for names, p in sets)
+    return Posterior(tuple(atoms), ("mass",))
+
+
+def judged(held, noise=1.0, on_train=QUIET):
+    """Return a model that misses held-out records by some error; None: nothing is held out."""
+    if held is None:
+        return Judgement(None, None, (), SimpleNamespace(diagnosis=on_train), None)
+    errors = SimpleNamespace(outputs={"speed": SimpleNamespace(rmse=held)}, joint_nrmse=0.01 * held)
+    unseen = SimpleNamespace(errors=errors, noise_of={"speed": noise}, diagnosis=LOUD if held > 1.2 * noise else QUIET)
+    seen = SimpleNamespace(errors=SimpleNamespace(outputs={}), diagnosis=on_train)
+    return Judgement(None, None, (), seen, unseen)
+
+
+@pytest.mark.parametrize(("held", "kept"), [
+    ([3.0, 1.0, 1.0], 2),
+    ([3.0, 1.0, 2.0], 1),
+    ([3.0, 1.0, 2.0, 2.5], 1),
+    # better than the declared model, and worse than the step before
+    ([3.0, 1.5, 2.0, 1.4], 3),
+    ([1.0, 2.0, 3.0], 0),
+    # a first step that only the second makes good
+    ([2.0, 3.0, 1.0], 2),
+    # as much as a prediction may be: above the noise by a tenth, worse by two per cent
+    ([1.0, 1.09], 1),
+    ([1.0, 1.12], 0),
+    ([3.0, 3.05], 1),
+    ([3.0, 3.07], 0),
+    ([3.0, np.inf], 0),
+    ([None, None, None], 2),
+    ([2.0], 0),
+])  # fmt: skip
+def test_last_steps_that_held_out_records_deny_go_one_by_one(held, kept):
+    assert confirmed([judged(error) for error in held]) == kept
+
+
+@pytest.mark.parametrize(("speed", "is_denied_then"), [(1.0, False), (3.0, True)])
+def test_any_output_that_is_held_out_may_deny(speed, is_denied_then):
+    """rmse of the angle, whose noise is 1, and of the speed."""
+
+    def seen(angle, speed):
+        outputs = {name: SimpleNamespace(rmse=rmse) for name, rmse in (("angle", angle), ("speed", speed))}
+        errors = SimpleNamespace(outputs=outputs, joint_nrmse=float(np.hypot(angle, speed)))
+        return SimpleNamespace(errors=errors, noise_of={"angle": 1.0, "speed": 1.0}, diagnosis=QUIET)
+
+    before, after = seen(1.0, 1.0), seen(1.0, speed)
+    after.diagnosis = LOUD
+    model = Judgement(None, None, (), before, after)
+    assert model.fails_to_carry_over is is_denied_then
+    assert is_denied(Judgement(None, None, (), before, before), model) is is_denied_then
+
+
+def step(name, claimed, p=1.0):
+    return Step(name, "torque", (), False, claimed, p, None)
+
+
+SURE, UNSURE = step("viscous", True), step("coulomb", False, 0.5)
+ENOUGH, MISSED = judged(1.0), judged(3.0)
+
+
+@pytest.mark.parametrize(("sets", "steps", "accused", "after", "verdicts"), [
+    ([("", 0.97), ("viscous", 0.03)], (), (), ENOUGH, ("no_discrepancy",)),
+    ([("viscous", 1.0)], (SURE,), (), ENOUGH, ("explained",)),
+    ([("viscous coulomb", 0.5), ("viscous seal", 0.5)], (SURE, UNSURE), (), ENOUGH, ("cannot_tell_apart",)),
+    # many weak answers, none of them probable
+    ([("", 0.4), ("viscous", 0.3), ("coulomb", 0.3)], (), (), ENOUGH, ("cannot_tell_apart",)),
+    ([("unknown:torque", 0.9), ("", 0.1)], (), (), judged(1.0, on_train=LOUD), ("unexplained",)),
+    ([("viscous unknown:torque", 1.0)], (SURE,), (), judged(1.0, on_train=LOUD), ("partly_explained",)),
+    # what nobody knows may be what a name stands for: then none is said to be undecided
+    ([("unknown:torque", 0.6), ("coulomb", 0.4)], (UNSURE,), (), ENOUGH, ("partly_explained",)),
+    ([("", 0.97)], (), (), judged(1.0, on_train=LOUD), ("unexplained",)),
+    ([("record:late@a.csv", 1.0)], (), (LATE,), ENOUGH, ("record_disagrees",)),
+    ([("drift:mass", 1.0)], (), (DRIFT,), ENOUGH, ("record_disagrees",)),
+    ([("viscous record:late@a.csv", 1.0)], (SURE,), (LATE,), ENOUGH, ("record_disagrees",)),
+    ([("record:late@a.csv unknown:torque", 1.0)], (), (LATE,), judged(1.0, on_train=LOUD),
+     ("record_disagrees", "unexplained")),
+    ([("", 0.97)], (), (), MISSED, ("does_not_carry_over",)),
+    ([("viscous", 1.0)], (SURE,), (), MISSED, ("does_not_carry_over",)),
+    ([("viscous record:late@a.csv", 1.0)], (SURE,), (LATE,), MISSED, ("does_not_carry_over", "record_disagrees")),
+])  # fmt: skip
+def test_verdicts_are_read_off_the_posterior(sets, steps, accused, after, verdicts):
+    assert verdicts_of(SimpleNamespace(posterior=posterior(*sets)), accused, after, steps, None) == verdicts
+
+
+def test_what_held_out_records_deny_does_not_carry_over_and_is_no_draw():
+    found = SimpleNamespace(posterior=posterior(("viscous", 1.0)))
+    withdrawn = Withdrawn((step("viscous", False),), MISSED)
+    assert verdicts_of(found, (), ENOUGH, (), withdrawn) == ("does_not_carry_over",)
+    # a name that is not claimed for that reason alone is not one of several
+    assert verdicts_of(found, (), MISSED, (step("viscous", False),), None) == ("does_not_carry_over",)
+
+
+def test_what_may_stand_in_the_place_of_an_effect():
+    found = Inference(None, posterior(
+        ("viscous coulomb", 0.4), ("viscous seal", 0.2), ("viscous stribeck", 0.15), ("viscous stribeck unknown:torque",
+        0.1), ("viscous record:late@a.csv", 0.05), ("viscous", 0.04), ("viscous seal tilt", 0.03), ("seal", 0.02),
+        ("viscous tilt", 0.005), ("drag coulomb", 0.005),
+    ))  # fmt: skip
+    model = frozenset({effect("viscous"), effect("coulomb")})
+    partners = found.partners(model, effect("coulomb"))
+    # no fault of a record, no two in the place of one, nothing beside another effect than the model's
+    assert partners == pytest.approx({"stribeck": 0.25, "seal": 0.2})
+    assert list(partners) == ["stribeck", "seal"], "the most probable first"
+    assert found.partners(model, effect("viscous")) == {}
+
+
+def test_the_way_to_a_model_goes_by_its_most_probable_parts():
+    a, b, c = map(effect, "abc")
+    whole = frozenset({a, b, c, LATE})
+    known = {whole: 9.0, whole - {a}: 5.0, whole - {b}: 6.0, whole - {c}: 1.0, frozenset({a, LATE}): 2.0,
+             frozenset({c, LATE}): 3.0}  # fmt: skip
+    found = SimpleNamespace(in_force=whole, found=SimpleNamespace(fits=known, log_posterior=known.__getitem__))
+    assert path_of(found) == [frozenset(), frozenset({c, LATE}), whole - {b}, whole]
+    alone = SimpleNamespace(in_force=frozenset({LATE}), found=found.found)
+    assert path_of(alone) == [frozenset(), frozenset({LATE})]
+    assert path_of(SimpleNamespace(in_force=frozenset(), found=found.found)) == [frozenset()]
+
+
+@pytest.mark.parametrize(("p", "at_a_bound", "crept", "claimed"), [
+    (0.951, False, False, True), (0.949, False, False, False), (0.999, True, False, False),
+    (0.999, False, True, False),
+])  # fmt: skip
+def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_bound, crept, claimed):
+    model = frozenset({effect("viscous"), LATE})
+    inference = Inference(None, posterior(("viscous record:late@a.csv", p), ("coulomb record:late@a.csv", 1.0 - p)))
+    inference.__dict__["in_force"] = model
+    library = SimpleNamespace(candidates={"viscous": SimpleNamespace(adds=("torque", "inertia"))})
+    object.__setattr__(inference, "found", SimpleNamespace(library=library))
+    fit = SimpleNamespace(is_at_a_bound=at_a_bound, crept=crept)
+    after = Judgement(fit, None, (), None, None)
+    (only,) = steps_of(inference, [frozenset(), model], [None, after])
+    assert (only.effect, only.port, only.claimed, only.empirical) == ("viscous", "torque, inertia", claimed, False)
+    assert only.probability == pytest.approx(p)
+    assert only.alternatives == (("coulomb",) if p < 0.99 else ())
+    # a model of faults alone is no step
+    assert steps_of(inference, [frozenset(), frozenset({LATE})], [None, after]) == ()
+
+
+def test_a_limit_that_holds_a_parameter_is_told():
+    at_limit = Estimate("n", 1.5, "1", 1.4, 1.6, (HELD,))
+    other = Estimate("p0", 3e6, "Pa", 2.9e6, 3.1e6, ())
+    length = Estimate("x.width", 0.02, "m", 0.01, 0.03, ("something else", HELD))
+    said = limits_of(SimpleNamespace(estimates=(at_limit, other, length)))
+    assert [s.partition(":")[0] for s in said] == ["n sits at its limit 1.5", "x.width sits at its limit 0.02 m"]
+    assert "--bounds n=LOW,HIGH" in said[0]
