@@ -17,7 +17,7 @@ from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.library import Library, constant_effects, library_of
 from armid.inference.model import Fit
-from armid.inference.posterior import Posterior, posterior
+from armid.inference.posterior import CONSTANTS, Posterior, posterior
 from armid.inference.prediction import predicting_best
 from armid.inference.scales import with_scales
 from armid.inference.search import Exploration, explore
@@ -103,11 +103,16 @@ class Inference:
     @cached_property
     def intervals(self) -> dict[str, Interval]:
         """Of each parameter of the declared model, about the model in force."""
-        return {
-            name: replace(one, low=self.posterior.interval(name)[0], high=self.posterior.interval(name)[1],
-                          causes=tuple(self.posterior.causes(name, (one.noise_high - one.noise_low) / 2.0 / NORMAL_95)))
-            for name, one in self.of_fit(self.in_force).items() if name in self.posterior.parameters
-        }  # fmt: skip
+        found = {}
+        sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
+        has_constants = any(f.unknown.name.startswith(NAMED) for f in self.best.others)
+        beside = CONSTANTS if has_constants or not sizes else f"size of {sizes[0]}"
+        for name, one in self.of_fit(self.in_force).items():
+            if name in self.posterior.parameters:
+                (low, high), noise = self.posterior.interval(name), 0.5 * (one.noise_high - one.noise_low) / NORMAL_95
+                causes = tuple(self.posterior.causes(name, noise, beside))
+                found[name] = replace(one, low=low, high=high, causes=causes)
+        return found
 
     def of_fit(self, model: Hypotheses) -> dict[str, Interval]:
         """Return the intervals of all parameters of one model, were it true: with its constants, and of noise alone."""
@@ -136,7 +141,9 @@ class Inference:
 
 
 def listed(probabilities: Mapping[str, float]) -> dict[str, float]:
-    return {name: p for name, p in probabilities.items() if p >= LISTED}
+    """Return the probabilities that are told, the largest first."""
+    told = {name: p for name, p in probabilities.items() if p >= LISTED}
+    return dict(sorted(told.items(), key=lambda pair: -pair[1]))
 
 
 # Threads of the linear algebra inside our own threads would only wait for each other.

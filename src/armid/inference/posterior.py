@@ -19,6 +19,8 @@ from armid.model import Array
 
 # Models of a smaller weight than this, relative to the best, do not count.
 NEGLIGIBLE = float(np.log(1e-6))
+# What further unknowns of a model are, in words.
+CONSTANTS = "constants within tolerances"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,25 +91,30 @@ class Posterior:
         """Return the interval that holds 95 % of the mixture."""
         return self.quantile(parameter, 0.025), self.quantile(parameter, 0.975)
 
-    def causes(self, parameter: str, noise: float) -> list[tuple[str, float]]:
+    def causes(self, parameter: str, noise: float, beside: str = CONSTANTS) -> list[tuple[str, float]]:
         """Return what makes the interval of a parameter wide, with shares of the variance, the largest first.
 
-        noise: deviation by noise alone, SI. What a model has beyond the most probable one counts for it.
+        noise: deviation by noise alone, SI. beside: what else the most probable model has as unknowns.
         """
         i = self.parameters.index(parameter)
         best = max(self.atoms, key=lambda a: a.log_weight)
         means, deviations = (np.array([getattr(a, what)[i] for a in self.atoms]) for what in ("mean", "deviation"))
-        centre = float(self.weights @ means)
-        total = float(self.weights @ (deviations**2 + (means - centre) ** 2))
-        if total <= 0.0:
+        whole, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), best.deviation[i] ** 2
+        if max(whole, own) <= 0.0:
             return []
-        found = {"noise": noise**2 / total, "constants within tolerances": (best.deviation[i] ** 2 - noise**2) / total}
+        away: dict[str, float] = {}
         for atom, weight in zip(self.atoms, self.weights, strict=True):
             names = sorted(name for _, name in atom.names ^ best.names)
-            more = weight * ((atom.mean[i] - best.mean[i]) ** 2 + atom.deviation[i] ** 2 - best.deviation[i] ** 2)
+            more = weight * ((atom.mean[i] - best.mean[i]) ** 2 + atom.deviation[i] ** 2 - own)
             for name in names:
-                found[name] = found.get(name, 0.0) + float(more) / len(names) / total
-        return sorted(((n, share) for n, share in found.items() if share > 0.0), key=lambda pair: -pair[1])
+                away[name] = away.get(name, 0.0) + float(more) / len(names)
+        # What narrows it is no cause; what other models add to the variance is theirs in these proportions.
+        away = {name: size for name, size in away.items() if size > 0.0}
+        scale = max(whole - own, 0.0) / max(sum(away.values()), 1e-300)
+        found = {"noise": min(noise**2, own), beside: max(own - noise**2, 0.0)}
+        found |= {name: scale * size for name, size in away.items()}
+        shares = {name: float(size) / max(whole, own) for name, size in found.items() if size > 0.0}
+        return sorted(shares.items(), key=lambda pair: (-pair[1], pair[0]))
 
 
 def posterior(found: Exploration) -> Posterior:

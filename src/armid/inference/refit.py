@@ -19,13 +19,21 @@ T = TypeVar("T")
 
 
 def finished(fit: Fit, library: Library) -> Fit:
-    """Return the fit at its estimate; where it crept there and has shapes set free, the better one by continuation."""
-    done = accurate(fit_from(fit.records, fit.active, [fit.z]), library)
+    """Return the fit at its estimate; where it crept there and has shapes set free, the better one by continuation.
+
+    Its further unknowns are held.
+    """
+
+    def from_starts(starts: list[Array]) -> Fit:
+        again = fit_from(fit.records, fit.active, starts)
+        return replace(again, others=fit.others, base=fit.base) if fit.others else accurate(again, library)
+
+    done = from_starts([fit.z])
     shapes = {name for key in fit.active if key.free_shape for name in library.fixed_shapes(key)}
     if not shapes or done.has_arrived:
         return done
     starts = continued(done, shapes)
-    again = unless_diverged(lambda: accurate(fit_from(done.records, fit.active, starts), library)) if starts else None
+    again = unless_diverged(lambda: from_starts(starts)) if starts else None
     return done if again is None or done.chi2 < again.chi2 else again
 
 

@@ -26,7 +26,7 @@ from armid.inference.evidence import (
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior, words
 from armid.inference.kinds import drifts, effects, records, unknown
 from armid.inference.library import EffectKey, Library
-from armid.inference.model import Fit, fit_from
+from armid.inference.model import Fit
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
 from armid.inference.unknowns import Unknown, constants_of, freed
@@ -69,8 +69,8 @@ class Exploration:
     forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
     completed: dict[Hypotheses, float] = field(default_factory=dict)
     refused: set[Hypotheses] = field(default_factory=set)
-    _evidence: dict[tuple[int, Scale], float] = field(default_factory=dict)
-    _scale: dict[int, Scale] = field(default_factory=dict)
+    _evidence: dict[tuple[Fit, Scale], float] = field(default_factory=dict)
+    _scale: dict[Fit, Scale] = field(default_factory=dict)
 
     @property
     def declared(self) -> Fit:
@@ -79,14 +79,14 @@ class Exploration:
     def scale(self) -> Scale:
         """Return the scale of the model that leaves least: it shows what is noise."""
         best = min(self.fits.values(), key=lambda f: f.chi2 + f.records.data.log_cover)
-        if id(best) not in self._scale:
-            self._scale[id(best)] = scale_of(best)
-        return self._scale[id(best)]
+        if best not in self._scale:
+            self._scale[best] = scale_of(best)
+        return self._scale[best]
 
     def log_posterior(self, model: Hypotheses, scale: Scale | None = None) -> float:
         """Return the log posterior of a model, up to a constant."""
         fit, scale = self.fits[model], scale or self.scale()
-        key = (id(fit), scale)
+        key = (fit, scale)
         if key not in self._evidence:
             self._evidence[key] = log_evidence(expansion_of(fit, scale, self.library))
         return self._evidence[key] + log_prior(model)
@@ -372,7 +372,7 @@ def finish(found: Exploration) -> None:
     best = found.ranked()[0][0]
     leading = [m for m, _ in found.ranked() if len(m) == len(best)][:BEAM]
     todo = [m for m in leading if found.fits[m].rough and found.fits[m].records.data.cover is None]
-    finished_each = [partial(estimated, found.fits[m], found.library) for m in todo]
+    finished_each = [partial(finished, found.fits[m], found.library) for m in todo]
     for model, again in zip(todo, found.library.each(unless_diverged, finished_each), strict=True):
         found.fits[model] = replace(again if again is not None else found.fits[model], rough=False)
 
@@ -408,16 +408,11 @@ def complete(found: Exploration, model: Hypotheses) -> None:
         found.fits[model] = again or replace(found.fits[model], rough=False)
 
 
-def estimated(fit: Fit, library: Library) -> Fit:
-    """Return a fit at its estimate, its further unknowns held."""
-    return settled(fit) if fit.others else finished(fit, library)
-
-
 def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:
     """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls."""
     if fit.records.data.cover is not None:
         return replace(fit, rough=False)
-    done = estimated(fit, library)
+    done = finished(fit, library)
     for key in done.active:
         if not key.free_shape and library.fixed_shapes(key):
             wide = unless_diverged(partial(reshaped, done, key, library))
@@ -432,10 +427,4 @@ def reshaped(fit: Fit, key: EffectKey, library: Library) -> Fit:
         return finished(with_free_shapes(fit, key, library), library)
     active = freed_shape(fit.active, key)
     wide = with_free_shapes(fit, key, library, effects.beside(fit, active, library))
-    return settled(replace(wide, others=fit.others, base=effects.base_of(fit, active, library)))
-
-
-def settled(fit: Fit) -> Fit:
-    """Return a fit at its estimate, its further unknowns held."""
-    again = fit_from(fit.records, fit.active, [fit.z])
-    return replace(again, others=fit.others, base=fit.base)
+    return finished(replace(wide, others=fit.others, base=effects.base_of(fit, active, library)), library)

@@ -139,7 +139,9 @@ def freed(
         new_z = descend(posed, [z], tolerance, limit=limit) if len(z) else z
         residual = records.plain.residuals(new_z)[0] + columns @ values
         best = np.linalg.solve(np.eye(len(unknowns)) / weight + columns.T @ columns, columns.T @ residual)
-        step, best_cost, share = np.clip(best - values, -FARTHEST, FARTHEST), np.inf, 1.0
+        step, best_cost, share = best - values, np.inf, 1.0
+        # Shortened as a whole: parts of a step that nearly cancel mean nothing alone.
+        step *= min(1.0, FARTHEST / max(float(np.abs(step).max(initial=0.0)), 1e-300))
         while share > 0.05:  # a step of a late record may be too long
             best_cost = cost_of(base, unknowns, values + share * step, new_z, weight)
             if best_cost < cost:

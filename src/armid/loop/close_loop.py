@@ -26,10 +26,12 @@ from armid.loop.advice import advice_on
 from armid.loop.common_factors import known_together
 from armid.loop.result import (
     CARRIES_NOT,
+    CLAIMED,
     DISAGREES,
     EXPLAINED,
     HELD,
     IMPLAUSIBLE,
+    MENTIONED,
     NO_DISCREPANCY,
     PARTLY,
     TOO_ALIKE,
@@ -44,8 +46,6 @@ from armid.loop.suspects import broken_suspects, suspects_of
 from armid.model import Effect, Model
 from armid.record import Campaign, Record
 
-# Probability from which on a name is claimed, and from which on a verdict or a fault is told.
-CLAIMED, MENTIONED = 0.95, 0.5
 # Half the 95 % interval of a parameter that is trusted may be this share of its value.
 WITHIN = 0.05
 # Held-out records deny a step with which their error is so many times that before, and that of the noise.
@@ -133,8 +133,6 @@ def close_loop(
     steps = steps_of(found, path, judged)
     kept = confirmed(judged)
     after, before = judged[kept], judged[0]
-    if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
-        steps = tuple(replace(step, claimed=False) for step in steps)
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
     withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
     accused = [h for h in path[kept] if found.posterior.probability(*h.public) >= MENTIONED]
@@ -150,7 +148,7 @@ def close_loop(
     missing = missing_of(in_force, found.found.library, told) if curve and not implausible else None
     advice = advice_on(found, campaign.gyro_range, threads, told) if TOO_ALIKE in verdicts else ()
     # Other suspicions rest on the declared model: they are told where nothing better was found.
-    at_a_loss = not {UNEXPLAINED, CARRIES_NOT}.isdisjoint(verdicts)
+    at_a_loss = not {UNEXPLAINED, CARRIES_NOT, PARTLY}.isdisjoint(verdicts) and not any(s.claimed for s in steps)
     screened = (*screened, *given_twice(campaign.records))
     told_first = dict.fromkeys(s.sentence for s in screened if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]

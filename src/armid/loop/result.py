@@ -30,6 +30,8 @@ IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAI
 )  # fmt: skip
 # Where train is noise, held-out records may be simulated worse than their noise by this factor.
 CARRIED = 1.1
+# Probability from which on a name is claimed, and from which on a verdict or a fault is told.
+CLAIMED, MENTIONED = 0.95, 0.5
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
@@ -205,6 +207,7 @@ def estimates(
     known = {**own, **found.intervals} if model == found.in_force else own
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
+    is_unknown = found.posterior.probability("unknown") >= MENTIONED
     told = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
@@ -217,7 +220,9 @@ def estimates(
         one = known[name]
         low, high = min(one.low, value), max(one.high, value)
         causes = tuple(f"{words_of(cause)}, {share:.0%}" for cause, share in one.causes[:MOST_CAUSES])
-        doubts = [REMAINS] if discrepancy and model != found.in_force else []
+        doubts = [REMAINS] if discrepancy and (model != found.in_force or is_unknown) else []
+        if owner is not None and found.posterior.probability("effect", owner.public) < CLAIMED:
+            doubts.append(f"{owner.public} is not certain")
         doubts += [HELD] if held[space.free_names.index(name)] else []
         if not max(value - low, high - value) <= within * abs(value):
             wide = f"its interval reaches further than {within:.0%} from the value"

@@ -16,7 +16,9 @@ from armid.inference.model import Fit
 from armid.record import Record
 from armid.units import shown
 
-FREED, LEFT_OUT, REPORTED = "freed", "left_out", "reported"
+FREED, LEFT_OUT = "freed", "left_out"
+# Another drift of this probability does as well.
+AS_WELL = 0.05
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def drift_of(what: OfParameter, name: str, fit: Fit, found: Inference) -> Suspec
         place = list(fit.values).index(what.name)
         factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit
     low, high = factor * (value - half), factor * (value + half)
-    others = [n for n in found.posterior.of_kind("drift") if n != name][:1]
+    others = [n for n, p in found.posterior.of_kind("drift").items() if n != name and p >= AS_WELL]
     return Suspect(
         last.file, last.role, "trend", FREED, factor * value, unit, low, high, parameter=", ".join([name, *others])
     )

@@ -65,6 +65,8 @@ def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
 
 def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
     """Return the drifts that a fit does not hold, with what the largest plausible one does."""
+    if not known:
+        return []
     held = {f.unknown.name for f in fit.others}
     order, names, found = order_of(fit.records), list(fit.values), []
     for hypothesis in known:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.inference.whitening import WhiteRecords, with_samples
 from armid.model import Array, Model, Plant
@@ -72,6 +73,19 @@ class Fault:
         return (int(np.ceil(max(-places[0], 0.0))) + 2 * (places[0] < 0.0),
                 int(np.ceil(max(places[-1] - len(places) + 1, 0.0))) + 2 * (places[-1] > len(places) - 1))  # fmt: skip
 
+    def spent(self, record: Record, value: float) -> float:
+        """Return by how much the sum of squares of noise alone falls once the fault is undone, in units of the noise.
+
+        Samples at the ends have no value; between samples noise is smoothed; a smaller signal has a smaller noise, whose
+        density counts with twice the logarithm of the factor.
+        """
+        if self.kind == "gain":
+            return 2.0 * record.measured.size * float(np.log(abs(1.0 + value)))
+        if self.kind not in OF_TIMES:
+            return 0.0
+        _, weights = sinc_weights(len(record.measured), self.places(record, value))
+        return float(sum(self.lost(record, value)) + np.sum(1.0 - np.sum(weights**2, axis=1)))
+
     def places(self, record: Record, value: float) -> Array:
         """Return where in its samples a record holds those of its true times, (n_samples,)."""
         own = np.arange(record.measured.size, dtype=np.float64)
@@ -102,12 +116,18 @@ def resampled(signal: Array, places: Array) -> Array:
     A spline would smooth it, and what is left would no longer look like the noise of the sensor. places: in samples.
     """
     padded = np.pad(signal, REACH, mode="reflect", reflect_type="odd")
-    inside = np.clip(places, 0.0, len(signal) - 1.0)
-    first = np.minimum(np.floor(inside), len(signal) - 2.0).astype(np.int64) - REACH + 1
+    near, weights = sinc_weights(len(signal), places)
+    return np.asarray(np.sum(padded[near + REACH] * weights, axis=1))
+
+
+def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return for each place which of n samples are near, and what each weighs, (n_places, 2 REACH) both."""
+    inside = np.clip(places, 0.0, n - 1.0)
+    first = np.minimum(np.floor(inside), n - 2.0).astype(np.int64) - REACH + 1
     near = first[:, np.newaxis] + np.arange(2 * REACH)
     away = inside[:, np.newaxis] - near
     weights = np.sinc(away) * np.cos(0.5 * np.pi * away / REACH) ** 2
-    return np.asarray(np.sum(padded[near + REACH] * weights, axis=1) / np.sum(weights, axis=1))
+    return near, weights / np.sum(weights, axis=1, keepdims=True)
 
 
 def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:

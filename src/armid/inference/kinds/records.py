@@ -41,7 +41,7 @@ class OfRecord:
     def unknown(self, name: str, records: WhiteRecords) -> Unknown:
         """Return the size as an unknown; samples that were not measured at their new times must not speak for it."""
         record = records.data.records[self.index]
-        return Unknown(name, self.moved, lambda value: float(sum(self.fault.lost(record, value * self.largest))),
+        return Unknown(name, self.moved, lambda value: self.fault.spent(record, value * self.largest),
                        self.column)  # fmt: skip
 
     def column(self, records: WhiteRecords, z: Array, value: float) -> Array:
