@@ -401,9 +401,11 @@ def complete(found: Exploration, model: Hypotheses) -> None:
     Where that makes it the best, a square weighs more than before, and constants are freed once more.
     """
     for _ in range(MOST_COMPLETED):
-        if is_complete(found, model) or not (model or found.constants):
+        if is_complete(found, model):
             return
         weight = found.completed[model] = found.scale().weight
+        if not (model or found.constants):
+            return
         again = unless_diverged(partial(completed, found.fits[model], found.library, found.constants, weight))
         found.fits[model] = again or replace(found.fits[model], rough=False)
 

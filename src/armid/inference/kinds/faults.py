@@ -76,7 +76,7 @@ class Fault:
     def spent(self, record: Record, value: float) -> float:
         """Return by how much the sum of squares of noise alone falls once the fault is undone, in units of the noise.
 
-        Samples at the ends have no value; between samples noise is smoothed; a smaller signal has a smaller noise, whose
+        Samples at the ends have no value. Between samples noise is smoothed. A smaller signal has less noise, whose
         density counts with twice the logarithm of the factor.
         """
         if self.kind == "gain":
