@@ -19,9 +19,11 @@ def stub(residual):
     """A fit of two parameters, of which an expansion asks no more than this."""
     space = SimpleNamespace(low=np.zeros(2), high=np.ones(2), free=np.ones(2, dtype=bool))
     parameters = dict.fromkeys("ab", SimpleNamespace(null=None))
+    none_known = (np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
     return SimpleNamespace(
         n_free=2, jacobian=JACOBIAN, columns=OTHERS, residual=residual, chi2=float(residual @ residual),
-        values={"a": 0.5, "b": 0.5}, records=SimpleNamespace(space=space), model=SimpleNamespace(parameters=parameters),
+        values={"a": 0.5, "b": 0.5}, records=SimpleNamespace(space=space, rows=none_known, span=np.ones(2)),
+        model=SimpleNamespace(parameters=parameters), others=(SimpleNamespace(value=0.0),),
     )  # fmt: skip
 
 

@@ -126,8 +126,15 @@ def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch
     assert next_model(exploration({large: 0.0}, (), False, monkeypatch)) is None
 
 
+class Leaves:
+    """A fit of which nothing is asked but what it leaves."""
+
+    def __init__(self, chi2):
+        self.chi2 = chi2
+
+
 def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one(monkeypatch):
-    local, better = (SimpleNamespace(chi2=chi2) for chi2 in (120.0, 100.0))
+    local, better = Leaves(120.0), Leaves(100.0)
     monkeypatch.setattr(search, "expansion_of", lambda fit, *_: fit)
     monkeypatch.setattr(search, "log_evidence", lambda fit: -0.5 * fit.chi2)
     monkeypatch.setattr(Exploration, "scale", lambda _: None)
@@ -137,7 +144,7 @@ def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one(monkeypatch):
     assert found.take(key, better)
     assert not found.take(key, local)
     assert not found.take(key, None)
-    assert not found.take(key, SimpleNamespace(chi2=np.nan))
+    assert not found.take(key, Leaves(np.nan))
     assert found.fits == {key: better}
 
 
@@ -148,6 +155,6 @@ def test_the_evidence_of_a_fit_is_its_own_and_not_that_of_one_that_is_gone(monke
     found, key, told = Exploration(None, {}), model(""), []
     for chi2 in range(20):
         found.fits.clear()
-        found.fits[key] = SimpleNamespace(chi2=float(chi2))
+        found.fits[key] = Leaves(float(chi2))
         told.append(found.log_posterior(key, "a scale"))
     assert told == [-0.5 * chi2 for chi2 in range(20)]

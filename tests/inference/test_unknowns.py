@@ -20,12 +20,10 @@ class Straight:
     columns: Any
     residual: Any
     space: Any = None
+    replays: Any = ()
 
     @property
     def plain(self):
-        return self
-
-    def with_all_samples(self):
         return self
 
     def residuals(self, _):
@@ -43,7 +41,7 @@ def freed_of(columns, truth):
     base = Straight(columns, columns @ np.array(truth))
     unknowns = [Unknown(f"u{i}", partial(lambda i, records, value: records.moved(i, value), i))
                 for i in range(len(truth))]  # fmt: skip
-    fit = freed(Fit((), base, np.empty(0), base.residual), base, unknowns)
+    fit = freed(Fit((), base, np.empty(0), base.residual), base, unknowns, 1.0)
     return np.array([f.value for f in fit.others])
 
 

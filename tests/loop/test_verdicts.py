@@ -147,17 +147,16 @@ def test_the_way_to_a_model_goes_by_its_most_probable_parts():
     assert path_of(SimpleNamespace(in_force=frozenset(), found=found.found)) == [frozenset()]
 
 
-@pytest.mark.parametrize(("p", "at_a_bound", "crept", "claimed"), [
-    (0.951, False, False, True), (0.949, False, False, False), (0.999, True, False, False),
-    (0.999, False, True, False),
+@pytest.mark.parametrize(("p", "at_a_limit", "has_arrived", "claimed"), [
+    (0.951, False, True, True), (0.949, False, True, False), (0.999, True, True, False), (0.999, False, False, False),
 ])  # fmt: skip
-def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_bound, crept, claimed):
+def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_limit, has_arrived, claimed):
     model = frozenset({effect("viscous"), LATE})
     inference = Inference(None, posterior(("viscous record:late@a.csv", p), ("coulomb record:late@a.csv", 1.0 - p)))
     inference.__dict__["in_force"] = model
     library = SimpleNamespace(candidates={"viscous": SimpleNamespace(adds=("torque", "inertia"))})
-    object.__setattr__(inference, "found", SimpleNamespace(library=library))
-    fit = SimpleNamespace(is_at_a_bound=at_a_bound, crept=crept)
+    fit = SimpleNamespace(is_at_a_limit=lambda _: at_a_limit, has_arrived=has_arrived)
+    object.__setattr__(inference, "found", SimpleNamespace(library=library, fits={model: fit}))
     after = Judgement(fit, None, (), None, None)
     (only,) = steps_of(inference, [frozenset(), model], [None, after])
     assert (only.effect, only.port, only.claimed, only.empirical) == ("viscous", "torque, inertia", claimed, False)

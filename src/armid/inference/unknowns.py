@@ -14,9 +14,11 @@ import numpy as np
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, moved_replays, products
 from armid.estimation.least_squares import LeastSquaresProblem, descend
+from armid.inference.kinds.faults import with_shared_starts
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
+from armid.problem.starts import fits_starts, with_starts
 
 # Step of the differences, and the farthest step of a turn, in prior standard deviations.
 STEP, FARTHEST = 1e-2, 3.0
@@ -149,8 +151,11 @@ def freed(
             share *= 0.5
         if not best_cost < cost:
             break
-        values, z, fall = values + share * step, new_z, cost - best_cost
-        cost = best_cost
+        values, z = values + share * step, new_z
+        if fits_starts(base.replays):
+            base = about_starts(base, unknowns, values, z)
+            best_cost = min(best_cost, cost_of(base, unknowns, values, z, weight))
+        fall, cost = cost - best_cost, best_cost
         if fall < (1.0 if rough else SETTLED) * max(cost / len(residual), 1.0):
             break
     if not np.isfinite(cost):
@@ -159,6 +164,25 @@ def freed(
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
     return replace(fit, records=records, z=z, residual=records.plain.residuals(z)[0], base=base,
                    others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
+
+
+def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array) -> WhiteRecords:
+    """Return records before any unknown was moved, from the starts that fit best with some values of the unknowns."""
+    there = moved(base, unknowns, values)
+    started = with_starts(there.replays, there.whole(z[np.newaxis])[0])
+    names = base.model.plant.start_constants.values()
+    replays = list(base.replays)
+    for i, (old, new) in enumerate(zip(base.replays, started, strict=True)):
+        pieces = []
+        for mine, theirs in zip(old.pieces, new.pieces, strict=True):
+            own = {n: theirs.manoeuvre.constants[n] for n in names if n in theirs.manoeuvre.constants}
+            manoeuvre = replace(mine.manoeuvre, constants={**mine.manoeuvre.constants, **own})
+            pieces.append(replace(mine, manoeuvre=manoeuvre, correction=theirs.correction))
+        replays[i] = replace(old, pieces=tuple(pieces))
+    for file in dict.fromkeys(r.record.file for r in replays):
+        inside = [i for i, r in enumerate(replays) if r.record.file == file]
+        replays = list(with_shared_starts(replays, inside))
+    return replace(base, replays=tuple(replays))
 
 
 def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, weight: float) -> float:

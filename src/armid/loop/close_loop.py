@@ -52,6 +52,7 @@ WITHIN = 0.05
 DENIED, OVER_NOISE = 1.02, 1.1
 # Mistakes of the screen of records that leave nothing to search for, and what it tells whatever the loop finds.
 GROSS = ("sign", "unit", "time", "angle", "exchanged", "input", "position")
+OF_SIZE = ("unit", "angle", "input")
 TOLD = (*GROSS, "start", "noise", "rest", "twice")
 
 
@@ -114,9 +115,9 @@ def close_loop(
     library, declared = prepared(model, campaign, candidates, bounds, fixed, priors, threads, told, progress)
     space = library.space(library.declared, ())
     screened = screen(replace(campaign, records=campaign.train), library.declared, space)
-    # Nobody is accused while a limit holds a parameter of the declared model: the limit may be what is wrong.
+    # A limit that holds a parameter of the declared model looks like a wrong unit.
     is_held = bool(held_by_bound(declared.records.space, declared.x).any())
-    gross = [s for s in screened if s.kind in GROSS and not is_held]
+    gross = [s for s in screened if s.kind in GROSS and not (is_held and s.kind in OF_SIZE)]
     screened = tuple(s for s in screened if s in gross or s.kind not in GROSS)
     # What a whole campaign has wrong needs no search.
     if any(not s.record and s.kind != "input" for s in gross):
@@ -238,7 +239,7 @@ def verdicts_of(
     unknown = post.probability("unknown") >= MENTIONED
     verdicts = [CARRIES_NOT] if withdrawn is not None or after.fails_to_carry_over else []
     verdicts += [DISAGREES] if any(h.kind in ("record", "drift") for h in accused) else []
-    in_doubt = any(not s.claimed for s in steps) if steps else post.nothing < MENTIONED
+    in_doubt = any(s.probability < CLAIMED for s in steps) if steps else post.nothing < MENTIONED
     verdicts += [TOO_ALIKE] if in_doubt and not unknown and withdrawn is None and DISAGREES not in verdicts else []
     if unknown or (after.diagnosis.significant and not verdicts):
         verdicts.append(PARTLY if steps else UNEXPLAINED)
