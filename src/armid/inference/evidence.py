@@ -62,13 +62,14 @@ class Scale:
 def scale_of(best: Fit) -> Scale:
     """Return the scale on which the best model leaves what its residual shows.
 
-    Noise: each sample counts. More than noise: what is left is the model's error, of unknown size, and slow.
+    Noise: each independent sample counts. More than noise: what is left is the model's error, of unknown size, and slow.
     """
     data, n = best.records.data, float(np.count_nonzero(best.records.data.sound))
-    if not is_significant(best):
-        return Scale(n, 1.0, data.n_noise(otherwise=n))
-    square = max(best.chi2 / n, 1.0)
     independent = float(np.clip(best.independent, FEWEST, n))
+    if not is_significant(best):
+        # A short rest tells the colour of the noise roughly, so that what is whitened may still be correlated.
+        return Scale(independent, independent / n, data.n_noise(otherwise=n))
+    square = max(best.chi2 / n, 1.0)
     # How much of the misfit is noise decides how much the rest still tells of its size.
     return Scale(independent, independent / n / square, data.n_noise(otherwise=n) / square**2)
 
