@@ -49,24 +49,6 @@ def test_another_form_of_an_effect_takes_its_place(stand):
 
 
 @pytest.mark.slow
-def test_a_pair_is_found_where_steps_over_a_narrow_sign_creep(tmp_path):
-    """Campaign c381 of the families of seed 149: the arm nearly stops, and the drive that brakes loses most of itself.
-
-    By continuation chi2 falls from 1.5 a sample to 0.6.
-    """
-    from stand import families
-
-    files, _ = families.make(families.read_suite(families.SUITE), 149, ("two", 47))
-    for name, text in files.items():
-        (tmp_path / name).write_text(text)
-    campaign = read_campaign(tmp_path)
-    names = ("line_loss", "quadratic_drag", "viscous", "worm_direction")
-    found = infer(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in names})
-    assert {h.name for h in found.in_force} == {"viscous", "worm_direction"}
-    assert found.best.chi2 < 1.1 * len(found.best.residual)
-    assert min(found.probabilities["effects"].get(n, 0.0) for n in ("viscous", "worm_direction")) > 0.9
-
-
 class Narrow:
     """A sum of squares with a narrow valley along its second parameter."""
 

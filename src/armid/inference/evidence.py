@@ -62,7 +62,7 @@ class Scale:
 def scale_of(best: Fit) -> Scale:
     """Return the scale on which the best model leaves what its residual shows.
 
-    Noise: each independent sample counts. More than noise: what is left is the model's error, of unknown size, and slow.
+    Noise: each independent sample counts. More than noise: what is left is the model's error, of unknown size.
     """
     data, n = best.records.data, float(np.count_nonzero(best.records.data.sound))
     independent = float(np.clip(best.independent, FEWEST, n))

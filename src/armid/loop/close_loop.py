@@ -141,6 +141,8 @@ def close_loop(
     verdicts = (
         (IMPLAUSIBLE, UNEXPLAINED) if implausible else verdicts_of(found, accused, after, steps[:kept], withdrawn)
     )
+    if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
+        steps = tuple(replace(step, claimed=False) for step in steps)
     every = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
