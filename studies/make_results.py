@@ -86,7 +86,7 @@ RECIPES = {
     "landscape": Recipe(("python studies/suite/landscape.py --out out/landscape",), ("landscape",)),
     "measured": Recipe(("python studies/measured/run.py --data out/data --out out/measured",)),
     "paper_arm": Recipe(("armid identify studies/campaigns/paper_arm --out out/paper_arm",), ("fit",)),
-    "rocking_shell": loop("rocking_shell", "motion", "ranking"),
+    "rocking_shell": loop("rocking_shell", "motion", "probabilities"),
     "suite": study("suite", "attained", file="suite/suite"), "suite_long": study("suite_long", file="suite/long"),
     "suite_tuned": study("suite_tuned", file="../out/tuned/tuned", before=(
         ("out/tuned/tuned.toml", "armid tune studies/suite/suite.toml --configurations 10 --out out/tuned"),)),

@@ -28,7 +28,7 @@ from armid.inference.model import Fit
 from armid.model import Array
 
 # Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude.
-SCALES = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
+SCALES = np.array([0.03, 0.1, 0.3, 1.0])
 # Fewest independent samples of a residual that is no noise.
 FEWEST = 10.0
 LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))

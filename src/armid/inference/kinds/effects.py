@@ -17,7 +17,7 @@ from armid.inference.whitening import WhiteRecords
 from armid.model import EFFECTS, Array
 
 # Effects that a campaign is expected to lack, of all in the library.
-EXPECTED = 0.7
+EXPECTED = 1.5
 # Shares of the range over which a strength is tried: a slope, and two secants where the answer is no straight line.
 SLOPE = 1e-3
 SHARES = (SLOPE, 0.05, 0.4)
