@@ -43,6 +43,8 @@ N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED = 8, 3, 3, 3
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
+# Of records with more samples than this fewer models are expanded, but for so many.
+SAMPLES, FEWEST_EXPANDED = 10_000, 8
 # In log units: a fit that is so far behind the best is given up.
 HOPELESS = 60.0
 # A model is brought to its estimate at most so often in turn.
@@ -111,8 +113,12 @@ class Exploration:
         return True
 
 
-def explore(library: Library, declared: Fit, most: int = MOST_EXPANDED) -> Exploration:
-    """Return the models that the train records ask for, from the declared one on; declared: its fit."""
+def explore(library: Library, declared: Fit, most: int | None = None) -> Exploration:
+    """Return the models that the train records ask for, from the declared one on.
+
+    declared: its fit. most: models that are expanded, None: as many as the samples allow.
+    """
+    most = most or int(np.clip(MOST_EXPANDED * SAMPLES / len(declared.residual), FEWEST_EXPANDED, MOST_EXPANDED))
     found = Exploration(library, effects.hypotheses(library))
     found.constants = constants_of(declared.records, declared.z, library.tolerances)
     found.fits[frozenset()] = declared

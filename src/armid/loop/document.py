@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from armid.errors import ArmidError
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
 from armid.inference.carry_over import missed_sentences
@@ -24,6 +25,7 @@ from armid.loop.result import (
     PARTLY,
     TOO_ALIKE,
     UNEXPLAINED,
+    VERSION,
     ClosedLoop,
     Judgement,
     record_entries,
@@ -105,6 +107,9 @@ def loop_document(
 
     report, details: report.json and details.json; for the others see `identify_document`.
     """
+    if report.get("version") != VERSION:
+        raise ArmidError(f"report.json of {report['campaign']} was written by another version of armid: the same "
+                         "`armid close-loop` again is expected")  # fmt: skip
     figures = stored_figures(FIGURES, svgs)
     unit = report["unit"]
     both = [(which, model, report["error"][model][which]) for which in ("train", "holdout")
