@@ -247,11 +247,6 @@ class Library:
         given = self.priors.get(effect)
         return default if given is None else float(np.log(given / (1.0 - given)))
 
-    @property
-    def declared_strengths(self) -> frozenset[str]:
-        """Names of strengths of the declared model's own effects that scale with the machine."""
-        return self.scaled_strengths & self.declared.parameters.keys()
-
     def declared_ranges(self, model: Model, key: EffectKey) -> dict[str, tuple[float, float]]:
         """Return the declared ranges of those strengths of an effect whose box is wider."""
         if self.reach == 1.0:

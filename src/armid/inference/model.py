@@ -19,13 +19,8 @@ from armid.problem.starts import fits_starts, with_starts
 
 # Relative change of the sum of squares at which a fit stops: far below the 1 that means anything in 10,000 samples.
 TOLERANCE, ROUGHLY = 1e-7, 1e-3
-ONLY_NOISE = 0.01
-# An effect is dropped whose strengths would be so far from their nulls by chance.
-OPEN = 0.05
 # A change of n_eff ln(chi2) that no comparison of two models tells from none.
 UNTOLD = 0.5
-# A residual of so many times the noise is the model's: then prediction decides and not significance.
-DWARFED = 10.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from armid.estimation.identify_document import PACKAGES
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import SIGNIFICANCE, Finding, Residuals, time_in_words
 from armid.inference.hypothesis import words
-from armid.inference.infer import Inference
+from armid.inference.infer import LISTED, Inference
 from armid.inference.missing_signal import Missing
 from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
@@ -124,6 +124,7 @@ def loop_document(
     shifts = (*details.get("suspects", ()), *details.get("shifts", ()))
     together = tuple(f"{said[0].upper()}{said[1:]}." for said in report.get("known_together", ()))
     beside = [Sentences((*shifts, *together))] if shifts or together else []
+    widths = [Sentences(width_sentences(report), "What makes the intervals wide")] if width_sentences(report) else []
     missing = tuple(details.get("missing", ()))
     words = details.get("advice") or [", ".join(f"{k} = {v}" for k, v in a["manoeuvre"].items())
                                       for a in report["advice"]]  # fmt: skip
@@ -136,7 +137,7 @@ def loop_document(
         Section("Error before and after", (errors,)),
         *([residual_section(details, unit, by_record)] if details else []),
         Section("Steps", steps or (Text("No effect was added."),)),
-        Section("Parameters", (parameters, *beside, *figures.get("parameters", ()))),
+        Section("Parameters", (parameters, *widths, *beside, *figures.get("parameters", ()))),
     ]
     if details:
         if "motion" in figures:
@@ -253,23 +254,19 @@ def log_table(log: list[Mapping[str, Any]]) -> Table:
 
 def parameter_table(report: Mapping[str, Any]) -> Table:
     before, after = report["parameters"]["before"], report["parameters"]["after"]
-    rows = [
-        (
-            name,
-            held_text(p),
-            noise_text(p),
-            "yes" if p["trusted"] else "not identified" if p["low"] is None else "no",
-            ", ".join(p["causes"]),
-            held_text(before[name]) if name in before else "",
-        )
-        for name, p in after.items()
-    ]
+    rows = [(name, held_text(p), noise_text(p), trust_text(p), held_text(before[name]) if name in before else "")
+            for name, p in after.items()]  # fmt: skip
     note = (
         "Values with 95 % intervals over all models; of noise alone: were the model in force true. Struck (~ ~) where "
         "the interval does not hold: a bound holds the value."
     )
-    columns = ["parameter", "after", "of noise alone", "trusted", "what makes it wide", "before"]
-    return table("Parameters", columns, rows, note)
+    return table("Parameters", ["parameter", "after", "of noise alone", "trusted", "before"], rows, note)
+
+
+def width_sentences(report: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what makes the interval of each parameter wide."""
+    after = report["parameters"]["after"]
+    return tuple(f"{name}: {'; '.join(p['causes'])}." for name, p in after.items() if p["causes"])
 
 
 def trust_text(p: Mapping[str, Any]) -> str:
@@ -365,18 +362,17 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
 
 def models_of(found: Inference) -> list[dict[str, Any]]:
     """Return the most probable models with the parameters of the declared model, were each true."""
-    chances, told = found.posterior.sets, []
-    for model, _ in found.found.ranked()[:MOST_DRAWN]:
-        own = {n: i for n, i in found.of_fit(model).items() if n in found.posterior.parameters}
-        values = found.found.fits[model].values
-        told.append(
-            {
-                "model": words(model),
-                "probability": chances.get(frozenset(h.public for h in model), 0.0),
+    told: dict[str, dict[str, Any]] = {}
+    for model, _ in found.found.ranked():
+        probability = found.posterior.sets.get(frozenset(h.public for h in model), 0.0)
+        if words(model) not in told and len(told) < MOST_DRAWN and (probability >= LISTED or not told):
+            own = {n: i for n, i in found.of_fit(model).items() if n in found.posterior.parameters}
+            values = found.found.fits[model].values
+            told[words(model)] = {
+                "model": words(model), "probability": probability,
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in own.items()},
-            }
-        )
-    return told
+            }  # fmt: skip
+    return list(told.values())
 
 
 def conclusion(found: ClosedLoop) -> str:

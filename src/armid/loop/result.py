@@ -236,7 +236,7 @@ def estimates(
 
 def words_of(cause: str) -> str:
     """Return a cause of an interval's width in words."""
-    return cause if " " in cause or cause == "noise" else f"{cause}, not told from none by these records"
+    return cause if " " in cause or cause == "noise" else f"{cause}, which these records cannot show"
 
 
 def report_of(found: ClosedLoop) -> dict[str, Any]:
