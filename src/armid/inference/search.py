@@ -44,7 +44,7 @@ N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
 # Of records with more samples than this fewer models are expanded, but for so many.
-SAMPLES, FEWEST_EXPANDED = 10_000, 8
+SAMPLES, FEWEST_EXPANDED = 4_000, 8
 # In log units: a fit that is so far behind the best is given up.
 HOPELESS = 60.0
 # A model is brought to its estimate at most so often in turn.
