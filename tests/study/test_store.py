@@ -6,6 +6,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import pytest
@@ -19,6 +20,7 @@ from armid.study.store import (
     Store,
     connected,
     is_gone,
+    opened,
     start_of,
     this_place,
     this_process,
@@ -185,3 +187,17 @@ def test_a_signal_ends_a_query(tmp_path):
     finally:
         timer.join()
         signal.signal(signal.SIGINT, before)
+
+
+def test_several_runners_may_make_a_store_in_the_same_moment(tmp_path):
+    """SQLite lets none of them wait for a log that another is making."""
+    start = threading.Barrier(4)
+
+    def make(path):
+        start.wait()
+        opened(path).close()
+
+    with ThreadPoolExecutor(4) as pool:
+        for i in range(10):
+            for done in [pool.submit(make, tmp_path / f"{i}.sqlite") for _ in range(4)]:
+                done.result()

@@ -5,6 +5,7 @@ import json
 import os
 import platform
 import sqlite3
+import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
@@ -264,7 +265,7 @@ def opened(path: Path) -> sqlite3.Connection:
         connection = connected(path, timeout=WAIT_S)
         try:
             check_format(connection, path, may_be_new=True)
-            connection.execute("PRAGMA journal_mode = WAL")
+            keep_log(connection)
             connection.execute("PRAGMA synchronous = NORMAL")
             with transaction(connection):
                 for statement in filter(str.strip, SCHEMA.split(";")):
@@ -277,6 +278,19 @@ def opened(path: Path) -> sqlite3.Connection:
             connection.close()
             raise
     return connection
+
+
+def keep_log(connection: sqlite3.Connection) -> None:
+    """Make a store keep a write-ahead log; SQLite waits for no other process that does so in the same moment."""
+    until = time.monotonic() + WAIT_S
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorname != "SQLITE_BUSY" or time.monotonic() > until:
+                raise
+        time.sleep(0.05)
 
 
 def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = False) -> None:
