@@ -6,7 +6,6 @@ import sqlite3
 import subprocess
 import sys
 import threading
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import pytest
@@ -189,15 +188,14 @@ def test_a_signal_ends_a_query(tmp_path):
         signal.signal(signal.SIGINT, before)
 
 
-def test_several_runners_may_make_a_store_in_the_same_moment(tmp_path):
-    """SQLite lets none of them wait for a log that another is making."""
-    start = threading.Barrier(4)
-
-    def make(path):
-        start.wait()
+def test_a_store_waits_for_another_runner_that_is_about_to_write(tmp_path):
+    """SQLite waits for nobody where a log is to be made: it tells at once that the file is locked."""
+    path = tmp_path / "made.sqlite"
+    opened(path).close()
+    with closing(sqlite3.connect(path, isolation_level=None, check_same_thread=False)) as other:
+        other.execute("PRAGMA journal_mode = DELETE")
+        other.execute("BEGIN IMMEDIATE")
+        soon = threading.Timer(0.3, lambda: other.execute("COMMIT"))
+        soon.start()
         opened(path).close()
-
-    with ThreadPoolExecutor(4) as pool:
-        for i in range(10):
-            for done in [pool.submit(make, tmp_path / f"{i}.sqlite") for _ in range(4)]:
-                done.result()
+        soon.join()
