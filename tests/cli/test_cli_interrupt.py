@@ -127,6 +127,7 @@ run()
 """
 
 
+@pytest.mark.usefixtures("keyboard")
 def test_an_interrupt_within_generated_code_is_one(tmp_path):
     (tmp_path / "within.py").write_text(WITHIN)
     ran = subprocess.run([sys.executable, "-m", "within"], cwd=tmp_path, capture_output=True, text=True, check=False)

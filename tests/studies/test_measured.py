@@ -91,7 +91,7 @@ def test_files_that_are_not_there_are_named(call, tmp_path, machine):
 def test_a_machine_without_data_is_left_out_of_the_table(call, tmp_path):
     code, said = call("run.py", "--data", tmp_path, "--out", tmp_path / "out")
     assert code == 0
-    assert said.count("is not there, left out") == 6
+    assert said.count("is not there, left out") == 8
     assert (tmp_path / "out" / "table.md").read_text().count("\n") == 2
 
 

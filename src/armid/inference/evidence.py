@@ -256,7 +256,9 @@ def log_evidence(about: Expansion) -> float:
     found += float(np.sum(np.log(density)))
     _, means, deviations = fit.records.rows
     found -= 0.5 * float(np.sum(((fit.x[fit.records.rows[0]] - means) / deviations) ** 2))
-    found -= 0.5 * float(sum(f.value**2 + f.unknown.lost(f.value) for f in fit.others))
+    # Of what samples lose, as of what they tell, only the independent ones count.
+    share = scale.n / len(fit.residual)
+    found -= 0.5 * float(sum(f.value**2 + share * f.unknown.lost(f.value) for f in fit.others))
     found -= 0.5 * fit.records.data.log_cover
     for key in fit.active:
         found += log_strength(about, key)

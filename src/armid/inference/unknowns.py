@@ -189,7 +189,9 @@ def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: A
     """Return the sum of squares, the priors and the samples that are left out counted."""
     residual = moved(base, unknowns, values).residuals(z)[0]
     lost = sum(u.lost(float(v)) for u, v in zip(unknowns, values, strict=True))
-    total = float(residual @ residual) + float(values @ values) / weight + lost
+    chi2 = float(residual @ residual)
+    # A sample that is left out would have missed by as much as the others do.
+    total = chi2 + float(values @ values) / weight + max(chi2 / len(residual), 1.0) * lost
     return total if np.isfinite(total) else np.inf
 
 
