@@ -63,7 +63,7 @@ class Posterior:
             if name is not None and not beside_unknown and any(k == "unknown" for k, _ in names):
                 continue
             total += weight * any(k == kind and name in (None, n) for k, n in names)
-        return total
+        return min(total, 1.0)
 
     @property
     def nothing(self) -> float:
