@@ -215,3 +215,29 @@ def test_noise_of_irregular_samples(write, axis_columns, noise):
     with pytest.warns(match="irregular sampling"):
         record = read(write(SERVO_TOML, move=columns)).records[0]
     assert record.noise.rms == pytest.approx(noise, rel=0.15)
+
+
+def test_what_is_known_beforehand_is_read(write_axis):
+    told = "[constants]\ngain = 35.0\n[priors]\ncoulomb = 0.9\nmass = { mean = 90.0, sd = 4.0 }\n"
+    campaign = read_campaign(write_axis(toml=AXIS.format(told)))
+    assert campaign.chances == {"coulomb": 0.9}
+    assert (campaign.known["mass"].mean, campaign.known["mass"].sd) == (90.0, 4.0)
+    told = "[priors]\ngain = { mean = 35.0, sd = 0.7 }\n"
+    campaign = read_campaign(write_axis(toml=AXIS.format(told)))
+    assert campaign.constants["gain"] == 35.0
+    assert campaign.tolerances["gain"] == pytest.approx(0.02)
+    assert campaign.known == {}
+
+
+@pytest.mark.parametrize(("prior", "said"), [
+    ("coulomb = 1.5", "priors.coulomb' is 1.5"),
+    ("coulom = 0.5", "did you mean 'coulomb'"),
+    ("mas = { mean = 1.0, sd = 1.0 }", "did you mean 'mass'"),
+    ("mass = { mean = 1.0, sd = -1.0 }", "a standard deviation above 0"),
+    ("gain = { mean = 0.0, sd = 1.0 }", "a mean other than 0"),
+    ("gain = { mean = 35.0, sd = 1.0 }\n[constants]\ngain = 35.0", "one place is expected"),
+])  # fmt: skip
+def test_a_prior_that_means_nothing_is_refused(write_axis, prior, said):
+    with pytest.raises(ArmidError) as refused:
+        read_campaign(write_axis(toml=AXIS.format(f"[priors]\n{prior}\n")))
+    assert said in str(refused.value)
