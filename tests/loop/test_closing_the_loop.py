@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from few_candidates import CANDIDATES, COMMON, TRUTH, garbage
 
+import armid
 from armid.errors import ArmidError
 from armid.estimation.constants import moved_record
 from armid.estimation.mends import Suspicion
@@ -390,3 +391,20 @@ def test_a_conclusion_is_what_the_tests_say():
     assert "b cannot be told from c or d" in group
     assert "a has a probability" not in group
     assert "b has a probability of 0.60" in concluded("cannot_tell_apart", ("a", "b"), "a")
+
+
+def test_what_is_known_of_a_parameter_beforehand_counts(axis):
+    """A prior as narrow as the records' own interval draws the estimate half-way."""
+    campaign = axis()
+    alone, drawn = (
+        armid.close_loop(campaign, candidates=["viscous"], curve=False, priors=priors).after.estimates[0]
+        for priors in ({}, {"mass": (2.02, 0.0001)})
+    )
+    assert abs(alone.value - 2.0) < 0.01
+    assert abs(drawn.value - 2.02) < 0.2 * abs(alone.value - 2.02)
+    assert drawn.high - drawn.low < alone.high - alone.low
+    for bad in ({"mas": (1.0, 1.0)}, {"mass": (2.0, -1.0)}, {"viscous": 1.5}):
+        with pytest.raises(ArmidError):
+            armid.close_loop(campaign, candidates=["viscous"], priors=bad)
+    with pytest.raises(ArmidError, match="within"):
+        armid.close_loop(campaign, candidates=["viscous"], within=-0.1)

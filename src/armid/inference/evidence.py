@@ -31,6 +31,8 @@ from armid.model import Array
 SCALES = np.array([0.03, 0.1, 0.3, 1.0])
 # Fewest independent samples of a residual that is no noise.
 FEWEST = 10.0
+# Beyond this an exponential is no number of use.
+LARGEST_EXPONENT = 500.0
 LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))
 
 
@@ -56,7 +58,8 @@ class Scale:
     def reach(self, log_likelihood: float) -> float:
         """Return the sum of squares at a log-likelihood."""
         total = self.rest + self.n
-        return float((np.expm1(-2.0 * log_likelihood / total) * total + self.n) / self.weight)
+        exponent = min(-2.0 * log_likelihood / total, LARGEST_EXPONENT)
+        return float((np.expm1(exponent) * total + self.n) / self.weight)
 
 
 def scale_of(best: Fit) -> Scale:
