@@ -13,8 +13,8 @@ search        which models are fitted
 posterior     probabilities of hypotheses and sets; intervals that count what may be missing
 checks        whether a residual is more than noise, and where; `carry_over`: on records held out
 
-Also here: prediction (which model is put in force where none is right), scales (sizes of strengths), responses and
-refit (starts of fits), missing_signal (the signal that a model lacks at each port).
+Also here: prediction (which model is put in force where none is right), scales (sizes of strengths), refit
+(starts of fits), missing_signal (the signal that a model lacks at each port).
 """
 
 from armid.inference.infer import Inference, infer

@@ -128,16 +128,19 @@ class Inference:
     @property
     def sentence(self) -> str:
         """The probabilities in one line."""
-        chances = self.probabilities
-        named = [f"{n} {p:.2f}" for n, p in chances["effects"].items()][:MOST_TOLD]
-        if len(chances["effects"]) > MOST_TOLD:
-            named.append(f"{len(chances['effects']) - MOST_TOLD} others")
-        faults = [f"{n} {p:.2f}" for kind in ("records", "drifts") for n, p in chances[kind].items()][:MOST_TOLD]
-        return "; ".join([*named, *faults, f"nothing missing {chances['nothing']:.2f}",
-                          f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip
+        return sentence_of(self.probabilities)
 
     def __repr__(self) -> str:
         return self.sentence
+
+
+def sentence_of(chances: Mapping[str, Any]) -> str:
+    """Return probabilities in one line: the effects, faults of records, nothing, and what nobody knows."""
+    named = [f"{name} {p:.2f}" for name, p in chances["effects"].items()]
+    more = [f"{len(named) - MOST_TOLD} others"] if len(named) > MOST_TOLD else []
+    faults = [f"{name} {p:.2f}" for kind in ("records", "drifts") for name, p in chances[kind].items()]
+    return "; ".join([*named[:MOST_TOLD], *more, *faults[:MOST_TOLD], f"nothing missing {chances['nothing']:.2f}",
+                      f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip
 
 
 def listed(probabilities: Mapping[str, float]) -> dict[str, float]:

@@ -19,7 +19,7 @@ from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.errors import ArmidError
 from armid.estimation.least_squares import side_by_side
 from armid.inference.whitening import WhitenedData, WhiteRecords
-from armid.model import Array, Effect, Manoeuvre, Model, Parameter, distinct
+from armid.model import EFFECTS, Array, Effect, Manoeuvre, Model, Parameter, distinct
 from armid.model.parameter import powers_of
 from armid.problem.problem import Replay
 from armid.problem.space import Space, space_of
@@ -28,8 +28,6 @@ from armid.record import Override, Record
 
 S = TypeVar("S")
 T = TypeVar("T")
-# What the names of empirical terms begin with (no effect of a library may), and how reports show them.
-UNNAMED, SHOWN_AS = "unnamed_", "unnamed:"
 # What the names of constants that are known roughly begin with, which are looked for as effects are.
 ROUGHLY, CONSTANT = "error_of_", "constant:"
 # More than the library holds: a model that grew for ever would take for ever to compile.
@@ -57,15 +55,9 @@ class EffectKey:
         return replace(self, free_shape=False)
 
     @property
-    def is_empirical(self) -> bool:
-        return self.name.startswith(UNNAMED)
-
-    @property
     def public(self) -> str:
         """Name in reports, whatever the form."""
-        if self.name.startswith(ROUGHLY):
-            return self.name.replace(ROUGHLY, CONSTANT, 1)
-        return self.name.replace(UNNAMED, SHOWN_AS, 1) if self.is_empirical else self.name
+        return self.name.replace(ROUGHLY, CONSTANT, 1) if self.name.startswith(ROUGHLY) else self.name
 
     def owns(self, parameter: str) -> bool:
         return parameter.startswith(f"{self.compiled}.")
@@ -140,6 +132,11 @@ class Library:
     @cached_property
     def _by_compiled_name(self) -> dict[str, EffectKey]:
         return {key.compiled: key for key in self.candidates}
+
+    @property
+    def known_names(self) -> set[str]:
+        """Names that share the prior probability: the candidates, and all effects that armid knows."""
+        return {key.public for key in self.candidates} | EFFECTS.keys()
 
     def problem(self, active: Active, near: Mapping[str, float] | None = None) -> WhiteRecords:
         """Return the least-squares problem of the declared model with some candidates, on all train records.

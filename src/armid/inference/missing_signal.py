@@ -13,7 +13,7 @@ from armid.estimation.least_squares import WeightedRecords
 from armid.inference.checks import variable_names
 from armid.inference.library import Library
 from armid.inference.model import Fit, beyond
-from armid.inference.responses import candidate_at, free_values
+from armid.inference.refit import candidate_at, free_values
 from armid.model import Array, Effect, Model, Parameter
 from armid.problem.problem import Replay
 from armid.problem.space import Space

@@ -102,16 +102,8 @@ class Fit:
 
     @cached_property
     def basis(self) -> Array:
-        return self._decomposed[0]
-
-    @cached_property
-    def answer(self) -> Array:
-        """How the free parameters answer to a change of the whitened signal, (n_free, n_samples)."""
-        return self._decomposed[1]
-
-    @cached_property
-    def _decomposed(self) -> tuple[Array, Array]:
-        return decomposed(self.jacobian)
+        """Orthonormal basis of what the free parameters can do, (n_samples, rank)."""
+        return decomposed(self.jacobian)[0]
 
     @cached_property
     def start_slopes(self) -> Array:

@@ -1,6 +1,6 @@
-"""Refit a model with one effect more, less or other, from the starts that a linear guess gives."""
+"""How the whitened signal answers to candidates about a fit, and refits from the starts that this gives."""
 
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from functools import reduce
 from typing import TypeVar
@@ -9,9 +9,8 @@ import numpy as np
 
 from armid.errors import ArmidError
 from armid.estimation.least_squares import descend
-from armid.inference.library import Active, EffectKey, Library, points_within
+from armid.inference.library import Activation, Active, EffectKey, Library, idle, points_within
 from armid.inference.model import Fit, fit_from, with_own_starts
-from armid.inference.responses import at_null, free_values
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
@@ -117,3 +116,32 @@ def unless_diverged(trial: Callable[[], T]) -> T | None:
         return trial()
     except ArmidError:
         return None
+
+
+def responses(current: Fit, records: WhiteRecords, grid: Sequence[Activation]) -> Array:
+    """Return the change of the whitened signal per full strength of each activation, (n_activations, n_samples)."""
+    population = np.tile(candidate_at(records, current.values), (len(grid) + 1, 1))
+    for row, activation in zip(population[1:], grid, strict=True):
+        for n, value in activation.at(activation.share).items():
+            row[records.space.index(n)] = value
+    signals = records.whole_signals(population)
+    return np.asarray((signals[1:] - signals[0]) / np.array([a.share for a in grid])[:, np.newaxis])
+
+
+def free_values(records: WhiteRecords, values: Mapping[str, float]) -> Array:
+    """Return the free parameters of a problem, SI: given values, the others where they rest, (n_free,)."""
+    declared = records.model.parameters
+    return np.array([values.get(n, idle(declared[n])) for n in records.space.free_names])
+
+
+def candidate_at(records: WhiteRecords, values: Mapping[str, float]) -> Array:
+    """Return the whole candidate of a problem at some values, as `free_values` takes them, SI, (n_parameters,)."""
+    return np.asarray(records.space.complete(free_values(records, values)[np.newaxis])[0])
+
+
+def at_null(records: WhiteRecords, candidate: Array, key: EffectKey) -> Array:
+    model, changed = records.model, candidate.copy()
+    for i, name in enumerate(records.space.names):
+        if key.owns(name) and model.parameters[name].null is not None:
+            changed[i] = idle(model.parameters[name])
+    return changed

@@ -7,7 +7,7 @@ import numpy as np
 from armid.estimation.constants import STEP, common_factors
 from armid.inference.library import ROUGHLY, Library
 from armid.inference.model import Fit, beyond, decomposed
-from armid.inference.responses import candidate_at
+from armid.inference.refit import candidate_at
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 

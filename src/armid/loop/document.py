@@ -12,7 +12,7 @@ from armid.estimation.identify_document import PACKAGES
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import SIGNIFICANCE, Finding, Residuals, time_in_words
 from armid.inference.hypothesis import words
-from armid.inference.infer import LISTED, Inference
+from armid.inference.infer import LISTED, Inference, sentence_of
 from armid.inference.missing_signal import Missing
 from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
@@ -63,7 +63,7 @@ from armid.units import shown
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
 # A shift of a parameter by more than this share of its value, and of its interval, is told.
 SHIFTED = 0.01
-MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_NAMED, MOST_DRAWN = 3, 5, 5, 5, 6
+MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
 # A manoeuvre that separates rivals with a smaller chance is no advice.
 HOPELESS = 0.2
 # Smaller chances than this are all the same.
@@ -188,15 +188,10 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
 
 
 def chances_sentence(report: Mapping[str, Any]) -> str:
-    """Return the probabilities in one line: the effects, faults of records, nothing, and what nobody knows."""
-    chances = report["probabilities"]
-    named = [f"{name} {p:.2f}" for name, p in chances["effects"].items()]
-    more = [f"{len(named) - MOST_NAMED} others"] if len(named) > MOST_NAMED else []
-    faults = [f"{name} {p:.2f}" for kind in ("records", "drifts") for name, p in chances[kind].items()]
-    among = chances.get("among")
-    asked = f" (among {among[0]} of {among[1]} effects)" if among is not None and among[0] < among[1] else ""
-    return "; ".join([*named[:MOST_NAMED], *more, *faults[:MOST_NAMED], f"nothing missing {chances['nothing']:.2f}",
-                      f"something that the library does not hold {chances['unknown']:.2f}"]) + asked  # fmt: skip
+    """Return the probabilities in one line, and among how many effects they were asked for."""
+    named, known = report["probabilities"].get("among", (0, 0))
+    asked = f" (among {named} of {known} effects)" if named < known else ""
+    return sentence_of(report["probabilities"]) + asked
 
 
 def probability_table(report: Mapping[str, Any]) -> Table:
@@ -236,7 +231,7 @@ def step_table(report: Mapping[str, Any]) -> Table:
                   f"{rmse_text(last[which], unit)} -> {rmse_text(step['error'][which], unit)}"
                   for which in ("holdout", "train")]  # fmt: skip
         alternatives = ", ".join(step["alternatives"]) or "none"
-        claimed = "" if step.get("claimed", True) or step["empirical"] else " (candidate)"
+        claimed = "" if step["claimed"] else " (candidate)"
         rows.append((step["effect"] + claimed, *errors, alternatives, "; ".join(own), step["port"]))
         last = step["error"]
     name = shown(0.0, unit)[1]

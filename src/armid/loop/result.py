@@ -18,7 +18,7 @@ from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
 from armid.inference.model import Fit
 from armid.loop.suspects import Suspect
-from armid.model import EFFECTS, Array, Model
+from armid.model import Array, Model
 from armid.problem.problem import Replay
 from armid.record import Campaign
 from armid.report.document import curve_entry, finite
@@ -294,8 +294,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
 
 def among(library: Library) -> list[int]:
     """Return how many effects may be named, and how many share the prior probability."""
-    named = {key.public for key in library.candidates}
-    return [len(named), len(named | EFFECTS.keys())]
+    return [len({key.public for key in library.candidates}), len(library.known_names)]
 
 
 def step_entry(step: Step) -> dict[str, Any]:

@@ -26,10 +26,10 @@ class Suspect:
     """Say how one record differs.
 
     kind: "late", "clock" (fast by a share), "offset", "drift", "gain", "start", "label" (another load or key than
-    told), "push", "trend" (of all records: by how much the parameter is larger in this one, the last, than in the
+    told), "trend" (of all records: by how much the parameter is larger in this one, the last, than in the
     first), or of samples "gap", "clipped", "stuck", "spikes". value, low, high: size with its 95 % interval
-    [unit]; from_s, to_s: where it is [s]; None where there is no such thing. action: "freed" (undone), "left_out" or
-    "reported". output: whose sensor it is, "" where the plant has but one, and of the whole file. parameter: what has
+    [unit]; from_s, to_s: where it is [s]; None where there is no such thing. action: "freed" (undone) or "left_out" (of
+    samples). output: whose sensor it is, "" where the plant has but one, and of the whole file. parameter: what has
     the trend, then others whose trend does as well; "" for a fault of one record.
     """
 
@@ -102,23 +102,20 @@ def suspect_sentence(s: Suspect) -> str:
         words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
         where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"
         return f"{s.record}: {s.value:.0f} samples are {words}, {where}: they count as no data."
-    if s.kind == "push":
-        return f"{s.record}: pushed from {s.from_s:.3g} to {s.to_s:.3g} s; it is left out."
     if s.kind == "label" or s.value is None or s.low is None or s.high is None:
-        left = "; it is left out" if s.action == LEFT_OUT else ""
-        return f"{s.record} looks like a record of another load, or of other inputs than it tells{left}."
+        return f"{s.record} looks like a record of another load, or of other inputs than it tells."
     if s.kind == "trend":
         grew, low, high = ("larger" if s.value > 0.0 else "smaller"), *sorted((abs(s.low), abs(s.high)))
         size = f"{factor * abs(s.value):.3g}{unit} ({factor * low:.3g} to {factor * high:.3g})"
         names = " or ".join(s.parameter.split(", "))
         return (f"{names} is {size} {grew} in {s.record}, the last record, than in the first, and changes from each to "
                 "the next, as of a machine that warms up, wears or runs in; so it is taken.")  # fmt: skip
-    done = {FREED: "; so it is taken", LEFT_OUT: ", or another fault of it is; it is left out"}.get(s.action, "")
     if s.kind == "late":
         word = "late" if s.value > 0.0 else "early"
         low, high = sorted((1e3 * abs(s.low), 1e3 * abs(s.high)))
-        return f"{s.record}: starts {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}){done}."
+        return f"{s.record}: starts {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}); so it is taken."
     words = {"start": "starts elsewhere than told, by", "offset": "its sensor is off by", "gain": "its gain is off by",
              "drift": "its sensor drifts by", "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
     where = f"{s.record}, {s.output}" if s.output else s.record
-    return f"{where}: {words} {factor * s.value:.3g}{unit} ({factor * s.low:.3g} to {factor * s.high:.3g}){done}."
+    size = f"{factor * s.value:.3g}{unit} ({factor * s.low:.3g} to {factor * s.high:.3g})"
+    return f"{where}: {words} {size}; so it is taken."

@@ -10,11 +10,10 @@ from armid.inference.evidence import SCALES, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal, expected
 from armid.inference.library import EffectKey, Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
-from armid.inference.refit import unless_diverged
-from armid.inference.responses import free_values, responses
+from armid.inference.refit import free_values, responses, unless_diverged
 from armid.inference.unknowns import freed, projected
 from armid.inference.whitening import WhiteRecords
-from armid.model import EFFECTS, Array
+from armid.model import Array
 
 # Effects that a campaign is expected to lack, of all in the library.
 EXPECTED = 1.5
@@ -32,7 +31,7 @@ def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
 
     That a user asks for a few candidates makes none of them more probable: the whole library shares what is expected.
     """
-    names = {key.public for key in library.candidates} | set(EFFECTS)
+    names = library.known_names
     forms = [key.public for key in library.candidates]
     return {
         key: Hypothesis("effect", key.public, key.form,

@@ -15,8 +15,7 @@ from armid.inference.hypothesis import Hypothesis, Proposal, expected
 from armid.inference.library import Library
 from armid.inference.missing_signal import Segment, motions, segments
 from armid.inference.model import Fit, fit_from
-from armid.inference.refit import unless_diverged
-from armid.inference.responses import candidate_at, free_values
+from armid.inference.refit import candidate_at, free_values, unless_diverged
 from armid.inference.whitening import Cover
 from armid.model import Array
 
