@@ -150,10 +150,10 @@ def probability_figure(campaign: str, chances: Mapping[str, Any]) -> Any:
     figure, axis = pyplot().subplots(figsize=(6.8, 0.34 * len(rows) + 1.3), layout="constrained")
     axis.barh(range(len(rows)), [p for _, p, _ in rows], color=[c for *_, c in rows])
     for i, (_, p, _) in enumerate(rows):
-        axis.text(min(p, 0.93) + 0.01, i, f"{p:.2f}", va="center", fontsize="small")
+        axis.text(p + 0.01, i, f"{p:.2f}", va="center", fontsize="small")
     axis.set_yticks(range(len(rows)), [n for n, *_ in rows])
     axis.invert_yaxis()
-    axis.set(xlim=(0.0, 1.0), xlabel="probability")
+    axis.set(xlim=(0.0, 1.1), xticks=np.linspace(0.0, 1.0, 6), xlabel="probability")
     axis.set_title(f"{campaign}: what the declared model may lack", fontsize="medium")
     return figure
 
