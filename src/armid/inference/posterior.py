@@ -13,7 +13,7 @@ from scipy.special import logsumexp, ndtr
 
 from armid.inference.checks import is_certain
 from armid.inference.evidence import Expansion, expansion_of
-from armid.inference.hypothesis import Hypotheses
+from armid.inference.hypothesis import Hypotheses, log_prior
 from armid.inference.search import Exploration
 from armid.model import Array
 
@@ -25,9 +25,13 @@ CONSTANTS = "constants within tolerances"
 
 @dataclass(frozen=True, eq=False)
 class Atom:
-    """Hold one model of the mixture: its log weight, its hypotheses, means and deviations of the parameters."""
+    """Hold one model of the mixture: its log weight, its hypotheses, means and deviations of the parameters.
+
+    log_prior: log prior odds of its hypotheses, part of the weight.
+    """
 
     log_weight: float
+    log_prior: float
     names: frozenset[tuple[str, str]]
     mean: Array
     deviation: Array
@@ -131,7 +135,7 @@ def posterior(found: Exploration) -> Posterior:
         about = expansion_of(found.fits[model], scale, library)
         mean, covariance = of_parameters(about, own)
         names = frozenset(h.public for h in model) | left
-        atoms.append(Atom(value, names, mean, np.sqrt(np.diag(covariance))))
+        atoms.append(Atom(value, log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
         atoms += beside(found, model, value, about, own, mean, covariance, top, left)
     return Posterior(tuple(atoms), own)
 
@@ -170,8 +174,9 @@ def beside(
                     strength, deviation = truncated(float(strength), float(deviation))
                 moved = -span * answer * strength
                 spread = (span * answer * deviation) ** 2
-            atoms.append(Atom(weight + float(ahead.log_factor[i, k]), names | {hypothesis.public}, mean + moved,
-                              np.sqrt(np.diag(covariance) + spread)))  # fmt: skip
+            atoms.append(Atom(weight + float(ahead.log_factor[i, k]), log_prior(model | {hypothesis}),
+                              names | {hypothesis.public}, mean + moved, np.sqrt(np.diag(covariance) + spread)))
+            # fmt: skip
     return atoms
 
 

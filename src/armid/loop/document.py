@@ -198,12 +198,12 @@ def probability_table(report: Mapping[str, Any]) -> Table:
     """Return what may be missing, with its probability and what may stand in its place."""
     chances = report["probabilities"]
     others = {s["effect"]: ", ".join(s["alternatives"]) for s in report["steps"]}
-    rows = [(name, "effect", p, others.get(name, "")) for name, p in chances["effects"].items()]
-    rows += [(name, "one record", p, "") for name, p in chances["records"].items()]
-    rows += [(name, "drift from record to record", p, "") for name, p in chances["drifts"].items()]
-    rows += [("something that the library does not hold", "", chances["unknown"], ""),
-             ("nothing", "", chances["nothing"], "")]  # fmt: skip
-    columns = ["what", "kind", Column("probability", "probability", ".2f"), "in its place"]
+    rows = [(name, p, "effect", others.get(name, "")) for name, p in chances["effects"].items()]
+    rows += [(name, p, "one record", "") for name, p in chances["records"].items()]
+    rows += [(name, p, "drift from record to record", "") for name, p in chances["drifts"].items()]
+    rows += [("something that the library does not hold", chances["unknown"], "", ""),
+             ("nothing", chances["nothing"], "", "")]  # fmt: skip
+    columns = ["what", Column("probability", "probability", ".2f"), "kind", "in its place"]
     return table("Probabilities", columns, rows, PROBABILITIES_NOTE)
 
 
