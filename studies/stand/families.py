@@ -24,8 +24,8 @@ from stand.arm import PARAMETERS, Arm
 from stand.blind.campaign import SUITE, campaign_files, entry_of, measure_strokes
 from stand.blind.draw import Drawn, draw_arm, run, six_strokes
 from stand.blind.many import Entry, key_path, make_as_told, suite_parser, write_campaigns
-from stand.blind.suite import Case, Suite, read_suite, signed
-from stand.campaign import record_text
+from stand.blind.suite import Case, Planted, Suite, read_suite, signed
+from stand.campaign import EXACT, record_text
 from stand.effects import Effects
 from stand.gyro import Gyro, rms
 from stand.motion import Motion
@@ -38,7 +38,11 @@ THREE = (
     ("quadratic_drag", "supply_sag", "controller_delay"), ("shell_rocking", "brush_drop", "gas_heat_loss"),
     ("stribeck", "flux_saturation", "gyro_lag"),
 )  # fmt: skip
-FAMILIES = ("control", "fault", "constant", "constants", "two", "three", "trend")
+FAMILIES = ("control", "fault", "constant", "constants", "two", "three", "trend", "one", "unlisted", "drawn", "wrong")
+# Families whose constants are exact in every other campaign, and known to the plant's own tolerances in the others.
+BY_TURNS = ("control", "one", "unlisted")
+# Standard deviation to which constants are declared where they are drawn from it, and where one is off by three.
+DECLARED = (0.02, 0.05)
 # An effect that moves no record by more than its noise is hardly there: the arm is drawn anew until each does.
 LEAST = 1.0
 # By how much a parameter changes from the first record to the last in a trend.
@@ -49,13 +53,13 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
     """Make the files of one campaign of a family, and its entry in the key."""
     family, index = case
     rng = np.random.default_rng([seed, FAMILIES.index(family), index])
-    sets = {"two": suite.pairs, "three": THREE}.get(family, ((),))
-    planted = tuple(signed(suite.kind(name), len(suite.kind(name).sizes), rng) for name in sets[index % len(sets)])
+    planted = planted_in(suite, family, index, rng)
     truth = Case(index, family, planted, bool(index % 2))
     gyro = Gyro(round(float(rng.uniform(*suite.noise_deg_s)), 4), 0.001, suite.bandwidth_hz if index % 2 else 0.0)
     fault = {"kind": FAULTS[index // 2 % len(FAULTS)]} if family == "fault" else {}
     while True:
-        arm, off = off_constants(draw_arm(suite, rng), family, rng)
+        deviation = float(rng.uniform(*DECLARED)) if family in ("drawn", "wrong") else 0.0
+        arm, off = off_constants(draw_arm(suite, rng), family, rng, deviation)
         strokes, duration = six_strokes(rng), round(float(rng.uniform(*suite.duration_s)), 2)
         place = int(rng.integers(len(strokes)))
         moved = [differing(m, fault, rng) if i == place else m for i, (m, _) in enumerate(strokes)]
@@ -89,7 +93,9 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
         if dirt != "none":
             table = dirtied(table, dirt, rng)
         records[i] = replace(each, time_s=table[:, 0], speed_deg_s=table[:, 1])
-    files = campaign_files(f"{family} {index}", gyro, records, ())
+    is_exact = family in BY_TURNS and bool(index // 4 % 2)
+    sheet_of = EXACT if is_exact else ("", "[tolerances]", f"default = {deviation:.6g}") if deviation else ()
+    files = campaign_files(f"{family} {index}", gyro, records, sheet_of)
     # a record that is clipped for long is refused otherwise
     sheet = "campaign.toml"
     files[sheet] = files[sheet].replace("\ngyro_range", "\nmost_lost = 0.9\ngyro_range", 1)
@@ -98,8 +104,18 @@ def make(suite: Suite, seed: int, case: tuple[str, int]) -> tuple[dict[str, str]
     if trend:
         there = truth.effects()
         fault = trend | {"record": f"{trained[-1].name}.csv", "role": "train", "moves": moves(drawn, there, there)}
-    entry = entry_of(truth, drawn, records) | {"fault": fault, "constants": off, "dirt": dirt}
+    entry = entry_of(truth, drawn, records) | {"fault": fault, "constants": off, "dirt": dirt, "exact": is_exact}
     return files, entry
+
+
+def planted_in(suite: Suite, family: str, index: int, rng: np.random.Generator) -> tuple[Planted, ...]:
+    """Return the effects of a campaign: those of a set at their largest, or one of all kinds and strengths."""
+    singles = {"one": suite.effects, "unlisted": suite.unlisted}.get(family)
+    if singles:
+        each = [(kind, strength) for kind in singles for strength in range(1, 1 + len(kind.sizes))]
+        return (signed(*each[int(rng.integers(len(each)))], rng),)
+    sets = {"two": suite.pairs, "three": THREE}.get(family, ((),))
+    return tuple(signed(suite.kind(name), len(suite.kind(name).sizes), rng) for name in sets[index % len(sets)])
 
 
 def moves(drawn: Drawn, effects: Effects, others: Effects) -> float:
@@ -120,14 +136,23 @@ def changed(arm: Any, name: str, share: float) -> Any:
     return replace(arm, **{load: value})
 
 
-def off_constants(arm: Arm, family: str, rng: np.random.Generator) -> tuple[Arm, dict[str, float]]:
-    """Return the arm with one constant, or with all, off by 2 to 5 %; and by how much."""
-    if not family.startswith("constant"):
+def off_constants(
+    arm: Arm, family: str, rng: np.random.Generator, deviation: float
+) -> tuple[Arm, dict[str, float]]:  # fmt: skip
+    """Return the arm with one constant, or with all, off by 2 to 5 %; and by how much.
+
+    drawn: all are off by normal deviates of the declared deviation. wrong: one is off by three of them.
+    """
+    if not family.startswith("constant") and not deviation:
         return arm, {}
     plain = [name for name, value in vars(arm).items() if isinstance(value, float) and name not in PARAMETERS]
     names = [*plain, *(f"{load}.{part}" for load in ("loaded", "empty") for part in ("mass", "lever", "inertia"))]
-    chosen = names if family == "constants" else [names[int(rng.integers(len(names)))]]
-    off = {name: float(rng.uniform(0.02, 0.05) * rng.choice([-1.0, 1.0])) for name in chosen}
+    chosen = names if family in ("constants", "drawn") else [names[int(rng.integers(len(names)))]]
+    if family == "drawn":
+        off = {name: float(deviation * rng.standard_normal()) for name in chosen}
+    else:
+        size = partial(rng.uniform, *((0.02, 0.05) if not deviation else (3.0 * deviation, 3.0 * deviation)))
+        off = {name: float(size() * rng.choice([-1.0, 1.0])) for name in chosen}
     for name, share in off.items():
         arm = changed(arm, name, share)
     return arm, off

@@ -5,8 +5,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from armid.inference.library import Activation
 from armid.inference.model import Fit
 from armid.model import Array
@@ -57,12 +55,6 @@ class Proposal:
     one_sided: bool = False
     joint: bool = False
     grid: Sequence[Activation] = ()
-
-
-def expected(number: float, n: int) -> float:
-    """Return the log prior odds of each of n hypotheses of which so many are expected to hold."""
-    p = min(number / max(n, 1), 0.5)
-    return float(np.log(p / (1.0 - p)))
 
 
 def log_prior(model: Hypotheses) -> float:

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
+from armid.inference.calibration import calibration
 from armid.inference.checks import is_certain
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
@@ -25,12 +26,9 @@ CONSTANTS = "constants within tolerances"
 
 @dataclass(frozen=True, eq=False)
 class Atom:
-    """Hold one model of the mixture: its log weight, its hypotheses, means and deviations of the parameters.
+    """Hold one model of the mixture: its hypotheses, their log prior odds, means and deviations of the parameters."""
 
-    log_prior: log prior odds of its hypotheses, part of the weight.
-    """
-
-    log_weight: float
+    log_evidence: float
     log_prior: float
     names: frozenset[tuple[str, str]]
     mean: Array
@@ -39,14 +37,19 @@ class Atom:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Hold the mixture. parameters: names of those of the declared model, in the order of the atoms' values."""
+    """Hold the mixture.
+
+    parameters: names of those of the declared model, in the order of the atoms' values. temperature: log evidence is
+    divided by it.
+    """
 
     atoms: tuple[Atom, ...]
     parameters: tuple[str, ...]
+    temperature: float = 1.0
 
     @cached_property
     def weights(self) -> Array:
-        each = np.array([a.log_weight for a in self.atoms])
+        each = np.array([a.log_evidence / self.temperature + a.log_prior for a in self.atoms])
         return np.asarray(np.exp(each - logsumexp(each)))
 
     @cached_property
@@ -101,7 +104,7 @@ class Posterior:
         noise: deviation by noise alone, SI. beside: what else the most probable model has as unknowns.
         """
         i = self.parameters.index(parameter)
-        best = max(self.atoms, key=lambda a: a.log_weight)
+        best = self.atoms[int(np.argmax(self.weights))]
         means, deviations = (np.array([getattr(a, what)[i] for a in self.atoms]) for what in ("mean", "deviation"))
         whole, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), best.deviation[i] ** 2
         if max(whole, own) <= 0.0:
@@ -135,9 +138,9 @@ def posterior(found: Exploration) -> Posterior:
         about = expansion_of(found.fits[model], scale, library)
         mean, covariance = of_parameters(about, own)
         names = frozenset(h.public for h in model) | left
-        atoms.append(Atom(value, log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
+        atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
         atoms += beside(found, model, value, about, own, mean, covariance, top, left)
-    return Posterior(tuple(atoms), own)
+    return Posterior(tuple(atoms), own, calibration().temperature)
 
 
 def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
@@ -174,9 +177,9 @@ def beside(
                     strength, deviation = truncated(float(strength), float(deviation))
                 moved = -span * answer * strength
                 spread = (span * answer * deviation) ** 2
-            atoms.append(Atom(weight + float(ahead.log_factor[i, k]), log_prior(model | {hypothesis}),
-                              names | {hypothesis.public}, mean + moved, np.sqrt(np.diag(covariance) + spread)))
-            # fmt: skip
+            prior = log_prior(model | {hypothesis})
+            atoms.append(Atom(weight - prior + float(ahead.log_factor[i, k]), prior, names | {hypothesis.public},
+                              mean + moved, np.sqrt(np.diag(covariance) + spread)))  # fmt: skip
     return atoms
 
 

@@ -17,7 +17,6 @@ from armid.inference.evidence import (
     Expansion,
     Forecast,
     Scale,
-    doubts_of,
     expansion_of,
     forecast,
     log_evidence,
@@ -29,7 +28,7 @@ from armid.inference.library import EffectKey, Library
 from armid.inference.model import Fit
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
-from armid.inference.unknowns import Unknown, constants_of, freed
+from armid.inference.unknowns import Unknown, constants_of, freed, moved
 from armid.model import Array
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
@@ -49,6 +48,8 @@ SAMPLES, FEWEST_EXPANDED = 4_000, 8
 HOPELESS = 60.0
 # A model is brought to its estimate at most so often in turn.
 MOST_COMPLETED = 4
+# Rivals that differ from the best model in one name and are brought to their estimates.
+N_TWINS = 3
 # Models of each size that are expanded outside the window where more than noise is left.
 BEAM = 3
 
@@ -143,7 +144,8 @@ def add_unknown(found: Exploration) -> bool:
     if not is_significant(found.fits[ranked[0][0]]) or any(h.kind == "unknown" for m in found.fits for h in m):
         return False
     library, scale, before = found.library, found.scale(), len(found.fits)
-    best = [m for m, _ in ranked[:N_BESIDE]] + [m for m, _ in ranked if not m]
+    # The last name may stand for what has none, so that a model without it is asked as well.
+    best = [*(m for m, _ in ranked[:N_BESIDE]), *simpler(found, ranked[0][0]), frozenset[Hypothesis]()]
     for model in dict.fromkeys(best):
         fit = found.fits[model]
         about = expansion_of(fit, scale, library)
@@ -282,10 +284,14 @@ def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposa
         hypothesis = next((h for h in model if h.means == key.declared), None)
         if hypothesis is None:
             continue
-        about = Expansion(fit, scale, found.library, doubts_of(fit, found.library), key)
+        # Constants that are free to stand in for either make twins look like strangers.
+        none = np.empty((len(fit.residual), 0))
+        about = Expansion(replace(fit, others=()), scale, found.library, none, key)
         others = {k.public for k in fit.active if k != key}
-        each = [likest(about, p) for p in proposals if p.hypothesis.name not in others]
-        each.sort(key=lambda pair: -pair[0])
+        wide = effects.propose_with_free_shapes(fit, key, found.known, found.library)
+        each = [likest(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
+        each.sort(key=lambda pair: pair[0])
+        each = list({one[1].hypothesis: one for one in each}.values())[::-1]
         forms = [one for one in each if one[1].hypothesis.name == hypothesis.name]
         for _, proposal, variant, strength in [*forms, *each[:N_SWAPPED]]:
             other = model - {hypothesis} | {proposal.hypothesis}
@@ -389,10 +395,27 @@ def finish_all(found: Exploration) -> None:
         ranked = found.ranked()
         todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(found, m)
                 and not is_outdone(m, value, ranked)]  # fmt: skip
+        # A second name must not stand for a shape of the first that was held.
+        best, top = ranked[0]
+        todo += [m for m in simpler(found, best) if not is_complete(found, m) and has_shapes(found, m)]
+        # Nor must a name stand for its twin, whose rough fit may be far from its estimate.
+        twins = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
+        todo += [m for m in twins[:N_TWINS] if m not in todo and not is_complete(found, m) and has_shapes(found, m)]
         if not todo:
             return
         for model in todo:
             complete(found, model)
+
+
+def simpler(found: Exploration, model: Hypotheses) -> list[Hypotheses]:
+    """Return the known models that lack one effect of a model, the most probable first."""
+    less = [model - {h} for h in sorted(model) if h.kind == "effect" and model - {h} in found.fits]
+    return sorted(less, key=lambda m: -found.log_posterior(m))
+
+
+def has_shapes(found: Exploration, model: Hypotheses) -> bool:
+    """Tell whether an effect of a model has a shape that its declaration holds, so that a rough fit says little."""
+    return any(found.library.fixed_shapes(key) for key in found.fits[model].active)
 
 
 def is_complete(found: Exploration, model: Hypotheses) -> bool:
@@ -420,13 +443,33 @@ def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: 
     """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls."""
     if fit.records.data.cover is not None:
         return replace(fit, rough=False)
-    done = finished(fit, library)
-    for key in done.active:
+    # Constants may have made up for a shape that was held: without them it finds its own size.
+    is_freed = any(f.unknown.name.startswith(NAMED) for f in fit.others)
+    is_shaped = any(library.fixed_shapes(key) for key in fit.active)
+    afresh = begun_again(fit, library, weight) if is_shaped and is_freed else None
+    starts = [fit] if afresh is None else [fit, afresh]
+    each = [with_constants(with_fitted_shapes(finished(start, library), library), constants, weight)
+            for start in starts]  # fmt: skip
+    return min(each, key=lambda done: done.chi2 + sum(f.value**2 for f in done.others) / weight)
+
+
+def begun_again(fit: Fit, library: Library, weight: float) -> Fit | None:
+    """Return a model fitted with its constants and shapes at their declared values, its other unknowns as they are."""
+    assert fit.base is not None
+    kept = tuple(f for f in fit.others if not f.unknown.name.startswith(NAMED))
+    records = moved(fit.base, [f.unknown for f in kept], [f.value for f in kept])
+    plain = replace(fit, records=records, others=kept, constants={}, base=fit.base if kept else None)
+    return near(plain, tuple(replace(k, free_shape=False) for k in fit.active), fit.values, library, weight)
+
+
+def with_fitted_shapes(fit: Fit, library: Library) -> Fit:
+    """Return a fit with the fixed shapes of its effects free, of each effect where chi2 falls."""
+    for key in fit.active:
         if not key.free_shape and library.fixed_shapes(key):
-            wide = unless_diverged(partial(reshaped, done, key, library))
-            if wide is not None and wide.chi2 < done.chi2 * (1.0 - 2.0 / len(done.residual)):
-                done = wide
-    return with_constants(done, constants, weight)
+            wide = unless_diverged(partial(reshaped, fit, key, library))
+            if wide is not None and wide.chi2 < fit.chi2 * (1.0 - 2.0 / len(fit.residual)):
+                fit = wide
+    return fit
 
 
 def reshaped(fit: Fit, key: EffectKey, library: Library) -> Fit:

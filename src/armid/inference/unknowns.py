@@ -23,7 +23,7 @@ from armid.problem.starts import fits_starts, with_starts
 # Step of the differences, and the farthest step of a turn, in prior standard deviations.
 STEP, FARTHEST = 1e-2, 3.0
 # Turns at most, those of a rough fit, and the fall of the sum of squares at which they end.
-MOST_TURNS, MOST_ROUGH, SETTLED = 8, 3, 0.02
+MOST_TURNS, MOST_ROUGH, MOST_INNER, SETTLED = 8, 3, 6, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def freed(
         records = moved(base, unknowns, values)
         columns = columns_about(base.plain, unknowns, values, z, kept)
         posed = about_known(records, columns, values, weight)
-        new_z = descend(posed, [z], tolerance, limit=limit) if len(z) else z
+        new_z = descend(posed, [z], tolerance, limit=limit, most=MOST_INNER) if len(z) else z
         residual = records.plain.residuals(new_z)[0] + columns @ values
         best = np.linalg.solve(np.eye(len(unknowns)) / weight + columns.T @ columns, columns.T @ residual)
         step, best_cost, share = best - values, np.inf, 1.0

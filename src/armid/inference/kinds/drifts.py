@@ -6,8 +6,9 @@ from functools import partial
 import numpy as np
 
 from armid.estimation.constants import Product, moved_replays
+from armid.inference.calibration import calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.kinds.faults import simulated_file, with_measured
 from armid.inference.library import Library
 from armid.inference.model import Fit
@@ -16,7 +17,6 @@ from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-EXPECTED = 0.03
 # A drift is asked of so many files.
 FEWEST = 4
 # Its largest plausible size, as a share of the range or of the constant; prior deviations as shares of that.
@@ -59,7 +59,7 @@ def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
         return []
     own = [OfParameter(name) for name in fit.values if library.owner(name) is None]
     own += [OfParameter(p.public, p) for p in fit.products(library.tolerances)]
-    return [Hypothesis("drift", one.name, "", expected(EXPECTED, len(own)), one) for one in own]
+    return [Hypothesis("drift", one.name, "", calibration().log_odds("drift", len(own)), one) for one in own]
 
 
 def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:

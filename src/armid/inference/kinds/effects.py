@@ -6,8 +6,9 @@ from functools import partial
 import numpy as np
 
 from armid.estimation.least_squares import descend
+from armid.inference.calibration import calibration
 from armid.inference.evidence import SCALES, Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import EffectKey, Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
 from armid.inference.refit import free_values, responses, unless_diverged
@@ -15,8 +16,6 @@ from armid.inference.unknowns import freed, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-# Effects that a campaign is expected to lack, of all in the library.
-EXPECTED = 1.5
 # Shares of the range over which a strength is tried: a slope, and two secants where the answer is no straight line.
 SLOPE = 1e-3
 SHARES = (SLOPE, 0.05, 0.4)
@@ -31,14 +30,12 @@ def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
 
     That a user asks for a few candidates makes none of them more probable: the whole library shares what is expected.
     """
-    names = library.known_names
-    forms = [key.public for key in library.candidates]
+    n, forms = len(library.known_names), [key.public for key in library.candidates]
+    odds = {name: library.log_odds(name, calibration().log_odds("effect", n, name)) for name in dict.fromkeys(forms)}
     return {
-        key: Hypothesis("effect", key.public, key.form,
-                        library.log_odds(key.public, expected(EXPECTED, len(names))) - np.log(forms.count(key.public)),
-                        key)
+        key: Hypothesis("effect", key.public, key.form, odds[key.public] - np.log(forms.count(key.public)), key)
         for key in library.candidates
-    }  # fmt: skip
+    }
 
 
 def propose(fit: Fit, known: dict[EffectKey, Hypothesis], library: Library) -> list[Proposal]:
@@ -50,6 +47,24 @@ def propose_forms(fit: Fit, known: dict[EffectKey, Hypothesis], library: Library
     """Return the other forms of the effects of a fit."""
     mine, names = {key.declared for key in fit.active}, {key.public for key in fit.active}
     return proposals(fit, [k for k in library.candidates if k.public in names and k not in mine], known, library)
+
+
+def propose_with_free_shapes(
+    fit: Fit, key: EffectKey, known: dict[EffectKey, Hypothesis], library: Library
+) -> list[Proposal]:  # fmt: skip
+    """Return the effects with a held shape that one of a fit has free, such as a width of a sign, theirs free as well.
+
+    With another width a twin would look like a stranger.
+    """
+    if not key.free_shape:
+        return []
+
+    def shapes(k: EffectKey) -> set[str]:
+        return {name.rpartition(".")[2] for name in library.fixed_shapes(k)}
+
+    rivals = [k for k in library.joinable(fit.active) if shapes(k) & shapes(key)]
+    each = library.each(lambda k: proposal(fit, known[k], replace(k, free_shape=True), library), rivals)
+    return [p for p in each if p is not None]
 
 
 def proposals(

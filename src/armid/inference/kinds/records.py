@@ -5,8 +5,9 @@ from functools import partial
 
 import numpy as np
 
+from armid.inference.calibration import calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.kinds.faults import Fault, column_of, faults_of, moved_by, with_record
 from armid.inference.library import Library
 from armid.inference.model import Fit, fit_from
@@ -15,8 +16,6 @@ from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-# Faults that a campaign is expected to have, of all that may be wrong in its records.
-EXPECTED = 0.15
 # What moves its record by less than this many times its noise is no fault.
 MOVES = 0.7
 # Prior deviations of a size, as shares of the largest plausible one.
@@ -60,7 +59,7 @@ def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
             place = f"{record.file}:{record.output}" if fault.kind in ("offset", "drift", "gain") else record.file
             name = f"{fault.kind}{'_' if fault.constant else ''}{fault.constant}@{place}"
             found.append((name, OfRecord(index, fault, largest)))
-    return [Hypothesis("record", name, "", expected(EXPECTED, len(found)), what) for name, what in found]
+    return [Hypothesis("record", name, "", calibration().log_odds("record", len(found)), what) for name, what in found]
 
 
 def propose(fit: Fit, known: list[Hypothesis], library: Library) -> list[Proposal]:

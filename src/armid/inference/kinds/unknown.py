@@ -10,8 +10,9 @@ from functools import lru_cache, partial
 import numpy as np
 from scipy.linalg import block_diag
 
+from armid.inference.calibration import calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
 from armid.inference.missing_signal import Segment, motions, segments
 from armid.inference.model import Fit, fit_from
@@ -19,7 +20,6 @@ from armid.inference.refit import candidate_at, free_values, unless_diverged
 from armid.inference.whitening import Cover
 from armid.model import Array
 
-EXPECTED = 0.05
 # Prior deviations: rms by which the signal moves all records, in units of the noise.
 SCALES = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 # Lengths over which the signal forgets, as shares of the median duration of a piece; of a curve, of its range.
@@ -110,7 +110,7 @@ def propose(fit: Fit, library: Library) -> list[Proposal]:
         return []
     known = signals_without_form(fit, library).columns
     return [
-        Proposal(Hypothesis("unknown", port, variable, expected(EXPECTED, len(known)), (port, variable)),
+        Proposal(Hypothesis("unknown", port, variable, calibration().log_odds("unknown", len(known)), (port, variable)),
                  column.T, SCALES, np.zeros(1), partial(refit, library, (port, variable)), joint=True)
         for (port, variable), column in known.items()
     ]  # fmt: skip

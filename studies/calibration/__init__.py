@@ -1,0 +1,9 @@
+"""Are the probabilities of the closed loop to be bet on, and do its intervals hold? The six scores, and their fit.
+
+    python studies/calibration/run.py FOLDER --seed 1 --size 150 [--jobs 2]    campaigns, closed one by one; goes on
+    python studies/calibration/fit.py FOLDER                                   temperature and priors by kind
+    python studies/calibration/score.py FOLDER --out results/calibration       the scores, with their intervals
+
+All campaigns are synthetic. Two simulators that share no code with armid make them: `studies/stand` an arm,
+`studies/machines` eight other machines. Read `campaigns`, `run`, `truth`, `scores`, `score`, `fit`.
+"""
