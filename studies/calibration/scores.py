@@ -58,6 +58,12 @@ class Closed:
         """Tell whether the model in force misses the records by more than noise."""
         return bool(self.said["leaves_more"])
 
+    @property
+    def leaves_declared(self) -> bool:
+        """Tell whether a planted effect moves a record by clearly more than its noise."""
+        moves = [effect.get("moves", MOVES + 1.0) for effect in self.entry["effects"]]
+        return any(move > MOVES for move in moves)
+
     def pairs(self) -> list[tuple[float, float]]:
         """Return the probability of each effect that counts, and how true it is."""
         return [(p, self.truth.share(name, self.chances)) for name, p in self.chances.items() if p >= COUNTS]

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from armid.inference.calibration import Calibration, calibration
 from armid.inference.evidence import Expansion, Scale, forecast
-from armid.inference.hypothesis import Hypothesis, Proposal, expected
+from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.posterior import Atom, Posterior, truncated
 from armid.inference.whitening import Cover
 
@@ -98,11 +99,22 @@ def test_unknowns_that_are_projected_out_are_those_of_a_joint_fit():
 
 
 def test_prior_odds_are_shared_out():
-    assert np.exp(expected(0.7, 36)) == pytest.approx((0.7 / 36) / (1 - 0.7 / 36))
+    beliefs = Calibration(1.0, {"effect": 0.7}, {"coulomb": 4.0})
+    odds = (0.7 / 36) / (1 - 0.7 / 36)
+    assert np.exp(beliefs.log_odds("effect", 36)) == pytest.approx(odds)
+    assert np.exp(beliefs.log_odds("effect", 36, "coulomb")) == pytest.approx(4.0 * odds)
+    assert set(calibration().expected) == {"effect", "record", "drift", "unknown"}
+
+
+def test_a_temperature_makes_evidence_weaker_and_leaves_the_prior():
+    atoms = tuple(Atom(e, p, frozenset({("effect", n)}), np.zeros(1), np.ones(1))
+                  for e, p, n in ((np.log(9.0), 0.0, "a"), (0.0, np.log(2.0), "b")))  # fmt: skip
+    assert Posterior(atoms, ("p",)).weights == pytest.approx([9 / 11, 2 / 11])
+    assert Posterior(atoms, ("p",), 2.0).weights == pytest.approx([3 / 5, 2 / 5])
 
 
 def test_the_mixture_has_the_quantiles_of_its_samples():
-    atoms = tuple(Atom(np.log(w), frozenset({("effect", n)}), np.array([m]), np.array([s]))
+    atoms = tuple(Atom(np.log(w), 0.0, frozenset({("effect", n)}), np.array([m]), np.array([s]))
                   for w, n, m, s in ((6.0, "a", 0.0, 1.0), (3.0, "b", 5.0, 0.5), (1.0, "c", -8.0, 2.0)))  # fmt: skip
     found = Posterior(atoms, ("p",))
     drawn = np.concatenate([RNG.normal(m, s, n) for n, m, s in ((600_000, 0, 1), (300_000, 5, 0.5), (100_000, -8, 2))])
@@ -114,18 +126,20 @@ def test_the_mixture_has_the_quantiles_of_its_samples():
 
 def test_the_causes_of_a_width_are_shares_of_it():
     """Two models as probable, far apart: their distance is nearly all, and no more than all."""
-    atoms = tuple(Atom(0.0, frozenset({("effect", n)}), np.array([m]), np.ones(1)) for n, m in (("a", 0.0), ("b", 9.0)))
+    atoms = tuple(
+        Atom(0.0, 0.0, frozenset({("effect", n)}), np.array([m]), np.ones(1)) for n, m in (("a", 0.0), ("b", 9.0))
+    )
     causes = dict(Posterior(atoms, ("p",)).causes("p", 1.0))
     assert causes["noise"] == pytest.approx(1.0 / (1.0 + 4.5**2))
     assert sum(causes.values()) == pytest.approx(1.0)
     # one model is in force, and another, sharper one has nearly all of the weight
-    atoms = (Atom(0.0, frozenset(), np.zeros(1), np.array([0.1])), atoms[1])
+    atoms = (Atom(0.0, 0.0, frozenset(), np.zeros(1), np.array([0.1])), atoms[1])
     assert all(share <= 1.0 for share in dict(Posterior(atoms, ("p",)).causes("p", 30.0)).values())
 
 
 def test_names_count_only_in_sets_without_an_unknown_signal():
     plain, beside = frozenset({("effect", "a")}), frozenset({("effect", "a"), ("unknown", "torque")})
-    found = Posterior(tuple(Atom(0.0, names, np.zeros(1), np.ones(1)) for names in (plain, beside)), ("p",))
+    found = Posterior(tuple(Atom(0.0, 0.0, names, np.zeros(1), np.ones(1)) for names in (plain, beside)), ("p",))
     assert found.probability("effect", "a") == pytest.approx(0.5)
     assert found.probability("unknown") == pytest.approx(0.5)
 

@@ -29,7 +29,7 @@ def posterior(*sets):
         kind, colon, name = word.partition(":")
         return (kind, name) if colon else ("effect", kind)
 
-    atoms = (Atom(np.log(p), frozenset(map(named, names.split())), np.zeros(1), np.ones(1)) for names, p in sets)
+    atoms = (Atom(np.log(p), 0.0, frozenset(map(named, names.split())), np.zeros(1), np.ones(1)) for names, p in sets)
     return Posterior(tuple(atoms), ("mass",))
 
 
