@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from armid.inference import infer, search
+from armid.inference.decisions import WINDOW
 from armid.inference.hypothesis import Hypothesis
 from armid.inference.library import EffectKey, Library
 from armid.inference.refit import best_along
-from armid.inference.search import BEAM, MOST_EFFECTS, WINDOW, Exploration, is_outdone, next_model
+from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, is_outdone, next_model
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 

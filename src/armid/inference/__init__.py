@@ -6,7 +6,8 @@ infer         the whole way: campaign -> probabilities and intervals
 whitening     train records with their noise -> residuals whose noise is white
 library       the candidate effects, compiled together and ready to be tried
 hypothesis    what may be true of the machine or its records beside the declared model
-calibration   what is believed before the records are read, from calibration.toml
+calibration   what is believed before the records are read, from calibration.toml; `decisions`: all other numbers that
+              decide
 kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form
 model         a model at its estimate; `unknowns`: constants, faults and drifts, fitted with their priors
 evidence      how probable the records are in a model, and what a hypothesis more would do to that

@@ -6,17 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from armid.inference.checks import Residuals
+from armid.inference.decisions import EXPLAINS, NOT_CARRIED, OUTSIDE
 from armid.inference.model import Fit
 from armid.inference.whitening import WhiteRecords
 from armid.units import shown
-
-# A record does not carry over where its error is so many times that of the train records. Records of one machine
-# differ by less as their motion does (measured: 1.5 times on EMPS, 1.6 on the pendulum); ten times were not reported.
-FACTOR = 2.0
-# A variable leaves the range of the train records where it exceeds that by this share of the range.
-OUTSIDE = 0.1
-# A change of one parameter is told where it takes away this share of the squared error of a record.
-SHARE = 0.9
 
 
 @dataclass(frozen=True)
@@ -72,7 +65,7 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
         inside = slice(int(edges[i]), int(edges[i + 1]))
         # Divided by noise and doubt together: the start of a held-out record is known from few samples.
         factor = float(np.sqrt(np.mean(holdout.residual[inside] ** 2))) / known.get(replay.place, 1.0)
-        if not np.isfinite(factor) or factor <= FACTOR:
+        if not np.isfinite(factor) or factor <= NOT_CARRIED:
             continue
         output = outputs[replay.place]
         before = train.errors.outputs[output].rmse if output in train.errors.outputs else holdout.noise_of[output]
@@ -121,6 +114,6 @@ def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
             continue
         moved = float(column @ own) / square
         taken = moved**2 * square / total
-        if taken > SHARE:
+        if taken > EXPLAINS:
             found[name] = (taken, moved * float(fit.records.span[i]) / abs(value))
     return {name: change for name, (_, change) in sorted(found.items(), key=lambda pair: -pair[1][0])}

@@ -13,6 +13,7 @@ from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
+from armid.inference.decisions import CERTAIN, SIGNIFICANCE
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_samples
@@ -21,10 +22,6 @@ from armid.problem.problem import Replay
 from armid.record import Record
 from armid.record.noise import memory_of
 
-# Chance of a false alarm, all tests together.
-SIGNIFICANCE = 0.005
-# Below this no number of tests makes up for it.
-CERTAIN = 1e-7
 LAGS, N_BINS = 40, 12
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
 # Neighbouring ordinates of a tapered periodogram tell partly the same; a band needs so many of the rest.

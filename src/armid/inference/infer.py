@@ -13,6 +13,7 @@ from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import Estimates, with_fitted_starts
+from armid.inference.decisions import LISTED, MENTIONED
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.library import Library, constant_effects, library_of
@@ -28,10 +29,6 @@ from armid.record import Campaign
 
 # By which factor strengths that scale with the machine may exceed their declared range.
 REACH = 16.0
-# Sets and hypotheses of a smaller probability are not listed.
-LISTED = 0.01
-# Where something unknown is as probable as this, what models predict decides which one is put in force.
-PREDICTS = 0.5
 # Names in the sentence that leads.
 MOST_TOLD = 5
 
@@ -67,7 +64,7 @@ class Inference:
     def in_force(self) -> Hypotheses:
         """The most probable model of which every part has a name; where none is right, the one that predicts best."""
         named = [m for m, _ in self.found.ranked() if not any(h.kind == "unknown" for h in m)]
-        if self.posterior.probability("unknown") < PREDICTS:
+        if self.posterior.probability("unknown") < MENTIONED:
             return named[0]
         return predicting_best(named, self.found.fits, self.found.library)
 

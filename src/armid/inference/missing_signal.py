@@ -23,7 +23,7 @@ from armid.record import Piece
 MOST_KNOTS = 600
 KNOT_S, MOST_KNOTS_OF_A_PIECE = 0.02, 240
 # A test signal may move the output by this share of the speed scale: far above rounding, hardly beyond linearity.
-MOVES = 1e-4
+MOVED = 1e-4
 SIZES = 10.0 ** np.arange(-12.0, 10.0)
 PROBE = "probe_"
 # Ports whose signals correlate above this are one; variables whose ranks do are one.
@@ -209,7 +209,7 @@ class Probe:
         run = self.run(segment, SIZES, float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
         signals, size = run.joint(self.model.plant.sizes), self.model.plant.sizes[0]
         moved = np.abs(signals[1:] - signals[0]).max(axis=1)
-        small = np.isfinite(moved) & (moved <= MOVES * size) & (moved > 0.0)
+        small = np.isfinite(moved) & (moved <= MOVED * size) & (moved > 0.0)
         return float(SIZES[small][-1]) if small.any() else None
 
     def gain(self, segment: Segment, size: float) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 
 from armid.estimation.constants import NAMED
 from armid.inference.checks import is_significant
+from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
 from armid.inference.evidence import (
     Expansion,
     Forecast,
@@ -32,10 +33,6 @@ from armid.inference.unknowns import Unknown, constants_of, freed, moved
 from armid.model import Array
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
-# A model is expanded whose posterior is above this share of the best one's.
-WINDOW = float(np.log(100.0))
-# What is more probable than this to first order, beside a model, is fitted.
-REFITTED = float(np.log(0.02))
 # Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
 N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED = 8, 3, 3, 3
 # Best models beside which a signal without a form is fitted.
@@ -44,8 +41,6 @@ N_BESIDE = 2
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
 # Of records with more samples than this fewer models are expanded, but for so many.
 SAMPLES, FEWEST_EXPANDED = 4_000, 8
-# In log units: a fit that is so far behind the best is given up.
-HOPELESS = 60.0
 # A model is brought to its estimate at most so often in turn.
 MOST_COMPLETED = 4
 # Rivals that differ from the best model in one name and are brought to their estimates.

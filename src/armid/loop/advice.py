@@ -5,14 +5,13 @@ from collections.abc import Callable
 import numpy as np
 
 from armid.estimation.advice import Advice, Rival, advise
+from armid.inference.decisions import WINDOW
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference
 from armid.model import Array
 
 # Manoeuvres that are told, and models between which one is to decide.
 MOST_ADVICE, MOST_RIVALS = 5, 4
-# Log posterior by which a model may be behind the best to be a rival.
-BEHIND = float(np.log(100.0))
 
 
 def advice_on(
@@ -43,7 +42,7 @@ def rivals_of(found: Inference) -> list[Rival]:
     rivals: dict[str, Rival] = {}
     for model, p in ranked:
         name = words(model)
-        if ranked[0][1] - p > BEHIND or len(rivals) == MOST_RIVALS:
+        if ranked[0][1] - p > WINDOW or len(rivals) == MOST_RIVALS:
             break
         fit = found.found.fits[model]
         # What a sample counts, and one of a record like these will: less than 1 where more than noise is left.

@@ -15,6 +15,7 @@ from armid.estimation.mends import Suspicion
 from armid.estimation.screen import AS_GOOD, given_twice, screen
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
+from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WITHIN
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.infer import Inference, inferred, prepared
 from armid.inference.library import Library, calibrated_replays
@@ -26,12 +27,10 @@ from armid.loop.advice import advice_on
 from armid.loop.common_factors import known_together
 from armid.loop.result import (
     CARRIES_NOT,
-    CLAIMED,
     DISAGREES,
     EXPLAINED,
     HELD,
     IMPLAUSIBLE,
-    MENTIONED,
     NO_DISCREPANCY,
     PARTLY,
     TOO_ALIKE,
@@ -46,10 +45,6 @@ from armid.loop.suspects import broken_suspects, suspects_of
 from armid.model import Effect, Model
 from armid.record import Campaign, Record
 
-# Half the 95 % interval of a parameter that is trusted may be this share of its value.
-WITHIN = 0.05
-# Held-out records deny a step with which their error is so many times that before, and that of the noise.
-DENIED, OVER_NOISE = 1.02, 1.1
 # Mistakes of the screen of records that leave nothing to search for, and what it tells whatever the loop finds.
 GROSS = ("sign", "unit", "time", "angle", "exchanged", "input", "position")
 OF_SIZE = ("unit", "angle", "input")

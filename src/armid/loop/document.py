@@ -10,13 +10,13 @@ from armid.errors import ArmidError
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
 from armid.inference.carry_over import missed_sentences
-from armid.inference.checks import SIGNIFICANCE, Finding, Residuals, time_in_words
+from armid.inference.checks import Finding, Residuals, time_in_words
+from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
-from armid.inference.infer import LISTED, Inference, sentence_of
+from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
 from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
-    CARRIED,
     CARRIES_NOT,
     DISAGREES,
     EXPLAINED,
@@ -65,7 +65,7 @@ TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort
 SHIFTED = 0.01
 MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
 # A manoeuvre that separates rivals with a smaller chance is no advice.
-HOPELESS = 0.2
+WEAK = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
 # A smaller share would read as 0 %.
@@ -306,7 +306,7 @@ def advice_table(advice: list[Mapping[str, Any]], words: list[str]) -> Table:
 
 def advice_sentence(best: Mapping[str, Any], words: str) -> str:
     names = " and ".join(best["separates"])
-    if best["power"] < HOPELESS:
+    if best["power"] < WEAK:
         return (f"No manoeuvre that this machine can make is likely to separate {names}: the best, {words}, has a "
                 f"chance of {best['power']:.0%}.")  # fmt: skip
     return f"A record of this manoeuvre would separate {names} with a chance of {best['power']:.0%}: {words}."
@@ -391,7 +391,7 @@ def nothing_missing(found: ClosedLoop) -> str:
     if not found.after.significant:
         return "What the declared model leaves is noise: nothing is missing that these records could show."
     return ("What the declared model leaves on the train records is noise: nothing is missing that they could show. "
-            f"Those held out are missed by more than noise, but by less than {CARRIED:g} times, as a prediction may "
+            f"Those held out are missed by more than noise, but by less than {OVER_NOISE:g} times, as a prediction may "
             "be.")  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from armid.estimation.identify import JointErrors, errors_by_file, errors_entry,
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, missed_records
 from armid.inference.checks import Diagnosis, Residuals
+from armid.inference.decisions import CLAIMED, MENTIONED, OVER_NOISE
 from armid.inference.hypothesis import Hypotheses, words
 from armid.inference.infer import Inference
 from armid.inference.library import Library
@@ -28,10 +29,6 @@ IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAI
     "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
     "partly_explained", "unexplained", "cannot_tell_apart",
 )  # fmt: skip
-# Where train is noise, held-out records may be simulated worse than their noise by this factor.
-CARRIED = 1.1
-# Probability from which on a name is claimed, and from which on a verdict or a fault is told.
-CLAIMED, MENTIONED = 0.95, 0.5
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
@@ -108,7 +105,7 @@ class Judgement:
         # what differences tell of the noise is the least that it can be
         seen = self.train_error.outputs
         least = {n: max(rms, seen[n].rmse if n in seen else 0.0) for n, rms in unseen.noise_of.items()}
-        return any(e.rmse > CARRIED * least[n] for n, e in unseen.errors.outputs.items())
+        return any(e.rmse > OVER_NOISE * least[n] for n, e in unseen.errors.outputs.items())
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armid.estimation.information import NORMAL_95
+from armid.inference.decisions import AS_WELL
 from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.infer import Inference
@@ -17,8 +18,6 @@ from armid.record import Record
 from armid.units import shown
 
 FREED, LEFT_OUT = "freed", "left_out"
-# Another drift of this probability does as well.
-AS_WELL = 0.05
 
 
 @dataclass(frozen=True)

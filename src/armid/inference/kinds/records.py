@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from armid.inference.calibration import calibration
+from armid.inference.decisions import MOVES
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.kinds.faults import Fault, column_of, faults_of, moved_by, with_record
@@ -16,8 +17,6 @@ from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-# What moves its record by less than this many times its noise is no fault.
-MOVES = 0.7
 # Prior deviations of a size, as shares of the largest plausible one.
 SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
 

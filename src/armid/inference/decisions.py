@@ -1,0 +1,41 @@
+"""Every number with which the loop and its inference compare to decide, in one list.
+
+Priors and temperature stand in `calibration.toml`. Numerics, layout and budgets of computing are no decisions and stand
+where they are used. `estimation/screen.py` and `mends.py` keep the numbers of the data checks.
+"""
+
+import math
+
+# Probability from which a name is claimed. Of claims 97 % are to be true; results/calibration counts them.
+CLAIMED = 0.95
+# Probability from which a fault or something unknown enters the verdict: more likely than not.
+MENTIONED = 0.5
+# Probability from which a name is listed: what is rarer would fill the page, 40 names share the rest.
+LISTED = 0.01
+# Share of its value within which an interval lies on either side where a parameter is trusted; `--within` changes it.
+WITHIN = 0.05
+# Held-out error over that of the model before, from which a step is rejected: errors of sound steps scatter by 2 %.
+DENIED = 1.02
+# Error over noise up to which records are simulated at their noise: the noise of a short rest is known to 10 %.
+OVER_NOISE = 1.1
+# Probability of a false alarm of the tests for whiteness, all together: one in 200 sound campaigns.
+SIGNIFICANCE = 0.005
+# p-value below which more than noise is left whatever the evidence says: no number of tests makes up for it.
+CERTAIN = 1e-7
+# Change of a record over its noise (rms) from which it is faulty: below it undoing a fault gains by smoothing alone.
+MOVES = 0.7
+# Log posterior odds within which models are expanded, and count as rivals for the next record (Madigan, Raftery 1994).
+WINDOW = math.log(100.0)
+# Log probability from which an addition is fitted: forecasts err by 2 units of log, and a claim needs the other 95 %.
+REFITTED = math.log(0.02)
+# Log units behind the best model at which a fit is given up: forecasts and rough fits err by less.
+HOPELESS = 60.0
+# Probability of a drift of another parameter from which both are named: the complement of a claim.
+AS_WELL = 1.0 - CLAIMED
+# Held-out error over that of the train records from which it is reported; between records of EMPS it is 1.5, of the
+# pendulum 1.6, and ten times went unreported.
+NOT_CARRIED = 2.0
+# Share of the trained range by which a held-out record leaves it where this is reported as new.
+OUTSIDE = 0.1
+# Share of the squared error of a held-out record that one changed parameter takes away where it is named.
+EXPLAINS = 0.9

@@ -1,0 +1,97 @@
+"""Fit temperature and priors by kind to closed campaigns, and print `calibration.toml`.
+
+    python studies/calibration/fit.py FOLDER
+
+The models of each mixture are weighted anew by log evidence / temperature + log prior odds. What is minimised is the
+mean log score of all statements: each effect, each faulty record, something unknown (Good 1952).
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import logsumexp
+
+from armid.inference.calibration import calibration
+from calibration.campaigns import tasks
+from calibration.score import closed_of, file_of, read
+from calibration.scores import Closed
+
+KINDS = ("effect", "record", "drift", "unknown")
+# A probability counts as no surer than this, so that no single campaign decides.
+SUREST = 1e-3
+
+
+def main(words: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(prog="fit.py", description="Fit temperature and priors by kind.")
+    parser.add_argument("folder", type=Path)
+    folder = parser.parse_args(words).folder
+    plan = json.loads((folder / "plan.json").read_text())
+    there = [(task, *read(folder, task)) for task in tasks(plan["size"]) if file_of(folder, task).exists()]
+    every = [Mixture(closed_of(task, entry, said)) for task, entry, said in there if "failed" not in said]
+    first = np.zeros(1 + len(KINDS))
+    found = minimize(lambda x: loss(every, x), first, method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-5})
+    # Priors alone, for a temperature that says nothing.
+    plain = minimize(lambda x: loss(every, np.concatenate([[0.0], x])), first[1:], method="Nelder-Mead")
+    before = calibration()
+    scores = f"{loss(every, first):.4f} before, {found.fun:.4f} after, {plain.fun:.4f} with temperature 1"
+    print(f"# Seed {plan['seed']}, {len(every)} campaigns: mean log score {scores}.")
+    print(f"temperature = {np.exp(found.x[0]):.2f}\n\n[expected]")
+    for kind, more, alone in zip(KINDS, found.x[1:], plain.x, strict=True):
+        was = before.expected[kind]
+        print(f"{kind} = {was * np.exp(more):.2g}  # with temperature 1: {was * np.exp(alone):.2g}")
+    return 0
+
+
+class Mixture:
+    """Hold the models of one campaign as arrays, and the statements that are true or false of it."""
+
+    def __init__(self, one: Closed) -> None:
+        models = one.said["mixture"]
+        sets = [frozenset((kind, name) for kind, name in m["names"]) for m in models]
+        self.evidence = np.array([m["log_evidence"] for m in models])
+        self.prior = np.array([m["log_prior"] for m in models])
+        # What is left beyond doubt has no prior of its own.
+        self.counts = np.array([[sum(k == kind and n != "output" for k, n in s) for kind in KINDS] for s in sets])
+        unknown = np.array([any(k == "unknown" for k, _ in s) for s in sets])
+        self.holds, self.true = [unknown], [float(one.is_unlisted and one.leaves_declared)]
+        names = {n for s in sets for n in s if n[0] in ("effect", "record", "drift")}
+        chances = {n: float(np.sum(self.weights(np.zeros(5)) * [("effect", n) in s for s in sets])) for k, n in names
+                   if k == "effect"}  # fmt: skip
+        for kind, name in sorted(names):
+            self.holds.append(np.array([(kind, name) in s for s in sets]) & ~(unknown & (kind == "effect")))
+            self.true.append(one.truth.share(name, chances) if kind == "effect" else float(is_fault(one, kind, name)))
+
+    def weights(self, x: Any) -> Any:
+        each = self.evidence / np.exp(x[0]) + self.prior + self.counts @ x[1:]
+        return np.exp(each - logsumexp(each))
+
+    def loss(self, x: Any) -> float:
+        weights, total = self.weights(x), 0.0
+        for holds, true in zip(self.holds, self.true, strict=True):
+            p = float(np.clip(weights @ holds, SUREST, 1.0 - SUREST))
+            total -= true * np.log(p) + (1.0 - true) * np.log(1.0 - p)
+        return total
+
+
+def is_fault(one: Closed, kind: str, name: str) -> bool:
+    """Tell whether a fault of a record is the planted one: its record and its kind, in the words of the library."""
+    fault = one.truth.fault
+    if kind != "record" or not fault or fault.get("role") != "train":
+        return False
+    what, _, where = name.partition("@")
+    return where.split(":")[0] == fault["record"] and what.split("_")[0] == fault["kind"]
+
+
+def loss(every: Sequence[Mixture], x: Any) -> float:
+    return float(np.mean([one.loss(x) for one in every]))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

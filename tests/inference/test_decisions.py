@@ -1,0 +1,73 @@
+"""Every number that decides stands in `inference/decisions.py`: the code is read, and no other is found."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import armid
+from armid.inference import decisions
+
+SRC = Path(armid.__file__).parent
+FILES = sorted([*(SRC / "loop").glob("*.py"), *(SRC / "inference").rglob("*.py")])
+MOST = 20
+# Constants that are compared with and decide nothing that a user is told, by what they are.
+NUMERICS = {
+    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST"),
+    "convergence of fits and of the engine": ("SETTLED", "FEWEST_SPARED", "FURTHER_ERROR", "WIDE"),
+    "budgets of computing": ("BUNDLE", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
+    "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "LAGS", "LINE", "MOST_BRIDGED", "STILL", "EVEN"),
+    "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),
+    "layout of pages": ("MOST_DRAWN", "MOST_TOLD", "SHIFTED", "LEAST_SHARE", "WEAK", "VERSION"),
+}
+# Plain numbers in comparisons that are no decision either: a half, rounding, and where a series or a range turns.
+LITERALS = {0, 1, 2, 3, -1, 0.5, 1.5, 5.0, 0.05, 1e-7, 1e-9, 1e-12, 1e-300}
+
+
+def numbers_of(tree):
+    """Return the names of a module's own numeric constants."""
+    found = set()
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and any(
+            isinstance(part, ast.Constant) and isinstance(part.value, (int, float)) for part in ast.walk(node.value)
+        ):
+            found |= {part.id for target in node.targets for part in ast.walk(target) if isinstance(part, ast.Name)}
+    return found
+
+
+def compared(tree, kind):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            yield from (part for part in ast.walk(node) if isinstance(part, kind))
+
+
+def test_no_other_constant_decides():
+    known = {name for names in NUMERICS.values() for name in names}
+    trees = {file: ast.parse(file.read_text()) for file in FILES if file.name != "decisions.py"}
+    mine = {name for tree in trees.values() for name in numbers_of(tree) if name.isupper()}
+    used = {part.id for tree in trees.values() for part in compared(tree, ast.Name)}
+    assert mine & used <= known
+    assert known <= used, "a name of the list is compared with nowhere"
+
+
+def test_no_plain_number_decides():
+    for file in FILES:
+        for part in compared(ast.parse(file.read_text()), ast.Constant):
+            if isinstance(part.value, (int, float)) and not isinstance(part.value, bool):
+                assert part.value in {0, 1, 2, 3, -1} | LITERALS, (
+                    f"{file.name}:{part.lineno} compares with {part.value}"
+                )
+
+
+def test_the_list_is_short_and_every_number_of_it_is_used():
+    names = [name for name in vars(decisions) if name.isupper()]
+    assert len(names) <= MOST
+    text = "\n".join(file.read_text() for file in FILES if file.name != "decisions.py")
+    assert [name for name in names if name not in text] == []
+
+
+@pytest.mark.parametrize("name", [name for name in vars(decisions) if name.isupper()])
+def test_each_says_why(name):
+    lines = Path(decisions.__file__).read_text().splitlines()
+    place = next(i for i, line in enumerate(lines) if line.startswith(f"{name} ="))
+    assert lines[place - 1].startswith("# ")
