@@ -34,7 +34,7 @@ from armid.model import Array
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
 # Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
-N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED = 8, 3, 3, 3
+N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 8, 3, 3, 3, 2
 # Best models beside which a signal without a form is fitted.
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
@@ -43,6 +43,8 @@ N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
 SAMPLES, FEWEST_EXPANDED = 4_000, 8
 # A model is brought to its estimate at most so often in turn.
 MOST_COMPLETED = 4
+# Mean square of the best model, in units of the noise, up to which rivals are begun afresh.
+NEAR = 2.0
 # Rivals that differ from the best model in one name and are brought to their estimates.
 N_TWINS = 3
 # Models of each size that are expanded outside the window where more than noise is left.
@@ -125,8 +127,14 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
         model = next_model(found)
         if model is None and not add_unknown(found):
             break
-        if model is not None:
-            complete(found, model)
+        if model is None:
+            continue
+        complete(found, model)
+        # Near the noise a second name must not stand for a shape of the first that was held.
+        for less in simpler(found, model) if is_near(found, model) else []:
+            if has_shapes(found, less):
+                complete(found, less)
+        if next_model(found) == model:
             expand(found, model)
             finish(found)
     finish_all(found)
@@ -198,10 +206,7 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     limit = limit_of(found, scale)
     trials: list[Trial] = []
     if is_significant(fit):
-        # Far from noise a straight line is a poor guess: the first steps of a fit tell which lead on.
-        begun = library.each(lambda a: effects.first_steps(fit, held, a, library), ahead_held)
-        for i in sorted(range(len(ahead)), key=lambda i: begun[i][0])[:N_ADDED]:
-            trials += trial_of(found, model, held, ahead_held[i], limit, begun[i][1])
+        trials += best_begun(found, model, held, ahead_held, limit, N_ADDED)
     else:
         added = [i for i, f in enumerate(ahead) if max(f.posterior, ahead_held[i].posterior) > REFITTED]
         for i in sorted(added, key=lambda i: -max(ahead[i].posterior, ahead_held[i].posterior))[:N_ADDED]:
@@ -209,7 +214,9 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     trials += [t for f in leading(beside) for t in trial_of(found, model, about, f, limit)]
     trials += drops(found, model, fit)
     ranked = found.ranked()
-    if found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
+    if is_significant(fit):
+        trials += exchanges(found, model, fit, limit)
+    elif found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
         forms = effects.propose_forms(fit, found.known, library)
         trials += swaps(found, model, fit, scale, [*proposals, *forms])
     made = library.each(lambda t: t[1](), trials)
@@ -219,6 +226,36 @@ def expand(found: Exploration, model: Hypotheses) -> None:
             found.refused.add(key)
     for key, again in pairs(found, model, about, ahead):
         found.take(key, again)
+
+
+def best_begun(
+    found: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast], limit: float, n: int
+) -> list[Trial]:
+    """Return the additions whose first steps lead farthest: far from noise a straight line is a poor guess."""
+    fit, library = about.fit, found.library
+    begun = library.each(lambda a: effects.first_steps(fit, about, a, library), ahead)
+    best = sorted(range(len(ahead)), key=lambda i: begun[i][0])[:n]
+    return [t for i in best for t in trial_of(found, model, about, ahead[i], limit, begun[i][1])]
+
+
+def exchanges(found: Exploration, model: Hypotheses, fit: Fit, limit: float) -> list[Trial]:
+    """Return the fits in which another effect takes the place of one of several, by its first steps there.
+
+    The effect that explains most alone may be the wrong one beside the others.
+    """
+    scale, trials = found.scale(), []
+    several = [h for h in sorted(model) if h.kind == "effect"]
+    for hypothesis in several if len(several) > 1 else []:
+        less = model - {hypothesis}
+        if less not in found.fits:
+            found.take(less, unless_diverged(partial(without, fit, hypothesis, found.library, scale.weight)))
+        if less not in found.fits or less in found.forecasts:
+            continue
+        about = expansion_of(found.fits[less], scale, found.library, with_doubts=False)
+        proposals = [p for p in effects.propose(about.fit, found.known, found.library)
+                     if p.hypothesis.name != hypothesis.name]  # fmt: skip
+        trials += best_begun(found, less, about, [forecast(about, p) for p in proposals], limit, N_EXCHANGED)
+    return trials
 
 
 def limit_of(found: Exploration, scale: Scale) -> float:
@@ -390,10 +427,9 @@ def finish_all(found: Exploration) -> None:
         ranked = found.ranked()
         todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(found, m)
                 and not is_outdone(m, value, ranked)]  # fmt: skip
-        # A second name must not stand for a shape of the first that was held.
         best, top = ranked[0]
         todo += [m for m in simpler(found, best) if not is_complete(found, m) and has_shapes(found, m)]
-        # Nor must a name stand for its twin, whose rough fit may be far from its estimate.
+        # A name must not stand for its twin, whose rough fit may be far from its estimate.
         twins = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
         todo += [m for m in twins[:N_TWINS] if m not in todo and not is_complete(found, m) and has_shapes(found, m)]
         if not todo:
@@ -430,19 +466,28 @@ def complete(found: Exploration, model: Hypotheses) -> None:
         weight = found.completed[model] = found.scale().weight
         if not (model or found.constants):
             return
-        again = unless_diverged(partial(completed, found.fits[model], found.library, found.constants, weight))
+        fit, near_noise = found.fits[model], is_near(found, model)
+        again = unless_diverged(partial(completed, fit, found.library, found.constants, weight, near_noise))
         found.fits[model] = again or replace(found.fits[model], rough=False)
 
 
-def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:
-    """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls."""
+def is_near(found: Exploration, model: Hypotheses) -> bool:
+    """Tell whether the best model is near the noise, so that a few log units count."""
+    return NEAR * found.scale().weight * len(found.fits[model].residual) > found.scale().n
+
+
+def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float, afresh: bool) -> Fit:
+    """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls.
+
+    afresh: whether it is begun again from the declared constants and shapes, too.
+    """
     if fit.records.data.cover is not None:
         return replace(fit, rough=False)
     # Constants may have made up for a shape that was held: without them it finds its own size.
     is_freed = any(f.unknown.name.startswith(NAMED) for f in fit.others)
     is_shaped = any(library.fixed_shapes(key) for key in fit.active)
-    afresh = begun_again(fit, library, weight) if is_shaped and is_freed else None
-    starts = [fit] if afresh is None else [fit, afresh]
+    again = begun_again(fit, library, weight) if afresh and is_shaped and is_freed else None
+    starts = [fit] if again is None else [fit, again]
     each = [with_constants(with_fitted_shapes(finished(start, library), library), constants, weight)
             for start in starts]  # fmt: skip
     return min(each, key=lambda done: done.chi2 + sum(f.value**2 for f in done.others) / weight)

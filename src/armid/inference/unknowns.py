@@ -22,8 +22,9 @@ from armid.problem.starts import fits_starts, with_starts
 
 # Step of the differences, and the farthest step of a turn, in prior standard deviations.
 STEP, FARTHEST = 1e-2, 3.0
-# Turns at most, those of a rough fit, and the fall of the sum of squares at which they end.
-MOST_TURNS, MOST_ROUGH, MOST_INNER, SETTLED = 8, 3, 6, 0.1
+# Turns at most, those of a rough fit, steps of the parameters in a turn (with 6 three effects were not found), and the
+# fall of the weighted sum of squares at which turns end.
+MOST_TURNS, MOST_ROUGH, MOST_INNER, SETTLED = 8, 3, 12, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +157,7 @@ def freed(
             base = about_starts(base, unknowns, values, z)
             best_cost = min(best_cost, cost_of(base, unknowns, values, z, weight))
         fall, cost = cost - best_cost, best_cost
-        if fall < (1.0 if rough else SETTLED) * max(cost / len(residual), 1.0):
+        if weight * fall < (1.0 if rough else SETTLED):
             break
     if not np.isfinite(cost):
         raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
