@@ -38,7 +38,7 @@ N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 8, 3, 3, 3, 2
 # Best models beside which a signal without a form is fitted.
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
-N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 24, 8
+N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 12, 8
 # Of records with more samples than this fewer models are expanded, but for so many.
 SAMPLES, FEWEST_EXPANDED = 4_000, 8
 # A model is brought to its estimate at most so often in turn.
