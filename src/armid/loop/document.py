@@ -11,7 +11,7 @@ from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import Finding, Residuals, time_in_words
-from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
+from armid.inference.decisions import LISTED, MENTIONED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
@@ -381,10 +381,18 @@ def conclusion(found: ClosedLoop) -> str:
     return {
         NO_DISCREPANCY: nothing_missing(found),
         EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(found)}.",
-        PARTLY: f"With {names} the declared model does better, but it lacks something that the library does not hold"
-        f"{unclaimed(found)}",
+        PARTLY: partly(found),
         UNEXPLAINED: "The declared model lacks something that the library does not hold.",
     }[found.verdict]
+
+
+def partly(found: ClosedLoop) -> str:
+    names, unknown = " + ".join(found.effects), found.inference.posterior.probability("unknown")
+    lacks = "something that the library does not hold"
+    if unknown < MENTIONED:
+        return f"With {names} the declared model does better, but it lacks {lacks}{unclaimed(found)}"
+    best = "the declared model predicts parts left out of the fit best"
+    return f"The declared model lacks {lacks}. Without it, but with {names}, {best}{unclaimed(found)}"
 
 
 def nothing_missing(found: ClosedLoop) -> str:
