@@ -38,7 +38,7 @@ N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 8, 3, 3, 3, 2
 # Best models beside which a signal without a form is fitted.
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
-N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 12, 8
+N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 16, 8
 # Of records with more samples than this fewer models are expanded, but for so many.
 SAMPLES, FEWEST_EXPANDED = 4_000, 8
 # A model is brought to its estimate at most so often in turn.
@@ -137,6 +137,7 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
         if next_model(found) == model:
             expand(found, model)
             finish(found)
+    add_unknown(found)
     finish_all(found)
     return found
 
@@ -163,15 +164,15 @@ def next_model(found: Exploration) -> Hypotheses | None:
     """Return the model that is to be expanded next, None where all in the window are.
 
     Where the best model leaves more than noise, the best ones of each smaller size may lead on as well: a strong second
-    effect can mislead the choice of the first.
+    effect can mislead the choice of the first. Far from the noise these come first, the smallest before all (a beam).
     """
     ranked = found.ranked()
     best, top = ranked[0]
     near = [m for m, value in ranked if value > top - WINDOW and not is_outdone(m, value, ranked)]
     if is_significant(found.fits[best]) and found.fits[best].records.data.cover is None:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
-        sizes = range(1, len(best) + 1)
-        near += [m for n in sizes for m in [m for m in plain if len(m) == n][:BEAM]]
+        beam = [m for n in range(1, len(best) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
+        near = [*near, *beam] if is_near(found, best) else [*beam, *near]
     return next((m for m in near if m not in found.forecasts and len(m) < MOST_EFFECTS), None)
 
 
@@ -214,8 +215,8 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     trials += [t for f in leading(beside) for t in trial_of(found, model, about, f, limit)]
     trials += drops(found, model, fit)
     ranked = found.ranked()
-    if is_significant(fit):
-        trials += exchanges(found, model, fit, limit)
+    if is_significant(fit) and not is_near(found, model):
+        trials += exchanges(found, model, fit, limit) if model == ranked[0][0] else []
     elif found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
         forms = effects.propose_forms(fit, found.known, library)
         trials += swaps(found, model, fit, scale, [*proposals, *forms])
