@@ -11,17 +11,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pymoo.core.algorithm import Algorithm
-from pymoo.optimize import minimize
 
 from armid.errors import ArmidError, quoted
 from armid.estimation.information import MISFIT, Information, information_at
 from armid.estimation.least_squares import held_by_bound, with_fitted_starts
 from armid.estimation.mends import Suspicion
-from armid.identifiers import Identifier, can_run_directly, run_directly
+from armid.identifiers import Identifier, run
 from armid.model import Array, Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
-from armid.problem.meter import LARGEST_BUDGET, BudgetIgnoredError, Meter, MeterTermination
+from armid.problem.meter import LARGEST_BUDGET, BudgetIgnoredError, Meter
 from armid.problem.problem import (
     IdentificationProblem,
     Replay,
@@ -210,17 +208,8 @@ def search(
                 progress(meter)
             return interrupted() or meter.reached or meter.exhausted
 
-        def after_generation(running: Algorithm) -> None:
-            if is_over():
-                running.termination.terminate()
-                running.termination.update(running)
-
         try:
-            if can_run_directly(algorithm):
-                run_directly(algorithm, problem, seed, is_over)
-            else:
-                minimize(problem, algorithm, MeterTermination(meter), seed=seed, callback=after_generation,
-                         copy_algorithm=False)  # fmt: skip
+            run(algorithm, problem, seed, is_over)
         except BudgetIgnoredError:
             if meter.best_x is None:
                 raise
