@@ -101,7 +101,10 @@ class Gone:
     def nthreads(self):
         raise OSError("in <TCP (closed) ConnectionPool.ncores>: ConnectionResetError")
 
-    def cancel(self, futures):
+    def get_executor(self, pure):
+        return self
+
+    def shutdown(self, wait):
         raise OSError("closed")
 
     def close(self):
@@ -109,6 +112,6 @@ class Gone:
 
 
 def test_a_cluster_that_goes_while_runs_are_made(write_study, tmp_path, monkeypatch):
-    monkeypatch.setattr("armid.study.dask_pool._connected", lambda address: (Gone(), ()))
+    monkeypatch.setattr("armid.study.dask_pool._connected", lambda address: Gone())
     with pytest.raises(ArmidError, match="the Dask cluster at tcp://x:1 has gone: start again to go on"):
         run_study(write_study(), dask="tcp://x:1", out=tmp_path / "out")

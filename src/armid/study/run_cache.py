@@ -31,6 +31,7 @@ SHARED = (
 class PreparedCase:
     """A case ready to run on; records: whole ones that noise is added to, empty for records that are read."""
 
+    equations: str
     space: Space
     records: tuple[Record, ...]
     replays: tuple[Replay, ...]
@@ -43,15 +44,15 @@ class RunCache:
         self.registry, self.folder = registry, folder
         self._kept: OrderedDict[str, Any] = OrderedDict()
 
-    def replays(self, settings: Mapping[str, Any]) -> tuple[Space, tuple[Replay, ...]]:
-        """Return the space of a run's case, and its records with the run's own noise, ready to be simulated."""
+    def replays(self, settings: Mapping[str, Any]) -> tuple[PreparedCase, tuple[Replay, ...]]:
+        """Return the case of a run, and its records with the run's own noise, ready to be simulated."""
         shared = {word: settings[word] for word in SHARED if word in settings}
         level = settings["noise_deg_s"] or 0.0
         case = self._once("case", shared | {"noise": level}, lambda: self._prepared(settings, level))
         if level == 0.0:
-            return case.space, case.replays
+            return case, case.replays
         noisy = [in_window(r, settings["window_s"]) for r in noisy_records(case.records, settings)]
-        return case.space, tuple(_measured_again(r, record) for r, record in zip(case.replays, noisy, strict=True))
+        return case, tuple(_measured_again(r, record) for r, record in zip(case.replays, noisy, strict=True))
 
     def _prepared(self, settings: Mapping[str, Any], level: float) -> PreparedCase:
         if "suite" in settings:
@@ -59,7 +60,7 @@ class RunCache:
             if version != VERSION:
                 raise ArmidError(f"problem '{name}' is of version {version} of the suite, {VERSION} is expected")
             problem = suite()[name].identification
-            return PreparedCase(problem.space, (), problem.replays)
+            return PreparedCase(str(problem.replays[0].model), problem.space, (), problem.replays)
         model, whole = self._source(settings)
         bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
         space = space_of(model, {}, bounds, settings["fixed"])
@@ -71,7 +72,7 @@ class RunCache:
         replays = tuple(r for record in records for r in replay_of(record, model, space, accuracy).each)
         train = iter(with_fitted_starts(tuple(r for r in replays if r.record.role == "train"), space))
         replays = tuple(next(train) if r.record.role == "train" else r for r in replays)
-        return PreparedCase(space, () if "campaign" in settings else tuple(whole), replays)
+        return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), replays)
 
     def _source(self, settings: Mapping[str, Any]) -> tuple[Model, tuple[Record, ...]]:
         source = settings.get("campaign")

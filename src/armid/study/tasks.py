@@ -32,7 +32,7 @@ from armid.record import Campaign
 from armid.record.schema import load_toml, unknown_name, validated
 from armid.registry import place_in_plugin
 from armid.study.cases import Case, cases_of, clean_records
-from armid.study.outcome import DONE, FAILED, ClaimedRun, Outcome, Performed, Planned, packed, planned
+from armid.study.outcome import DONE, FAILED, MissingRun, Outcome, Performed, Planned, packed, planned
 from armid.study.run_cache import RunCache
 from armid.study.spec import (
     CLOSES_LOOP,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from armid.study.loops import LoopStudy
 
 Task: TypeAlias = "Study | LoopStudy"
-Performer: TypeAlias = Callable[[ClaimedRun], Outcome]
+Performer: TypeAlias = Callable[[MissingRun], Outcome]
 SUFFIX = ".toml"
 LONGEST_ERROR = 2000
 # Each run is a row of some kB in the store.
@@ -104,7 +104,7 @@ def task_type(kind: str) -> "type[Task]":
     return Study
 
 
-def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
+def perform(run: MissingRun, cache: RunCache) -> Outcome:
     """Perform a run of any kind; one that fails is an outcome too, so that the others go on.
 
     Raises MachineError where disk, memory or cache are at fault: that is no result of a run.
@@ -221,7 +221,7 @@ class Study:
             if self.registry.digests_of("identifiers", entry.name):
                 settings = {"kind": self.kind, "only_built": True, "identifier": entry.name,
                             "options": dict(entry.options), "budget": entry.budget}  # fmt: skip
-                outcome = performed(ClaimedRun(entry.label, json.dumps(settings)))
+                outcome = performed(MissingRun(entry.label, json.dumps(settings)))
                 if outcome.status == FAILED:
                     raise ArmidError(f"identifier '{entry.label}': it cannot be built: {outcome.error}")
         asked: set[str] = set()
@@ -332,20 +332,22 @@ class Study:
         if settings.get("only_built"):
             identifier.build(settings["budget"])
             return Performed(0, "", {})
-        space, replays = cache.replays(settings)
+        case, replays = cache.replays(settings)
         train, holdout = (tuple(r for r in replays if r.record.role == role) for role in ("train", "holdout"))
         model, fitness = train[0].model, fitness_of_name(settings["fitness"], cache.registry.fitness)
         campaign = Campaign(settings["case"], cache.folder, model.plant, (), tuple(r.record for r in replays), {}, {})
-        found = identified(campaign, train, holdout, space, fitness, identifier, settings["budget"], settings["seed"])
+        found = identified(
+            campaign, train, holdout, case.space, fitness, identifier, settings["budget"], settings["seed"]
+        )
         if found.stopped == INTERRUPTED:
             # not what was asked for: the worker ends, and the run is given back
             raise KeyboardInterrupt
         near, far = found.train, found.holdout
         errors = (near.rmse, near.s, near.s1, near.s2, None if far is None else far.rmse)
-        return Performed(found.used, str(model), {
+        return Performed(found.used, case.equations, {
             "identified": [(found.used, found.n_failed, found.value, found.stopped, *errors)],
             "parameters": _parameter_rows(found),
-            "traces": [(json.dumps(space.free_names), packed(*found.trace, found.improved))],
+            "traces": [(json.dumps(case.space.free_names), packed(*found.trace, found.improved))],
         })  # fmt: skip
 
 

@@ -57,7 +57,7 @@ def tune(
     """Try n configurations of each identifier; return what was found, nothing after Ctrl-C, and how all rounds ended.
 
     first: see `training`. The others are those of `armid.study.runner.run`; progress is told of all rounds as one
-    study. Raises ArmidError without Optuna, and while another runner is at runs of the store.
+    study. Raises ArmidError without Optuna, and while another process is at the store.
     """
     if find_spec("optuna") is None:
         raise ArmidError("armid tune needs the package optuna, which is not installed: "
@@ -78,9 +78,6 @@ def tune(
         endings.append(run(study, file, jobs, dask, out, progress=_with_later(progress, later)))
         if endings[-1].interrupted:
             return [], _together(endings, later)
-        if endings[-1].counts.missing:
-            raise ArmidError(f"{endings[-1].counts.missing} runs of {out} are still with another runner: let it end, "
-                             "the same command goes on then")  # fmt: skip
         areas = scores(study, load_study(out))
     found = []
     for label, own in tried.items():
