@@ -28,8 +28,9 @@ def cluster(tmp_path):
             started.append(subprocess.Popen(command, stdout=log, stderr=log, cwd=tmp_path, start_new_session=True))
 
     dask("scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1")
-    for _ in range(2):
-        dask("worker", "--nthreads", "1", "--no-dashboard", "--no-nanny")
+    # the second is a child of Dask's nanny, in which multiprocessing starts no process
+    for nanny in ("--no-nanny", "--nanny"):
+        dask("worker", "--nthreads", "1", "--no-dashboard", nanny)
     end = time.monotonic() + 300.0
     while not file.exists():
         assert time.monotonic() < end, (tmp_path / "0.log").read_text()

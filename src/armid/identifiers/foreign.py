@@ -3,6 +3,7 @@
 import random as python_random
 import threading
 import warnings
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +22,9 @@ class Foreign(SearchOptions):
         """Minimise until the task drops it."""
         search_by(self.minimise, {}, task)
 
+    @abstractmethod
     def minimise(self, value: Value, low: Array, high: Array, budget: int, random: np.random.Generator) -> None:
         """Call for values within a box until they raise; random: draws its seed."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

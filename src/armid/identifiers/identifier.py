@@ -1,6 +1,7 @@
 """What an identifier is, and what an option of it is: a typed field with its meaning, limits and range for tuning."""
 
 import inspect
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
@@ -65,7 +66,7 @@ def population(default: int | None, meaning: str, **limits: Any) -> Any:
     return option(default, meaning, least=1, most=LARGEST_POPULATION, **limits)
 
 
-class Options:
+class Options(ABC):
     """Check the options of an algorithm, a frozen dataclass of fields made by `option`, and build it.
 
     package: what it needs beside armid's own dependencies, "" for nothing.
@@ -79,9 +80,9 @@ class Options:
             if value is not None or each.default is not None:
                 object.__setattr__(self, each.name, checked(each.name, value, kind_of(each), each.metadata["option"]))
 
+    @abstractmethod
     def build(self, budget: int) -> Algorithm:
         """Return a fresh algorithm of pymoo for a budget in simulations."""
-        raise NotImplementedError
 
 
 def options_in(algorithm: Any) -> list[Any]:

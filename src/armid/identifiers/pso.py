@@ -62,11 +62,23 @@ class Swarm(SearchOptions):
 
 
 class PaperPSO(SearchAlgorithm):
-    """The paper's swarm as an algorithm of pymoo; without another termination it ends after n_iterations.
+    """Search with the paper's swarm where pymoo expects an algorithm.
 
-    n_particles, n_iterations, options: see `Swarm`, and those of pymoo's Algorithm, such as termination, callback,
-    seed; verbose prints once output is given. Raises ArmidError for an unknown option, for a value out of range, and in
-    `setup` for a problem that has no finite box, has constraints or has several objectives.
+    Parameters
+    ----------
+    n_particles : int
+        Size of the swarm.
+    n_iterations : int
+        Iterations over which the inertia falls, and after which the run ends when no termination is given.
+    **options
+        Those of `Swarm` (c1, c2, first_inertia, last_inertia, velocity_limit, first_velocity), and those of pymoo's
+        Algorithm, such as termination, callback, seed; verbose prints once output is given.
+
+    Raises
+    ------
+    ArmidError
+        For an unknown option or a value out of range, and in `setup` for a problem that has no finite box, has
+        constraints or has several objectives.
     """
 
     def __init__(self, n_particles: int = 80, n_iterations: int = 150, **options: Any) -> None:

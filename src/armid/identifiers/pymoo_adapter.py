@@ -1,5 +1,6 @@
 """A search as an algorithm of pymoo, an algorithm of pymoo as a search, and a run of either within a budget."""
 
+from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -110,9 +111,9 @@ class SearchOptions(Options):
 
     is_seeded: ClassVar[bool] = False
 
+    @abstractmethod
     def search(self, task: SearchTask) -> None:
         """Ask for candidates until the task drops the search, or to its own end."""
-        raise NotImplementedError
 
     def build(self, budget: int) -> SearchAlgorithm:
         """Return the search as an algorithm of pymoo."""

@@ -1,6 +1,7 @@
 """Worker processes that perform runs, each with a time limit.
 
-A run that takes too long is stopped, and a worker that dies is replaced; both lose no other run.
+A run that takes too long is stopped, and a worker that dies is replaced; both lose no other run. A worker is a program
+of its own and no child of multiprocessing: a script needs no main guard, and workers of Dask may have workers.
 """
 
 import os
