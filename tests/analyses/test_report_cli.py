@@ -94,7 +94,7 @@ def test_what_a_store_holds_cannot_steer_the_terminal(store, run, tmp_path, monk
         copy.execute("UPDATE plan SET identifier = ? WHERE place > 2", (STEERING,))
     monkeypatch.setattr(write, "save", not_drawn)
     counts = Counts(4, 3, 1)
-    said = words(Ending(SimpleNamespace(name="s"), tmp_path, counts, 0, 0, 1.0, False, STEERING, ()))
+    said = words(Ending(SimpleNamespace(name="s"), tmp_path, counts, 0, 0, 1.0, False, STEERING))
     put(*said)
     printed = run("report", tmp_path).out
     assert r"x\nComplete: 4 of 4 runs\x1b[2J" in printed

@@ -1,6 +1,5 @@
 """The paper's swarm: its equations, what pymoo expects of it, and pyswarms as an independent second opinion."""
 
-import copy
 import json
 import pickle
 import subprocess
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pymoo.algorithms.soo.nonconvex.pso import PSO
 from pymoo.core.algorithm import Algorithm
 from pymoo.core.callback import Callback
 from pymoo.core.evaluator import Evaluator
@@ -111,12 +109,6 @@ def test_the_paper_s_settings_make_12000_evaluations() -> None:
     assert minimize(Valley(), PaperPSO(termination=("n_gen", 3)), seed=1).algorithm.evaluator.n_eval == 240
 
 
-def test_the_literal_limit_is_the_magnitude_of_the_box() -> None:
-    problem = Problem(n_var=3, n_obj=1, xl=np.array([3.0, -4.0, -5.0]), xu=np.array([3.5, 1.0, 0.0]))
-    assert PaperPSO().setup(problem)._limit.tolist() == [3.5, 4.0, 5.0]
-    assert PaperPSO(velocity_limit=0.2).setup(problem)._limit.tolist() == pytest.approx([0.1, 1.0, 1.0])
-
-
 def test_every_evaluator_gives_the_same_run() -> None:
     light = minimize(Valley(), PaperPSO(), seed=5)
     plain = minimize(Valley(), PaperPSO(), seed=5, evaluator=Evaluator())
@@ -139,19 +131,9 @@ def test_what_pymoo_shows_of_a_run_is_true() -> None:
     assert (cv == 0.0).all()
     assert feas.all()
     assert set(n_gen) <= {1, 2, 3, 4, 5, 6}
-    assert result.F[0] == f.min() == result.opt[0].F[0]
+    assert f.min() >= result.F[0] == result.opt[0].F[0] == min(bests.bests)
     assert result.CV[0] == 0.0
     assert all(individual.evaluated >= {"F", "G", "H"} for individual in result.pop)
-
-
-def test_a_run_can_be_copied_and_pickled_on_its_way() -> None:
-    swarm = PaperPSO().setup(Valley(), seed=4)
-    for _ in range(10):
-        swarm.next()
-    twins = copy.deepcopy(swarm), pickle.loads(pickle.dumps(swarm))
-    expected = swarm.run().X
-    for twin in twins:
-        np.testing.assert_array_equal(twin.run().X, expected)
 
 
 def test_prints_with_an_output(capsys: pytest.CaptureFixture[str]) -> None:
@@ -181,21 +163,6 @@ def test_values_of_the_problem_beside_the_fitness_reach_the_individuals() -> Non
 def test_refuses_problems_it_cannot_search(problem: Problem, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         minimize(problem, PaperPSO(), seed=1)
-
-
-def test_refuses_to_move_without_a_problem_or_its_particles() -> None:
-    with pytest.raises(ValueError, match="no problem yet"):
-        PaperPSO().ask()
-    swarm = PaperPSO().setup(Valley(), seed=1)
-    with pytest.raises(ValueError, match="3 candidates were told to the swarm, expected its 80"):
-        swarm.tell(infills=swarm.ask()[:3])
-
-
-def test_spends_less_than_half_of_pymoo_s_own_swarm() -> None:
-    def seconds(algorithm: Algorithm) -> float:
-        return float(min(minimize(Valley(), algorithm, ("n_gen", 50), seed=1).exec_time for _ in range(3)))
-
-    assert seconds(PaperPSO()) < 0.5 * seconds(PSO(pop_size=80))
 
 
 PYSWARMS = """
@@ -235,10 +202,15 @@ def test_pyswarms_finds_as_much(tmp_path: Path) -> None:
 
 def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
     for budget, n_particles, n_iterations in ((12000, 80, 150), (81, 80, 2), (80, 80, 1), (7, 7, 1)):
-        swarm = IDENTIFIERS["pso"].build(budget)
-        assert (swarm.n_particles, swarm.n_iterations) == (n_particles, n_iterations)
+        problem, other = Valley(), Valley()
+        minimize(problem, IDENTIFIERS["pso"].build(budget), ("n_gen", 2), seed=1)
+        minimize(other, PaperPSO(n_particles, n_iterations), ("n_gen", 2), seed=1)
+        np.testing.assert_array_equal(np.array(problem.seen), np.array(other.seen))
     given = IDENTIFIERS["pso"].with_options({"velocity_limit": 0.2, "c1": 2, "n_particles": 20}).build(200)
-    assert (given.velocity_limit, given.c1, given.n_particles, given.n_iterations) == (0.2, 2.0, 20, 10)
+    problem, other = Valley(), Valley()
+    minimize(problem, given, seed=1)
+    minimize(other, PaperPSO(20, 10, velocity_limit=0.2, c1=2.0), seed=1)
+    np.testing.assert_array_equal(np.array(problem.seen), np.array(other.seen))
     assert IDENTIFIERS["pso"].with_options({}) is IDENTIFIERS["pso"]
     for wrong in (0, -5, 1.5, "12"):
         with pytest.raises(ValueError, match="expected a whole number above 0"):
@@ -255,10 +227,10 @@ def test_as_identifier() -> None:
     assert (pso.is_global, pso.uses_gradient, pso.is_stochastic) == (True, False, True)
     from_class, from_function = as_identifier("a", PaperPSO), as_identifier("b", a_small_swarm)
     assert isinstance(from_class, Identifier)
-    assert from_class.build(12000).n_iterations == 150
-    assert from_function.build(40).n_iterations == 10
+    assert from_class.build(40).budget == 12000
     for identifier in (pso, from_class, from_function):
-        assert pickle.loads(pickle.dumps(identifier)).build(40).n_particles > 0
+        assert pickle.loads(pickle.dumps(identifier)).build(40).budget > 0
+    assert from_function.build(40).budget == 40
 
 
 @pytest.mark.parametrize(("obj", "sentence"), [

@@ -2,10 +2,13 @@
 
 import copy
 import pickle
+import threading
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
+from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from pymoo.problems.functional import FunctionalProblem
@@ -15,7 +18,8 @@ from searches import COMPOSED, Bowl, identifier, ran
 from armid.contract.identifier import Trial, run
 from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, as_identifier
-from armid.identifiers.foreign import needing
+from armid.identifiers.identifier import declared
+from armid.identifiers.nlopt import ByValues
 from armid.identifiers.pymoo_adapter import SearchAlgorithm
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter
@@ -89,8 +93,8 @@ def test_pymoo_s_trimmings(name: str, capsys: pytest.CaptureFixture[str]) -> Non
     bests = [h.opt[0].F[0] for h in result.history]
     assert bests == sorted(bests, reverse=True)
     assert capsys.readouterr().out == ""
-    with pytest.raises(ArmidError, match="it cannot go on"):
-        result.history[0].next()
+    with pytest.raises(ArmidError, match="has run before"):
+        result.history[0].run()
     shown = identifier(name).build(60)
     shown.output = SingleObjectiveOutput()
     minimize(Bowl(), shown, ("n_gen", 2), seed=3, verbose=True)
@@ -105,16 +109,28 @@ def test_identifiers_travel_to_other_processes_and_algorithms_copy_before_they_r
     np.testing.assert_array_equal(*results)
 
 
-@pytest.mark.parametrize("name", [*OURS, "pso"])
-def test_asked_and_told_by_hand(name: str) -> None:
-    problem, again = Bowl(), Bowl()
-    algorithm = identifier(name).build(40).setup(problem, termination=("n_eval", 40), seed=2)
-    while algorithm.has_next():
-        infills = algorithm.ask()
-        algorithm.evaluator.eval(problem, infills, algorithm=algorithm)
-        algorithm.tell(infills=infills)
-    ran(name, again, 40, seed=2)
-    np.testing.assert_array_equal(np.concatenate(problem.batches), np.concatenate(again.batches))
+class Broken(Problem):  # type: ignore[misc]
+    """A bowl that raises after some batches."""
+
+    def __init__(self, error: BaseException, after: int) -> None:
+        self.bowl, self.error, self.left = Bowl(), error, after
+        super().__init__(n_var=3, n_obj=1, xl=self.bowl.xl, xu=self.bowl.xu)
+
+    def _evaluate(self, X: Any, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        self.left -= 1
+        if self.left < 0:
+            raise self.error
+        self.bowl._evaluate(X, out)
+
+
+@pytest.mark.parametrize("name", ["nelder_mead", "lbfgs", "least_squares", "multistart:bobyqa", "random+bobyqa"])
+def test_an_error_of_the_problem_comes_out_and_no_thread_is_left(name: str) -> None:
+    before = threading.enumerate()
+    for error, after in ((ZeroDivisionError("mine"), 0), (ZeroDivisionError("mine"), 5), (KeyboardInterrupt(), 5)):
+        with pytest.raises(type(error)) as came:
+            minimize(Broken(error, after), identifier(name).build(300), ("n_eval", 300), seed=1, copy_algorithm=False)
+        assert came.value is error
+        assert threading.enumerate() == before
 
 
 def test_offspring_of_differential_evolution_are_no_more_than_its_population() -> None:
@@ -126,14 +142,14 @@ def test_what_minimize_would_swallow_is_refused() -> None:
     with pytest.raises(ArmidError, match="no option 'sede', did you mean 'seed'"):
         minimize(Bowl(), identifier("bobyqa").build(10), sede=3)
     with pytest.raises(ArmidError, match="no option 'terminaton'"):
-        SearchAlgorithm(lambda task: iter(()), 10, terminaton=3)  # type: ignore[arg-type,return-value]
-    with pytest.raises(ArmidError, match="no problem yet"):
-        identifier("bobyqa").build(10).ask()
+        SearchAlgorithm(lambda task: None, 10, terminaton=3)
+    with pytest.raises(ArmidError, match="the search has no problem"):
+        identifier("bobyqa").build(10).run()
+    for step in ("ask", "next"):
+        with pytest.raises(ArmidError, match="runs as a whole, it is not asked and told"):
+            getattr(identifier("bobyqa").build(10).setup(Bowl()), step)()
     with pytest.raises(ArmidError, match="2 objectives"):
         minimize(get_problem("zdt1"), identifier("cmaes").build(10))
-    asked = identifier("random", n_candidates=5).build(10).setup(Bowl(), seed=1)
-    with pytest.raises(ArmidError, match="2 candidates were told to the search, expected 5"):
-        asked.tell(infills=asked.ask()[:2])
 
 
 def test_capabilities_are_true() -> None:
@@ -166,6 +182,11 @@ def test_an_error_that_a_library_wraps_comes_out_and_a_failure_stays_finite() ->
         run(as_identifier("wrapping", wrapping), 1, Trial(Meter(403), holes=True))
 
 
+@dataclass(frozen=True)
+class Absent(ByValues):
+    package = "no_such_package"
+
+
 def test_a_package_that_is_missing_is_named() -> None:
-    with pytest.raises(ArmidError, match="'wrapping' needs the package no_such_package, which is not installed"):
-        needing("no_such_package", wrapping, "").build(100)
+    with pytest.raises(ArmidError, match="'absent' needs the package no_such_package, which is not installed"):
+        declared("absent", "", Absent, "LN_BOBYQA").build(100)

@@ -16,7 +16,7 @@ import pytest
 from small_study import RUNS_A_SEED, beside_cost, same_results
 
 from armid.errors import ArmidError, MachineError
-from armid.study.outcome import ClaimedRun
+from armid.study.outcome import MissingRun
 from armid.study.results import load_study
 from armid.study.runner import run_study
 from armid.study.store import FILE_NAME
@@ -277,7 +277,7 @@ def test_a_fault_of_the_machine_marks_no_run(error, of_the_machine, monkeypatch)
         raise error
 
     monkeypatch.setattr(Study, "perform", staticmethod(failing))
-    run = ClaimedRun("r", '{"kind": "identify"}')
+    run = MissingRun("r", '{"kind": "identify"}')
     if of_the_machine:
         with pytest.raises(MachineError, match="the machine, not a run, is at fault"):
             perform(run, None)
@@ -289,3 +289,11 @@ def test_a_worker_that_cannot_start_is_told(write_study, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.executable", "/bin/false")
     with pytest.raises(ArmidError, match="a worker process cannot start: it ends with code 1"):
         run_study(write_study(), jobs=1, out=tmp_path / "out")
+
+
+def test_a_script_without_a_main_guard_runs_a_study(write_study, tmp_path):
+    script = tmp_path / "script.py"
+    called = f"run_study({str(write_study(1))!r}, 1, out={str(tmp_path / 'out')!r}, only='row 1/random')"
+    script.write_text(f"import armid\nprint(len(armid.{called}.runs))\n", encoding="utf-8")
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("2\n", "")

@@ -1,5 +1,5 @@
 """Whatever ends a runner or a worker: no finished run is lost, none is there twice, and the rest is made as if nothing
-had been; runners share the work; and the clock may jump."""
+had been; a second runner is refused; and the clock may jump."""
 
 import os
 import random
@@ -138,11 +138,15 @@ def test_an_interrupt_of_the_workers_cuts_no_run(start, write_study, tmp_path, u
 
 
 @pytest.mark.slow
-def test_two_runners_share_the_work(start, write_study, tmp_path, undisturbed):
+def test_a_second_runner_is_refused_and_harms_nothing(start, write_study, tmp_path, undisturbed):
     file = write_study(SEEDS)
-    both = [start(file, "--out", tmp_path / "out", "--jobs", 1) for _ in range(2)]
-    made = [int(re.search(r"small: (\d+) runs made", ended_well(process))[1]) for process in both]
-    assert sum(made) == N_RUNS
+    first = start(file, "--out", tmp_path / "out", "--jobs", 1)
+    wait_for(first, tmp_path / "out", 1)
+    second = start(file, "--out", tmp_path / "out", "--jobs", 1)
+    out, err = second.communicate(timeout=600)
+    assert (second.returncode, out) == (2, "")
+    assert "another process is at the runs of" in err
+    ended_well(first)
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 

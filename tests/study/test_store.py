@@ -1,4 +1,4 @@
-"""The store: claims of other runners, files that are no store, and damaged ones."""
+"""The store: one process at a time, files that are no store, and damaged ones."""
 
 import os
 import signal
@@ -13,30 +13,13 @@ import pytest
 from armid.errors import ArmidError
 from armid.study.outcome import DONE, Outcome, Planned
 from armid.study.results import load_study
-from armid.study.store import (
-    FILE_NAME,
-    ProcessIdentity,
-    Store,
-    connected,
-    is_gone,
-    opened,
-    start_of,
-    this_place,
-    this_process,
-    transaction,
-    translate_errors,
-)
+from armid.study.store import FILE_NAME, Store, connected, opened, transaction, translate_errors
 
 DESCRIPTION = {"name": "made", "cases": []}
 
 
 def planned(n, case="a"):
     return [Planned(f"{case}{i}", "{}", case, "pso", "rmse", 0.0, "whole", i, 10) for i in range(n)]
-
-
-def claims_of_another(folder, *process):
-    with closing(sqlite3.connect(folder / FILE_NAME)) as connection, connection:
-        connection.execute("UPDATE claims SET place = ?, pid = ?, start = ?", process)
 
 
 @pytest.fixture
@@ -46,53 +29,47 @@ def store(tmp_path):
         yield store
 
 
-def runs(tasks):
-    return [task.run for task in tasks]
+def runs(store):
+    return [each.run for each in store.missing()]
 
 
-def test_runs_are_claimed_in_order_and_once(store, tmp_path):
-    with Store(tmp_path) as other:
-        other.plan(DESCRIPTION, planned(4))
-        assert runs(store.claim(2)) == ["a0", "a1"]
-        assert runs(other.claim(3)) == ["a2", "a3"]
-        assert store.claim(1) == other.claim(1) == []
+def test_what_is_missing_comes_in_order_and_once(store, monkeypatch):
+    monkeypatch.setattr("armid.study.store.PAGE", 3)
+    missing = store.missing()
+    assert next(missing).run == "a0"
+    assert store.save(Outcome("a0", DONE))
+    assert [each.run for each in missing] == ["a1", "a2", "a3"]
+    assert runs(store) == ["a1", "a2", "a3"]
 
 
-def test_the_claim_of_a_process_that_has_ended_is_void(store, tmp_path):
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    assert len(store.claim(4)) == 4
-    claims_of_another(tmp_path, this_place(), ended.pid, "1")
-    assert runs(store.claim(4)) == ["a0", "a1", "a2", "a3"]
+def test_a_second_process_is_refused_and_the_first_goes_on(store, tmp_path):
+    with pytest.raises(ArmidError, match="another process is at the runs of"):
+        Store(tmp_path)
+    assert store.save(Outcome("a0", DONE))
+    assert len(load_study(tmp_path).runs) == 1
 
 
-def test_the_number_of_a_process_may_be_used_again(store, tmp_path):
-    if not this_process().start:
-        pytest.skip("the system does not tell when a process started")
-    store.claim(4)
-    claims_of_another(tmp_path, this_place(), this_process().pid, "1")
-    assert len(store.claim(4)) == 4
+HOLDER = """
+import sys, time
+from pathlib import Path
+from armid.study.store import Store
+
+store = Store(Path(sys.argv[1]))
+print("open", flush=True)
+time.sleep(600)
+"""
 
 
-def test_the_claim_of_a_living_process_is_respected(store, tmp_path):
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as living:
-        identity = ProcessIdentity(this_place(), living.pid, start_of(living.pid))
-        assert not is_gone(identity)
-        assert len(store.claim(3)) == 3
-        claims_of_another(tmp_path, *identity)
-        assert runs(store.claim(4)) == ["a3"]
-        assert store.claim(1) == []
-        assert store.others() == [living.pid]
-        living.communicate(b"\n")
-    assert is_gone(identity)
-    assert len(store.claim(4)) == 3
-
-
-def test_the_claim_of_another_machine_is_void_for_who_has_nothing_else(store, tmp_path):
-    store.claim(2)
-    claims_of_another(tmp_path, "elsewhere", 1, "1")
-    assert runs(store.claim(4)) == ["a2", "a3"]
-    assert runs(store.claim(4)) == ["a0", "a1"]
+def test_a_killed_process_keeps_nobody_out(tmp_path):
+    command = [sys.executable, "-c", HOLDER, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "open\n"
+        with pytest.raises(ArmidError, match="another process is at the runs of"):
+            Store(tmp_path)
+        process.kill()
+    with Store(tmp_path) as store:
+        store.plan(DESCRIPTION, planned(2))
+        assert runs(store) == ["a0", "a1"]
 
 
 def test_a_run_is_kept_once(store):
@@ -103,18 +80,10 @@ def test_a_run_is_kept_once(store):
     assert load_study(store.path).runs["seconds"].tolist() == [1.0]
 
 
-def test_a_plan_that_another_runner_has_changed_is_told(store, tmp_path):
-    with Store(tmp_path) as other:
-        other.plan(DESCRIPTION, planned(5))
-        with pytest.raises(ArmidError, match="was given another plan by another runner"):
-            store.claim(1)
-
-
-def test_another_study_in_the_same_folder_is_refused(store, tmp_path):
-    words = "holds the study 'made', another folder is expected"
-    with Store(tmp_path) as other, pytest.raises(ArmidError, match=words):
-        other.plan({"name": "other", "cases": []}, planned(1, "b"))
-    assert runs(store.claim(9)) == ["a0", "a1", "a2", "a3"]
+def test_another_study_in_the_same_folder_is_refused(store):
+    with pytest.raises(ArmidError, match="holds the study 'made', another folder is expected"):
+        store.plan({"name": "other", "cases": []}, planned(1, "b"))
+    assert runs(store) == ["a0", "a1", "a2", "a3"]
 
 
 @pytest.mark.parametrize("content", [b"no database at all, but long enough to look like one" * 99, None])
@@ -143,7 +112,7 @@ ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELEC
 # What makes a store that computes when it is used, and the name under which it is refused.
 COMPUTING = {
     f"DROP TABLE runs; CREATE VIEW runs AS {ENDLESS} i AS run, i AS status FROM n": "runs",
-    f"CREATE TRIGGER late AFTER INSERT ON claims BEGIN INSERT INTO texts {ENDLESS} i, i FROM n; END": "late",
+    f"CREATE TRIGGER late AFTER INSERT ON runs BEGIN INSERT INTO texts {ENDLESS} i, i FROM n; END": "late",
     "CREATE INDEX wide ON runs(length(printf('%0200000000d', 1)))": "wide",
     "CREATE TABLE made (a, b AS (hex(zeroblob(100000000))))": "made",
     "CREATE VIRTUAL TABLE made USING fts5(a)": "made",

@@ -20,7 +20,7 @@ from armid.study.analyses.convergence import area_over_curve, attained
 from armid.study.document import report_of
 from armid.study.results import load_study
 from armid.study.runner import run_study
-from armid.study.store import Counts, Store
+from armid.study.store import Store
 from armid.study.tasks import read_study
 from armid.study.tune import RANGES, Tuned, proposed, training, tune, tuned_document, tuned_study
 from commands import ended
@@ -136,12 +136,12 @@ def watched(monkeypatch):
         if len(seen.finished) == seen.press_after:
             signal.raise_signal(signal.SIGINT)
 
-    def claim(store, n, claims=Store.claim):
-        runs = claims(store, n)
-        seen.handed += [(each.run, each.run in seen.finished) for each in runs]
-        return runs
+    def missing(store, missing=Store.missing):
+        for each in missing(store):
+            seen.handed.append((each.run, each.run in seen.finished))
+            yield each
 
-    monkeypatch.setattr(Store, "claim", claim)
+    monkeypatch.setattr(Store, "missing", missing)
     monkeypatch.setattr("armid.study.runner.progress_bar", lambda shown: nullcontext(watch))
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield seen
@@ -250,9 +250,7 @@ def test_a_tuned_identifier_has_the_budgets_and_seeds_of_the_one_as_it_is(writte
 def test_no_tuning_without_its_package_or_while_another_is_at_its_runs(written, tmp_path, monkeypatch):
     pytest.importorskip("optuna")
     first = training(read_study(written()), 1)
-    left = SimpleNamespace(interrupted=False, counts=Counts(6, 4, 0))
-    monkeypatch.setattr("armid.study.tune.run", lambda *_, **__: left)
-    with pytest.raises(ArmidError, match=r"2 runs of .* are still with another runner"):
+    with Store(tmp_path / "out"), pytest.raises(ArmidError, match="another process is at the runs of"):
         tune(first, "own.toml", tmp_path / "out", 2)
     monkeypatch.setattr("armid.study.tune.find_spec", lambda name: None)
     with pytest.raises(ArmidError, match=r"needs the package optuna.*pip install 'armid\[suite\]'"):

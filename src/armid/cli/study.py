@@ -48,8 +48,8 @@ def study_command(
     """Run what is missing of STUDY, a TOML file of cases, identifiers, fitnesses and seeds, or of campaigns to close.
 
     Finished runs are kept in one SQLite file, whatever ends the program; the same command goes on where it was.
-    Several may work on one study at once. A study whose file has changed keeps the runs whose settings have not. Ends
-    with 0 also where runs have failed, which is told; 130 after Ctrl-C.
+    One process at a time works on a folder; --dask shares the runs among machines. A study whose file has changed keeps
+    the runs whose settings have not. Ends with 0 also where runs have failed, which is told; 130 after Ctrl-C.
     """
     from armid.study.runner import TIME_LIMIT_S, absolute, progress_bar, run
     from armid.study.tasks import Study, read_study
@@ -85,9 +85,6 @@ def words(ending: "Ending") -> list[str]:
              f"of {counts.planned} are in {ending.folder}"]  # fmt: skip
     if ending.interrupted:
         lines.append("interrupted: every finished run is kept, the same command goes on")
-    elif counts.missing and ending.others:
-        others = ", ".join(map(str, ending.others))
-        lines.append(f"{counts.missing} runs are still with another runner (process {others})")
     if counts.failed:
         lines.append(f"{counts.failed} runs failed, the first: {ending.first_error[:MOST_NAMED]}")
     return lines

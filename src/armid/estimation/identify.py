@@ -11,17 +11,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pymoo.core.algorithm import Algorithm
-from pymoo.optimize import minimize
 
 from armid.errors import ArmidError, quoted
 from armid.estimation.information import MISFIT, Information, information_at
 from armid.estimation.least_squares import held_by_bound, with_fitted_starts
 from armid.estimation.mends import Suspicion
-from armid.identifiers import Identifier, can_run_directly, run_directly
+from armid.identifiers import Identifier, run
 from armid.model import Array, Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
-from armid.problem.meter import LARGEST_BUDGET, BudgetIgnoredError, Meter, MeterTermination
+from armid.problem.meter import LARGEST_BUDGET, BudgetIgnoredError, Meter
 from armid.problem.problem import (
     IdentificationProblem,
     Replay,
@@ -86,7 +84,8 @@ class Identification(Result):
     """The result of one run; it prints itself, and has a table, figures and files.
 
     candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
-    (None without such records). trace: evaluations and best fitness at each improvement. suspicions: of a screen.
+    (None without such records). trace: evaluations and best fitness at each improvement. improved: the free parameters
+    at each improvement, SI, (n_improvements, n_free). suspicions: of a screen.
     """
 
     kind: ClassVar[Kind] = IDENTIFICATION
@@ -108,6 +107,7 @@ class Identification(Result):
     n_failed: int
     seed: int
     stopped: str
+    improved: Array
     suspicions: tuple[Suspicion, ...] = ()
 
     @property
@@ -146,10 +146,20 @@ def identify(
         # a whole number may have more digits than any float
         raise ArmidError(f"the budget is {quoted(budget)}, expected at most {LARGEST_BUDGET:,} simulations")
     identifier.refuse(fitness)
-    meter = Meter(budget, target)
-    identifier.build(meter.budget)  # refuses bad options before anything is calibrated
+    # a bad budget or target, and bad options, are refused before anything is calibrated
+    identifier.build(Meter(budget, target).budget)
     train = with_fitted_starts(replays(campaign.train, model, space, accuracy), space)
-    seen = judged_by(fitness, train)
+    holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
+    return identified(campaign, train, holdout, space, fitness, identifier, budget, seed, target, progress)
+
+
+def identified(
+    campaign: Campaign, train: tuple[Replay, ...], holdout: tuple[Replay, ...], space: Space, fitness: Fitness,
+    identifier: Identifier, budget: int, seed: int, target: float | None = None,
+    progress: Callable[[Meter], None] | None = None,
+) -> Identification:  # fmt: skip
+    """Identify from records that are ready to be simulated, all of one model; arguments and errors as `identify`."""
+    meter, seen, model = Meter(budget, target), judged_by(fitness, train), train[0].model
     if space.free.any():
         stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
         if meter.best_x is None:
@@ -170,7 +180,6 @@ def identify(
         signals, measured = signals_of(seen, space.complete(x[np.newaxis])), [r.measured for r in seen]
         value = float(fitness_of(fitness, seen, measured, signals, weights_of(fitness, seen), output_sizes(seen))[0])
     candidate = space.complete(x[np.newaxis])[0]
-    holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     errors = campaign_errors(train, candidate)
     assert errors is not None
     weights = None if fitness.weigh is None else residual_weights(fitness, seen, output_sizes(seen))
@@ -179,7 +188,7 @@ def identify(
     return Identification(
         campaign, model, space, fitness, identifier.name, candidate, value, information,
         errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
-        meter.budget, meter.used, meter.n_failed, int(seed), stopped,
+        meter.budget, meter.used, meter.n_failed, int(seed), stopped, meter.log().X[trace.evaluation - 1],
     )  # fmt: skip
 
 
@@ -199,17 +208,8 @@ def search(
                 progress(meter)
             return interrupted() or meter.reached or meter.exhausted
 
-        def after_generation(running: Algorithm) -> None:
-            if is_over():
-                running.termination.terminate()
-                running.termination.update(running)
-
         try:
-            if can_run_directly(algorithm):
-                run_directly(algorithm, problem, seed, is_over)
-            else:
-                minimize(problem, algorithm, MeterTermination(meter), seed=seed, callback=after_generation,
-                         copy_algorithm=False)  # fmt: skip
+            run(algorithm, problem, seed, is_over)
         except BudgetIgnoredError:
             if meter.best_x is None:
                 raise

@@ -12,12 +12,13 @@ from pymoo.core.algorithm import Algorithm
 
 from armid.engine import golden_steps
 from armid.errors import ArmidError, nearest
-from armid.identifiers.identifier import Identifier, checked_share
-from armid.identifiers.pymoo_adapter import SearchAlgorithm, search_of, takes_start
-from armid.identifiers.search import Ask, Dropped, Search, SearchTask, Told
+from armid.identifiers.identifier import SMALLEST_SHARE, Identifier, Option, checked
+from armid.identifiers.pymoo_adapter import SearchAlgorithm, carry_out, takes_start
+from armid.identifiers.search import Dropped, SearchTask, Told
 from armid.model import Array
 
 PREFIX = "multistart:"
+SHARE = Option("of the budget", least=SMALLEST_SHARE, most=1.0)
 
 
 def chain_of(phases: Sequence[Identifier]) -> Identifier:
@@ -46,14 +47,35 @@ def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> 
         if not takes_start(build()) and phase is not phases[0]:
             raise ArmidError(f"identifier '{phase.name}' takes no start x0, in a chain it is expected to be the first")
     ends = [*(round(end * budget) for end in accumulate(shares[:-1])), maxsize]
+    return SearchAlgorithm(partial(search_in_turn, builds, ends), budget)
 
-    def method(task: SearchTask) -> Search:
-        seen = Seen(task)
-        for build, end in zip(builds, ends, strict=True):
-            yield from seen.until(build, end)
-        return seen.best is not None
 
-    return SearchAlgorithm(method, budget)
+def search_in_turn(builds: Sequence[Callable[[], Algorithm]], ends: Sequence[int], task: SearchTask) -> None:
+    """Run fresh phases one after another, each from the best so far until so many simulations are used in all.
+
+    The last batch of a phase may be cut.
+    """
+    best, least, used = task.start, np.inf, 0
+
+    def ask(X: Array, residuals: bool = False) -> Told:
+        nonlocal best, least, used
+        kept = X[: end - used]
+        told = task.ask(kept, residuals)
+        used += len(kept)
+        if len(kept) and (lowest := float(told.F.min())) < least:
+            best, least = kept[np.argmin(told.F)].copy(), lowest
+        if used >= end:
+            raise Dropped
+        return told
+
+    for build, end in zip(builds, ends, strict=True):
+        if used < end:
+            try:
+                carry_out(build(), replace(task, start=best, ask=ask))
+            except Dropped:
+                # the run itself may have ended
+                if used < end:
+                    raise
 
 
 def shares_of(given: Any, n_phases: int) -> list[float]:
@@ -61,7 +83,7 @@ def shares_of(given: Any, n_phases: int) -> list[float]:
         shares = [0.5**phase for phase in range(1, n_phases)]
     else:
         parts = given.split(":") if isinstance(given, str) else given if isinstance(given, list | tuple) else [given]
-        shares = [checked_share("share", as_number(part)) for part in parts]
+        shares = [checked("share", as_number(part), about=SHARE) for part in parts]
     if len(shares) != n_phases - 1 or sum(shares) >= 1.0:
         raise ArmidError(f"share is {given!r}, expected {n_phases - 1} shares of the budget with a sum below 1, "
                          "one for each phase but the last, such as 0.5 or 0.5:0.3")  # fmt: skip
@@ -73,50 +95,6 @@ def as_number(part: Any) -> Any:
         return float(part) if isinstance(part, str) else part
     except ValueError:
         return part
-
-
-class Seen:
-    """Follow the phases of a chain: count what they ask for and keep the best, where the next one starts."""
-
-    def __init__(self, task: SearchTask) -> None:
-        self.task, self.best, self.least, self.used = task, task.start, np.inf, 0
-
-    def until(self, build: Callable[[], Algorithm], end: int) -> Search:
-        """Run a fresh phase until it ends by itself or so many simulations are used; its last batch may be cut."""
-
-        def ask(X: Array, residuals: bool = False) -> Told:
-            assert self.task.ask is not None
-            kept = X[: end - self.used]
-            told = self.see(kept, self.task.ask(kept, residuals))
-            if self.used >= end:
-                raise Dropped
-            return told
-
-        if self.used >= end:
-            return True
-        asker = None if self.task.ask is None else ask
-        search = search_of(build(), replace(self.task, start=self.best, ask=asker))
-        told: Told | None = None
-        try:
-            while self.used < end:
-                asked = search.send(told)  # type: ignore[arg-type]
-                kept = asked.X[: end - self.used]
-                told = self.see(kept, (yield Ask(kept, asked.residuals)))
-        except StopIteration:
-            return True
-        except Dropped:
-            if self.used < end:
-                raise
-        finally:
-            search.close()
-        return True
-
-    def see(self, X: Array, told: Told) -> Told:
-        self.used += len(X)
-        leader = int(np.argmin(told.F))
-        if told.F[leader] < self.least:
-            self.best, self.least = X[leader].copy(), float(told.F[leader])
-        return told
 
 
 def multistart_of(local: Identifier) -> Identifier:
@@ -135,14 +113,15 @@ def built_multistart(local: Identifier, budget: int, **options: Any) -> SearchAl
     if not takes_start(build()):
         raise ArmidError(f"identifier '{local.name}' takes no start x0, {PREFIX} expects one that does")
 
-    def method(task: SearchTask) -> Search:
-        cube, start = task.cube, task.start
-        for point in spread(task.random, cube.n):
-            yield from search_of(build(), replace(task, start=cube.candidates(point)[0] if start is None else start))
-            start = None
-        return True
+    return SearchAlgorithm(partial(search_again, build), budget)
 
-    return SearchAlgorithm(method, budget)
+
+def search_again(build: Callable[[], Algorithm], task: SearchTask) -> None:
+    """Run fresh searches from the task's start, then from ever new points."""
+    cube, start = task.cube, task.start
+    for point in spread(task.random, cube.n):
+        carry_out(build(), replace(task, start=cube.candidates(point)[0] if start is None else start))
+        start = None
 
 
 def spread(random: np.random.Generator, n: int) -> Iterator[Array]:

@@ -1,11 +1,14 @@
-"""What an identifier is, and checks of options."""
+"""What an identifier is, and what an option of it is: a typed field with its meaning, limits and range for tuning."""
 
 import inspect
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import partial
-from typing import Any
+from importlib.util import find_spec
+from sys import float_info
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 from pymoo.core.algorithm import Algorithm
@@ -25,6 +28,93 @@ NOT_OPTIONS = (*OF_SETUP, "budget", "self")
 SMALLEST_SHARE = 1e-15
 # Larger populations do not fit into memory, larger budgets and schedules into no lifetime.
 LARGEST_POPULATION, LARGEST_COUNT = 10**6, 10**15
+RANGE = "share of the range"
+
+
+@dataclass(frozen=True)
+class Option:
+    """Declare what an option means, its unit, and which values it can have.
+
+    least, most: limits of a number. known: words that it may be. expected: values in words, where the limits do not
+    say it. tune: range in which `armid tune` looks, None where it leaves the option alone.
+    """
+
+    meaning: str
+    unit: str = "1"
+    least: float = 0.0
+    most: float = float_info.max
+    known: tuple[str, ...] = ()
+    expected: str = ""
+    tune: tuple[float, float] | None = None
+
+
+NUMBER = Option("")
+
+
+def option(default: Any, meaning: str, unit: str = "1", **limits: Any) -> Any:
+    """Return the field of an option; limits: those of `Option`. A default of None is the algorithm's own choice."""
+    return field(default=default, metadata={"option": Option(meaning, unit, **limits)})
+
+
+def share(default: float, meaning: str, most: float = 1.0, **limits: Any) -> Any:
+    """Return the field of an option that is a share of each parameter's range."""
+    return option(default, meaning, RANGE, least=SMALLEST_SHARE, most=most, **limits)
+
+
+def population(default: int | None, meaning: str, **limits: Any) -> Any:
+    """Return the field of an option that is a number of candidates."""
+    return option(default, meaning, least=1, most=LARGEST_POPULATION, **limits)
+
+
+class Options(ABC):
+    """Check the options of an algorithm, a frozen dataclass of fields made by `option`, and build it.
+
+    package: what it needs beside armid's own dependencies, "" for nothing.
+    """
+
+    package: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        for each in options_in(type(self)):
+            value = getattr(self, each.name)
+            if value is not None or each.default is not None:
+                object.__setattr__(self, each.name, checked(each.name, value, kind_of(each), each.metadata["option"]))
+
+    @abstractmethod
+    def build(self, budget: int) -> Algorithm:
+        """Return a fresh algorithm of pymoo for a budget in simulations."""
+
+
+def options_in(algorithm: Any) -> list[Any]:
+    return [each for each in fields(algorithm) if "option" in each.metadata]
+
+
+def kind_of(option: Any) -> type:
+    """Return the type of the values of an option that may also be None or a word."""
+    kinds = get_args(option.type) or (option.type,)
+    return next(kind for kind in (bool, int, float, str) if kind in kinds)
+
+
+def checked(name: str, value: Any, kind: type = float, about: Option = NUMBER) -> Any:
+    """Return a value as its kind; refuse with ArmidError another kind, or a number outside the limits."""
+    if isinstance(value, str) and value in about.known:
+        return value
+    kinds = {bool: bool | np.bool_, int: int | np.integer, float: int | float | np.number, str: ()}[kind]
+    fits = isinstance(value, kinds) and isinstance(value, bool | np.bool_) == (kind is bool)
+    if fits and (kind is bool or about.least <= value <= about.most):
+        return kind(value)
+    if fits and kind is int and value > about.most:
+        raise ArmidError(f"{name} is {value:.6g}, expected a whole number of at most {about.most:,}")
+    if about.known and not about.expected:
+        raise ArmidError(f"{name} is {value!r}, {nearest(str(value), about.known)}")
+    number = "a number above 0" if about.least == SMALLEST_SHARE else f"a number of at least {about.least:g}"
+    number += f" and at most {about.most:g}" if about.most < float_info.max else ""
+    expected = {bool: "true or false", int: "a whole number above 0"}.get(kind, number)
+    raise ArmidError(f"{name} is {value!r}, expected {about.expected or expected}")
+
+
+def checked_count(name: str, value: Any) -> int:
+    return int(checked(name, value, int, Option("", least=1, most=LARGEST_COUNT)))
 
 
 @dataclass(frozen=True)
@@ -35,7 +125,7 @@ class Identifier:
     any; note: what it is, in words.
     is_global: it searches the whole box; uses_gradient: it asks for derivatives; is_stochastic: a seed changes it;
     needs_residuals: it works on residual vectors, so the fitness has to be a sum of squares.
-    package: what it needs beside armid's own dependencies, "" for nothing.
+    package: what it needs beside armid's own dependencies, "" for nothing. algorithm: the dataclass of its options.
     """
 
     name: str
@@ -46,6 +136,7 @@ class Identifier:
     is_stochastic: bool = True
     needs_residuals: bool = False
     package: str = ""
+    algorithm: Any = None
 
     def with_options(self, options: Mapping[str, Any]) -> "Identifier":
         """Return the identifier with options of its own, such as `velocity_limit` of the swarm.
@@ -70,6 +161,22 @@ class Identifier:
             )
 
 
+def declared(name: str, note: str, algorithm: Any, *fixed: Any, **flags: Any) -> Identifier:
+    """Return the identifier of a dataclass of options; fixed: values of its first fields, which are no options."""
+    build = partial(built, algorithm, fixed, name)
+    return Identifier(name, build, note, package=algorithm.package, algorithm=algorithm, **flags)
+
+
+def built(algorithm: Any, fixed: tuple[Any, ...], name: str, budget: int, **options: Any) -> Algorithm:
+    """Return the algorithm of a dataclass; refuse a missing package, unknown options and bad values."""
+    if algorithm.package and find_spec(algorithm.package) is None:
+        raise ArmidError(f"identifier '{name}' needs the package {algorithm.package}, which is not installed: "
+                         "pip install 'armid[suite]' is expected")  # fmt: skip
+    checked_count("the budget", budget)
+    refuse_unknown(options, [each.name for each in options_in(algorithm)], f"'{name}'")
+    return algorithm(*fixed, **options).build(budget)
+
+
 def accepts(function: Callable[..., Any], *arguments: object, **named: object) -> bool:
     try:
         inspect.signature(function).bind(*arguments, **named)
@@ -85,41 +192,3 @@ def refuse_unknown(given: Iterable[str], known: Iterable[str], whose: str, unsai
         if name not in (*names, *further):
             names += get_close_matches(name, further, n=1)
             raise ArmidError(f"{whose} has no option '{name}', {nearest(name, names)}")
-
-
-def checked(name: str, value: Any, least: float = 0.0, expected: str = "a number of at least 0") -> float:
-    """Return an option as a float; refuse with ArmidError what is no finite number or is below the least."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not least <= value < np.inf:
-        raise ArmidError(f"{name} is {value!r}, expected {expected}")
-    return float(value)
-
-
-def checked_share(name: str, value: Any, most: float = 1.0) -> float:
-    expected = f"a number above 0 and at most {most:g}"
-    share = checked(name, value, SMALLEST_SHARE, expected)
-    if share > most:
-        raise ArmidError(f"{name} is {value!r}, expected {expected}")
-    return share
-
-
-def checked_count(name: str, value: Any, most: int = LARGEST_COUNT) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise ArmidError(f"{name} is {value!r}, expected a whole number above 0")
-    if value > most:
-        raise ArmidError(f"{name} is {value:.6g}, expected a whole number of at most {most:,}")
-    return int(value)
-
-
-checked_population = partial(checked_count, most=LARGEST_POPULATION)
-
-
-def checked_flag(name: str, value: Any) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise ArmidError(f"{name} is {value!r}, expected true or false")
-    return bool(value)
-
-
-def checked_choice(name: str, value: Any, known: tuple[str, ...]) -> str:
-    if value not in known:
-        raise ArmidError(f"{name} is {value!r}, {nearest(str(value), known)}")
-    return str(value)

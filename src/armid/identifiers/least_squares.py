@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armid.identifiers.identifier import checked, checked_choice, checked_share
-from armid.identifiers.pymoo_adapter import declared
-from armid.identifiers.search import Asker, Cube, Method, NoFitnessError, Search, SearchTask, local_search
+from armid.identifiers.identifier import RANGE, declared, option, share
+from armid.identifiers.pymoo_adapter import SearchOptions
+from armid.identifiers.search import NoFitnessError, SearchTask, local_search
 from armid.model import Array
 
 FORWARD, CENTRAL = "forward", "central"
@@ -15,45 +15,44 @@ KINDS = (FORWARD, CENTRAL)
 MOST_CALLS = 10**9
 
 
-def trust_region(differences: str = FORWARD, step: float = 1e-6, tolerance: float = 1e-12) -> Method:
+@dataclass(frozen=True)
+class TrustRegion(SearchOptions):
     """Minimise sum r_i(x)^2 within the box by trust region reflective steps.
 
     The derivatives of r come from one batch of perturbed candidates a step. Source: Branch, Coleman, Li 1999,
     doi:10.1137/S1064827595289108, as scipy.optimize.least_squares has it.
-    differences: "forward" or "central"; step: how far a perturbed candidate is, as a share of the range;
-    tolerance: it ends when a step changes parameters or sum of squares by less than this share.
     """
-    checked_choice("differences", differences, KINDS)
-    checked_share("step", step)
-    checked("tolerance", tolerance, 1e-15, "a number of at least 1e-15")
 
-    def search(task: SearchTask) -> Search:
-        cube = task.cube
+    differences: str = option(FORWARD, "forward or central", "", known=KINDS)
+    step: float = share(1e-6, "how far a perturbed candidate is")
+    tolerance: float = option(1e-12, "it ends when a step changes no parameter, nor the sum of squares, by more", RANGE,
+                              least=1e-15, expected="a number of at least 1e-15")  # fmt: skip
 
-        def descend(ask: Asker, start: Array) -> None:
-            from scipy.optimize import least_squares
+    def search(self, task: SearchTask) -> None:
+        """Descend from the task's start, or from random ones until one has a fitness."""
+        local_search(task, lambda start: self.descend(task, start))
 
-            residual = Residual(cube, ask, step, differences)
-            # no limit on the gradient: it is no share of anything
-            least_squares(
-                residual.at, start, residual.derivative, (0.0, 1.0), "trf", ftol=tolerance, xtol=tolerance, gtol=None,
-                max_nfev=MOST_CALLS,
-            )  # fmt: skip
+    def descend(self, task: SearchTask, start: Array) -> None:
+        """Let scipy minimise from a start in the unit cube, (n,)."""
+        from scipy.optimize import least_squares
 
-        return local_search(task, descend)
+        residual = Residual(task, self.step, self.differences)
+        # no limit on the gradient: it is no share of anything
+        least_squares(
+            residual.at, start, residual.derivative, (0.0, 1.0), "trf", ftol=self.tolerance, xtol=self.tolerance,
+            gtol=None, max_nfev=MOST_CALLS,
+        )  # fmt: skip
 
-    return search
 
-
-LEAST_SQUARES = declared("least_squares", "trust region on the residual vector (scipy)", trust_region,
+LEAST_SQUARES = declared("least_squares", "trust region on the residual vector (scipy)", TrustRegion,
                          uses_gradient=True, needs_residuals=True)  # fmt: skip
 
 
 class Residual:
     """Give scipy residuals and their derivatives; the latter at the point that it asked for last, which is accepted."""
 
-    def __init__(self, cube: Cube, ask: Asker, step: float, differences: str) -> None:
-        self.cube, self.ask, self.step, self.differences = cube, ask, step, differences
+    def __init__(self, task: SearchTask, step: float, differences: str) -> None:
+        self.cube, self.ask, self.step, self.differences = task.cube, task.ask, step, differences
         self.here: Array | None = None
 
     def at(self, u: Array) -> Array:

@@ -1,7 +1,7 @@
 """How a user's own becomes an identifier: a class or a function of pymoo, or any function that searches by itself."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from pymoo.core.algorithm import Algorithm
 from armid.errors import ArmidError
 from armid.identifiers.identifier import Identifier, accepts, refuse_unknown
 from armid.identifiers.pymoo_adapter import SearchAlgorithm
-from armid.identifiers.search import Asker, Calls, Search, SearchTask, in_thread
+from armid.identifiers.search import Asker, Calls, SearchTask
 from armid.model import Array
 from armid.problem.meter import PENALTY
 
@@ -89,29 +89,26 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
 def searching(name: str, function: Callable[..., Any], budget: int, **options: Any) -> SearchAlgorithm:
     """Return a user's search as an algorithm; refuse with ArmidError an option that it does not take."""
     refuse_unknown(options, [a for a in arguments_of(function) if a not in SEARCH_ARGUMENTS], f"'{name}'")
+    return SearchAlgorithm(partial(search_by, function, options), budget)
 
-    def method(task: SearchTask) -> Search:
-        low, high = task.problem.xl, task.problem.xu
-        cube = task.cube
-        start = cube.candidates(cube.drawn(task.random))[0] if task.start is None else task.start
 
-        def attempt(ask: Asker) -> bool:
-            value = Value(ask, low, high)
-            given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": budget, "random": task.random,
-                     "start": start.copy()}  # fmt: skip
-            try:
-                function(**{key: given[key] for key in arguments_of(function) if key in given}, **options)
-            except Exception:
-                # compiled libraries turn an error of a call into one of their own
-                if value.ask.error is None:
-                    raise
-            if value.ask.error is not None:
-                raise value.ask.error
-            return True
-
-        return attempt(task.ask) if task.ask is not None else (yield from in_thread(attempt))
-
-    return SearchAlgorithm(method, budget)
+def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: SearchTask) -> None:
+    """Let a function search that calls for values until they raise."""
+    low, high, cube = task.problem.xl, task.problem.xu, task.cube
+    value, start = (
+        Value(task.ask, low, high),
+        cube.candidates(cube.first(task))[0] if task.start is None else task.start,
+    )
+    given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": task.budget, "random": task.random,
+             "start": start.copy()}  # fmt: skip
+    try:
+        function(**{key: given[key] for key in arguments_of(function) if key in given}, **options)
+    except Exception:
+        # compiled libraries turn an error of a call into one of their own
+        if value.ask.error is None:
+            raise
+    if value.ask.error is not None:
+        raise value.ask.error
 
 
 class Value:

@@ -8,7 +8,7 @@ Where a run goes, in reading order:
 - runner: run what is missing of a study
 - pool: worker processes on this machine, each run with a time limit
 - worker: the program of such a process
-- store: one SQLite file: the planned runs, which process works on which, and all finished runs
+- store: one SQLite file: the planned runs and all finished ones
 
 Beside them: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind of
 study that closes the loop), dask_pool (a cluster in place of own processes), tune (options of identifiers, learnt on

@@ -2,100 +2,61 @@
 
 import logging
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from concurrent.futures import Future
+from contextlib import suppress
 from importlib import import_module
-from queue import Empty, SimpleQueue
 from typing import Any
 
 from armid.errors import ArmidError
-from armid.study.outcome import ClaimedRun, Outcome
-from armid.study.pool import BatchSize, WorkerProcess, WorkerSetup
+from armid.study.outcome import MissingRun, Outcome
+from armid.study.pool import Worker, WorkerSetup
 
-# Batches of runs that each thread of the cluster has before it.
-AHEAD = 2
-# How often a batch may be sent again after the loss of the workers that had it.
-MOST_LOSSES = 10
 CONNECT_S = 20.0
 OF_THREAD = threading.local()
 
 
-def perform_batch(runs: tuple[ClaimedRun, ...], setup: WorkerSetup) -> list[Outcome]:
-    """Perform some runs on a worker of the cluster, in a process of their own that can be stopped."""
-    process = getattr(OF_THREAD, "process", None)
-    if process is None or process.setup != setup:
-        if process is not None:
-            process.stop()
-        process = OF_THREAD.process = WorkerProcess(setup)
-    return process.perform(list(runs))
+def perform_on_cluster(run: MissingRun, setup: WorkerSetup) -> Outcome:
+    """Perform a run on a worker of the cluster, in a process of its own that can be stopped."""
+    worker = getattr(OF_THREAD, "worker", None)
+    if worker is None or worker.setup != setup:
+        if worker is not None:
+            worker.stop()
+        worker = OF_THREAD.worker = Worker(setup)
+    return worker.perform(run)
 
 
 class DaskPool:
-    """Perform runs on a Dask cluster, as `LocalPool` does on this machine; batches of a lost worker are sent again."""
+    """Perform runs on a Dask cluster, as `LocalPool` does on this machine; runs of a lost worker are made again."""
 
     def __init__(self, address: str, setup: WorkerSetup) -> None:
         self.setup, self.address = setup, address
-        self._client, self._killed = _connected(address)
-        self._batches: dict[Any, tuple[tuple[ClaimedRun, ...], int]] = {}
-        self._ended: SimpleQueue[Any] = SimpleQueue()
-        self._size = BatchSize()
+        self._client = _connected(address)
+        self._executor = self._client.get_executor(pure=False)
 
     @property
-    def held(self) -> int:
-        return sum(len(runs) for runs, _ in self._batches.values())
-
-    def wanted(self) -> int:
-        with self._reached():
-            batches = AHEAD * max(1, sum(self._client.nthreads().values()))
-        return int(max(0, batches - len(self._batches)) * self._size.n_runs)
-
-    def give(self, runs: Sequence[ClaimedRun]) -> None:
-        size = self._size.n_runs
-        for first in range(0, len(runs), size):
-            self._submit(tuple(runs[first : first + size]), 0)
-
-    def wait(self, seconds: float) -> list[Outcome]:
-        with self._reached(), suppress(Empty):
+    def width(self) -> int:
+        """How many runs are performed at a time; ArmidError when the cluster has gone."""
+        try:
             if self._client.status != "running":
                 raise ConnectionError
-            outcomes = self._finished(self._ended.get(timeout=seconds))
-            self._size.update(outcomes)
-            return outcomes
-        return []
-
-    def close(self) -> None:
-        # a scheduler that has gone has nothing to cancel
-        with suppress(OSError):
-            self._client.cancel(list(self._batches))
-        self._client.close()
-
-    @contextmanager
-    def _reached(self) -> Iterator[None]:
-        try:
-            yield
+            return max(1, sum(map(int, self._client.nthreads().values())))
         except OSError as error:
             raise ArmidError(f"the Dask cluster at {self.address} has gone: start again to go on") from error
 
-    def _submit(self, runs: tuple[ClaimedRun, ...], losses: int) -> None:
-        future = self._client.submit(perform_batch, runs, self.setup, pure=False)
-        self._batches[future] = (runs, losses)
-        future.add_done_callback(self._ended.put)
+    def submit(self, run: MissingRun) -> "Future[Outcome]":
+        """Perform a run as soon as a worker is idle."""
+        future: Future[Outcome] = self._executor.submit(perform_on_cluster, run, self.setup)
+        return future
 
-    def _finished(self, future: Any) -> list[Outcome]:
-        runs, losses = self._batches.pop(future)
-        if future.status == "finished":
-            outcomes: list[Outcome] = future.result()
-            return outcomes
-        error = future.exception() if future.status == "error" else None
-        if error is not None and not isinstance(error, self._killed):
-            raise ArmidError(f"a worker of the Dask cluster fails: {error}") from error
-        if losses >= MOST_LOSSES:
-            raise ArmidError(f"the Dask cluster at {self.address} has lost {losses} workers over the same runs")
-        self._submit(runs, losses + 1)
-        return []
+    def close(self) -> None:
+        """End at once; what is not finished is lost."""
+        # a scheduler that has gone has nothing to cancel
+        with suppress(OSError):
+            self._executor.shutdown(wait=False)
+        self._client.close()
 
 
-def _connected(address: str) -> tuple[Any, Any]:
+def _connected(address: str) -> Any:
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
@@ -108,4 +69,4 @@ def _connected(address: str) -> tuple[Any, Any]:
     except (OSError, TimeoutError, ValueError) as error:
         raise ArmidError(f"the Dask cluster at {address} does not answer, tcp://HOST:PORT of a scheduler with a worker "
                          "is expected") from error  # fmt: skip
-    return client, distributed.KilledWorker
+    return client

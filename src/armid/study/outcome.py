@@ -42,7 +42,7 @@ def planned(settings: Mapping[str, Any], *words: Any) -> Planned:
     return Planned(hashlib.sha256(text.encode()).hexdigest()[:ID_LENGTH], text, *words)
 
 
-class ClaimedRun(NamedTuple):
+class MissingRun(NamedTuple):
     """A run that is to be performed: its id, and its settings as the store keeps them (JSON)."""
 
     run: str

@@ -61,8 +61,9 @@ class StudyResults(Shown):
     runs: one row a finished run. noise_deg_s: that the study added, NaN for records that are read. used, n_failed:
     simulations. value: best fitness. train_rmse, holdout_rmse: SI. status: "done" or "failed", with the reason in
     `error`. model, versions: hashes, see `text_of`.
-    parameters: one row a run and free parameter, SI. deviation: one sigma of the Cramer-Rao bound at the solution.
-    relative_error: abs(value - truth)/abs(truth), NaN where the truth is not known.
+    parameters: one row a run and free parameter, SI. deviation: one sigma as of `armid.identify`, the Cramer-Rao bound
+    at the solution where the fitness weighs records by their noise. relative_error: abs(value - truth)/abs(truth),
+    NaN where the truth is not known.
     """
 
     path: Path

@@ -4,10 +4,12 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,12 +32,14 @@ TIME_LIMIT_S = 600.0
 OUT = Path("out")
 # How long to listen for finished runs before Ctrl-C is looked for [s].
 LISTEN_S = 0.25
+# Runs handed out for each that is performed: while one is performed, the next lies ready.
+AHEAD = 3
 Progress = Callable[[Counts, Outcome | None], None]
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a runner ended: how far its study is, what it did, and the other processes still at runs of the study."""
+    """How a runner ended: how far its study is, and what it did."""
 
     study: Task
     folder: Path
@@ -45,7 +49,6 @@ class Ending:
     seconds: float
     interrupted: bool
     first_error: str
-    others: tuple[int, ...]
 
 
 def run_study(
@@ -156,27 +159,26 @@ def run(
                     pool.close()
             return Ending(
                 study, folder, store.counts(), finished, simulations, time.monotonic() - began, interrupted(),
-                store.first_error(), tuple(store.others()),
+                store.first_error(),
             )  # fmt: skip
 
 
-def _performed(store: Store, pool: "LocalPool | DaskPool", interrupted: Callable[[], bool]) -> Iterable[Outcome]:
+def _performed(store: Store, pool: "LocalPool | DaskPool", interrupted: Callable[[], bool]) -> Iterator[Outcome]:
     """Let the pool perform what is missing and keep each run as it comes; yield those that were new."""
-    is_all_given = False
+    missing, pending = store.missing(), set[Future[Outcome]]()
     while not interrupted():
-        wanted = 0 if is_all_given else pool.wanted()
-        if wanted:
-            runs = store.claim(wanted)
-            is_all_given = not runs
-            pool.give(runs)
-        if not pool.held:
-            # a runner that has ended meanwhile may have left something
-            left = store.claim(1)
-            if not left:
-                return
-            is_all_given = False
-            pool.give(left)
-        for outcome in pool.wait(LISTEN_S):
+        pending |= {pool.submit(run) for run in islice(missing, max(0, AHEAD * pool.width - len(pending)))}
+        if not pending:
+            return
+        finished, pending = wait(pending, LISTEN_S, FIRST_COMPLETED)
+        for future in finished:
+            try:
+                outcome = future.result()
+            except ArmidError:
+                raise
+            except Exception as error:
+                words = f"{type(error).__name__}: {error}"
+                raise ArmidError(f"a worker has gone ({words[:200]}): start again to go on") from error
             if store.save(outcome):
                 yield outcome
 

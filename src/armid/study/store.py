@@ -1,9 +1,8 @@
-"""The store of a study: one SQLite file that holds what is planned, who is at it, and every finished run."""
+"""The store of a study: one SQLite file that holds what is planned and every finished run."""
 
 import hashlib
 import json
 import os
-import platform
 import sqlite3
 import time
 import zlib
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from armid.errors import ArmidError, quoted
-from armid.study.outcome import DONE, FAILED, ClaimedRun, Outcome, Planned
+from armid.study.outcome import DONE, FAILED, MissingRun, Outcome, Planned
 
 FILE_NAME = "study.sqlite"
 # "armd" in ASCII: a file of another program is recognised before anything is written to it.
@@ -42,9 +41,6 @@ CREATE TABLE IF NOT EXISTS runs (
     model TEXT NOT NULL, versions TEXT NOT NULL
 ) WITHOUT ROWID, STRICT;
 CREATE TABLE IF NOT EXISTS texts (hash TEXT PRIMARY KEY, text TEXT NOT NULL) WITHOUT ROWID, STRICT;
-CREATE TABLE IF NOT EXISTS claims (
-    run TEXT PRIMARY KEY, place TEXT NOT NULL, pid INTEGER NOT NULL, start TEXT NOT NULL
-) WITHOUT ROWID, STRICT;
 CREATE TABLE IF NOT EXISTS identified (
     run TEXT NOT NULL PRIMARY KEY, used INTEGER, n_failed INTEGER, value REAL, stopped TEXT, train_rmse REAL,
     train_s REAL, train_s1 REAL, train_s2 REAL, holdout_rmse REAL
@@ -62,26 +58,21 @@ CREATE TABLE IF NOT EXISTS loops (
 
 # Declared type of a column -> what SQLite calls the types of its values.
 TYPES = {"TEXT": ("text",), "INTEGER": ("integer",), "REAL": ("real", "integer"), "BLOB": ("blob",)}
-# Runs that this runner looks at, those of them that are not finished, and those that nobody is at.
+# Runs that this runner looks at, and those of them that are not finished.
 CHOSEN = """
 (p."case" = :case OR p."case" GLOB :case) AND (p.identifier = :identifier OR p.identifier GLOB :identifier)
 """
-UNFINISHED = "NOT EXISTS (SELECT 1 FROM runs r WHERE r.run = p.run)"
-UNCLAIMED = "NOT EXISTS (SELECT 1 FROM claims c WHERE c.run = p.run)"
-NEXT = f"""
+MISSING = f"""
 SELECT p.place, p.run, s.settings FROM plan p JOIN settings s USING (run)
-WHERE p.place > :after AND {CHOSEN} AND {UNFINISHED} AND {UNCLAIMED} ORDER BY p.place LIMIT :n
+WHERE p.place > :after AND {CHOSEN} AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.run = p.run) ORDER BY p.place LIMIT :n
 """
+# How many missing runs are fetched at a time.
+PAGE = 256
 COUNTS = f"""
 SELECT count(*), count(status), ifnull(sum(status = '{FAILED}'), 0) FROM plan p LEFT JOIN runs USING (run)
 WHERE {CHOSEN}
 """
 FAILURES = f"FROM plan p JOIN runs r USING (run) WHERE {CHOSEN} AND r.status = '{FAILED}'"
-OTHERS = f"""
-SELECT DISTINCT c.pid FROM plan p JOIN claims c USING (run)
-WHERE {CHOSEN} AND {UNFINISHED} AND c.place = :here AND c.pid != :pid
-"""
-VOID = "DELETE FROM claims WHERE place = ? AND pid = ? AND start = ?"
 
 
 class Counts(NamedTuple):
@@ -95,30 +86,31 @@ class Counts(NamedTuple):
 
 
 class Store:
-    """Write to the store of a study; only: patterns of case and identifier that this runner looks at.
+    """Write to the store of a study, one process at a time; only: patterns of case and identifier that it looks at.
 
     Every finished run is one transaction. A run that is there already stays as it is, so that nothing is there twice.
-    Raises ArmidError with one sentence for all that the disk refuses.
+    Raises ArmidError with one sentence for all that the disk refuses, and where another process is at the store.
     """
 
     def __init__(self, folder: Path, only: tuple[str, str] = ("*", "*")) -> None:
         if folder.exists() and not folder.is_dir():
             raise ArmidError(f"{folder} is a file, a folder for the results is expected")
         self.path = folder / FILE_NAME
-        self._process = this_process()
         self._chosen = {"case": only[0], "identifier": only[1]}
-        self._place, self._plan = -1, ""
         self._connection = opened(self.path)
+        try:
+            self._lock = locked(folder)
+        except BlockingIOError as error:
+            closed(self._connection)
+            raise ArmidError(f"another process is at the runs of {self.path}: let it end, the same command goes on "
+                             "then") from error  # fmt: skip
 
     def __enter__(self) -> "Store":
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give back what was claimed and not finished, and close the file."""
-        # where the disk is full, the claims end with this process
-        with suppress(sqlite3.Error):
-            self._connection.execute(VOID, self._process)
         closed(self._connection)
+        os.close(self._lock)
 
     def plan(self, description: Mapping[str, Any], planned: Iterable[Planned]) -> None:
         """Set what the study consists of now; finished runs stay, also those that it no longer asks for."""
@@ -132,17 +124,17 @@ class Store:
             self._connection.executemany(
                 "INSERT INTO wanted VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", self._rows(planned, digest)
             )
-            self._plan = digest.hexdigest()
+            plan = digest.hexdigest()
             # an earlier version kept runs that were cut off
             cut = "SELECT run FROM identified WHERE stopped = 'interrupted'"
             self._connection.execute(f"DELETE FROM runs WHERE run IN ({cut})")
-            if self._plan != self._kept("plan"):
+            if plan != self._kept("plan"):
                 self._connection.execute("DELETE FROM plan")
                 self._connection.execute("INSERT INTO plan SELECT * FROM wanted")
                 kept = "SELECT run FROM plan UNION SELECT run FROM runs"
                 self._connection.execute(f"DELETE FROM settings WHERE run NOT IN ({kept})")
             self._connection.execute("DROP TABLE wanted")
-            self._keep("plan", self._plan)
+            self._keep("plan", plan)
             self._keep("description", json.dumps(description, ensure_ascii=False))
 
     def _rows(self, planned: Iterable[Planned], digest: Any) -> Iterable[tuple[Any, ...]]:
@@ -165,27 +157,12 @@ class Store:
         with translate_errors(self.path), transaction(self._connection):
             self._connection.execute(f"DELETE FROM runs WHERE run IN (SELECT p.run {FAILURES})", self._chosen)
 
-    def claim(self, n: int) -> list[ClaimedRun]:
-        """Return up to n runs that nobody has finished or is at, and mark them as this process's.
-
-        When there is none left, claims of processes that have ended are void, and those of other machines too: at worst
-        a run is then made twice, and kept once.
-        """
-        with translate_errors(self.path), transaction(self._connection):
-            if self._kept("plan") != self._plan:
-                raise ArmidError(f"{self.path} was given another plan by another runner: start again to go on with it")
-            rows = self._selected(NEXT, after=self._place, n=n)
-            if not rows:
-                self._place = -1
-                claims = self._connection.execute("SELECT DISTINCT place, pid, start FROM claims").fetchall()
-                for process in (ProcessIdentity(*row) for row in claims):
-                    if process.place != self._process.place or is_gone(process):
-                        self._connection.execute(VOID, process)
-                rows = self._selected(NEXT, after=self._place, n=n)
-            mine = [(run, *self._process) for _, run, _ in rows]
-            self._connection.executemany("INSERT INTO claims VALUES (?, ?, ?, ?)", mine)
-        self._place = rows[-1][0] if rows else -1
-        return [ClaimedRun(run, settings) for _, run, settings in rows]
+    def missing(self) -> Iterator[MissingRun]:
+        """Yield the runs that are not finished, in the order of the plan."""
+        place = -1
+        while rows := self._selected(MISSING, after=place, n=PAGE):
+            place = rows[-1][0]
+            yield from (MissingRun(run, settings) for _, run, settings in rows)
 
     def _selected(self, query: str, **further: object) -> list[Any]:
         """Return rows of the runs that this runner looks at."""
@@ -204,7 +181,6 @@ class Store:
                 for each in rows:
                     marks = ", ".join("?" * (1 + len(each)))
                     self._connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", (outcome.run, *each))
-            self._connection.execute("DELETE FROM claims WHERE run = ?", (outcome.run,))
         return is_new
 
     def _text(self, text: str) -> str:
@@ -221,10 +197,23 @@ class Store:
         rows = self._selected(f"SELECT r.error {FAILURES} ORDER BY p.place LIMIT 1")
         return str(rows[0][0]) if rows else ""
 
-    def others(self) -> list[int]:
-        """Return the processes of this machine that are at runs which this runner looks at."""
-        rows = self._selected(OTHERS, here=self._process.place, pid=self._process.pid)
-        return [int(row[0]) for row in rows]
+
+def locked(folder: Path) -> int:
+    """Return a handle that locks a folder until it is closed or the process ends; BlockingIOError for a locked one.
+
+    Some network file systems have no such lock. There two processes may make a run twice; it is kept once.
+    """
+    from fcntl import LOCK_EX, LOCK_NB, flock
+
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        flock(handle, LOCK_EX | LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise
+    except OSError:
+        pass
+    return handle
 
 
 @contextmanager
@@ -388,50 +377,3 @@ def description_of(file: Path, text: str) -> dict[str, Any]:
     if missing:
         raise ArmidError(f"{file} is damaged: the description of the study lacks '{missing[0]}'")
     return dict(found)
-
-
-class ProcessIdentity(NamedTuple):
-    """A process: its place (machine, boot, and space of numbers, as a container has its own), number, and start.
-
-    start: in ticks since that boot, "" where the system does not tell: numbers are used again.
-    """
-
-    place: str
-    pid: int
-    start: str
-
-
-def this_process() -> ProcessIdentity:
-    return ProcessIdentity(this_place(), os.getpid(), start_of(os.getpid()))
-
-
-def this_place() -> str:
-    """Return what the numbers of processes count in."""
-    boot, space = "", ""
-    with suppress(OSError), open("/proc/sys/kernel/random/boot_id", encoding="ascii") as file:
-        boot = file.read().strip()
-    with suppress(OSError):
-        space = os.readlink("/proc/self/ns/pid")
-    return "/".join((platform.node(), boot, space))
-
-
-def start_of(pid: int) -> str:
-    """Return when a process started, "" where it does not live or the system does not tell."""
-    try:
-        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
-            # the name of the program stands in brackets and may hold anything; the start is 20 fields behind it
-            fields = file.read().rpartition(")")[2].split()
-    except OSError:
-        return ""
-    return "" if fields[0] in "ZX" else fields[19]
-
-
-def is_gone(process: ProcessIdentity) -> bool:
-    """Tell whether a process of this place has surely ended."""
-    if process.start:
-        return start_of(process.pid) != process.start
-    try:
-        os.kill(process.pid, 0)
-    except OSError as error:
-        return isinstance(error, ProcessLookupError)
-    return False

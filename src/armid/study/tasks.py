@@ -23,20 +23,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 
 from armid.errors import ArmidError, MachineError, quoted
-from armid.estimation.identify import INTERRUPTED, campaign_errors, search, versions_of
-from armid.estimation.information import information_at
-from armid.estimation.least_squares import held_by_bound
+from armid.estimation.identify import INTERRUPTED, Identification, identified, versions_of
 from armid.model import Model
 from armid.problem.fitness import fitness_of_name
-from armid.problem.meter import Meter
-from armid.problem.problem import IdentificationProblem, Replay
-from armid.problem.space import Space
 from armid.problem.suite import SuiteProblem, first_of
 from armid.progress import announced
+from armid.record import Campaign
 from armid.record.schema import load_toml, unknown_name, validated
 from armid.registry import place_in_plugin
 from armid.study.cases import Case, cases_of, clean_records
-from armid.study.outcome import DONE, FAILED, ClaimedRun, Outcome, Performed, Planned, packed, planned
+from armid.study.outcome import DONE, FAILED, MissingRun, Outcome, Performed, Planned, packed, planned
 from armid.study.run_cache import RunCache
 from armid.study.spec import (
     CLOSES_LOOP,
@@ -54,7 +50,7 @@ if TYPE_CHECKING:
     from armid.study.loops import LoopStudy
 
 Task: TypeAlias = "Study | LoopStudy"
-Performer: TypeAlias = Callable[[ClaimedRun], Outcome]
+Performer: TypeAlias = Callable[[MissingRun], Outcome]
 SUFFIX = ".toml"
 LONGEST_ERROR = 2000
 # Each run is a row of some kB in the store.
@@ -108,7 +104,7 @@ def task_type(kind: str) -> "type[Task]":
     return Study
 
 
-def perform(run: ClaimedRun, cache: RunCache) -> Outcome:
+def perform(run: MissingRun, cache: RunCache) -> Outcome:
     """Perform a run of any kind; one that fails is an outcome too, so that the others go on.
 
     Raises MachineError where disk, memory or cache are at fault: that is no result of a run.
@@ -225,7 +221,7 @@ class Study:
             if self.registry.digests_of("identifiers", entry.name):
                 settings = {"kind": self.kind, "only_built": True, "identifier": entry.name,
                             "options": dict(entry.options), "budget": entry.budget}  # fmt: skip
-                outcome = performed(ClaimedRun(entry.label, json.dumps(settings)))
+                outcome = performed(MissingRun(entry.label, json.dumps(settings)))
                 if outcome.status == FAILED:
                     raise ArmidError(f"identifier '{entry.label}': it cannot be built: {outcome.error}")
         asked: set[str] = set()
@@ -337,28 +333,21 @@ class Study:
             identifier.build(settings["budget"])
             return Performed(0, "", {})
         case, replays = cache.replays(settings)
-        train = tuple(r for r in replays if r.record.role == "train")
-        holdout = tuple(r for r in replays if r.record.role == "holdout")
-        meter, fitness = Meter(settings["budget"]), fitness_of_name(settings["fitness"], cache.registry.fitness)
-        problem = IdentificationProblem(case.space, train, fitness, meter)
-        stopped = search(problem, meter, identifier, settings["seed"], None)
-        if stopped == INTERRUPTED:
+        train, holdout = (tuple(r for r in replays if r.record.role == role) for role in ("train", "holdout"))
+        model, fitness = train[0].model, fitness_of_name(settings["fitness"], cache.registry.fitness)
+        campaign = Campaign(settings["case"], cache.folder, model.plant, (), tuple(r.record for r in replays), {}, {})
+        found = identified(
+            campaign, train, holdout, case.space, fitness, identifier, settings["budget"], settings["seed"]
+        )
+        if found.stopped == INTERRUPTED:
             # not what was asked for: the worker ends, and the run is given back
             raise KeyboardInterrupt
-        if meter.best_x is None:
-            raise ArmidError(
-                f"none of {meter.used} candidates has a fitness: each diverged, or it was no finite number"
-            )
-        candidate = case.space.complete(meter.best_x[np.newaxis])[0]
-        near, far = campaign_errors(train, candidate), campaign_errors(holdout, candidate)
-        assert near is not None
+        near, far = found.train, found.holdout
         errors = (near.rmse, near.s, near.s1, near.s2, None if far is None else far.rmse)
-        improvements, log = meter.trace(), meter.log()
-        trace = packed(improvements.evaluation, improvements.value, log.X[improvements.evaluation - 1])
-        return Performed(meter.used, case.equations, {
-            "identified": [(meter.used, meter.n_failed, meter.best_f, stopped, *errors)],
-            "parameters": _parameter_rows(case.space, meter.best_x, train),
-            "traces": [(json.dumps(case.space.free_names), trace)],
+        return Performed(found.used, case.equations, {
+            "identified": [(found.used, found.n_failed, found.value, found.stopped, *errors)],
+            "parameters": _parameter_rows(found),
+            "traces": [(json.dumps(case.space.free_names), packed(*found.trace, found.improved))],
         })  # fmt: skip
 
 
@@ -451,12 +440,12 @@ def window_text(window: Sequence[float] | str) -> str:
     return window if isinstance(window, str) else f"{window[0]:g}-{window[1]:g} s"
 
 
-def _parameter_rows(space: Space, x: np.ndarray, train: tuple[Replay, ...]) -> list[tuple[Any, ...]]:
-    """Return value, bounds, Cramer-Rao deviation, largest correlation and flag of each free parameter."""
-    information, free = information_at(train, space, x), space.only(space.free_names)
-    sizes = np.abs(information.correlation)
+def _parameter_rows(found: Identification) -> list[tuple[Any, ...]]:
+    """Return value, bounds, standard deviation, largest correlation and flag of each free parameter."""
+    information, free = found.information, found.space.only(found.space.free_names)
+    x, sizes = found.candidate[found.space.free], np.abs(information.correlation)
     known = np.isfinite(sizes) & ~np.eye(len(sizes), dtype=bool)
     largest = [float(row[there].max()) if there.any() else None for row, there in zip(sizes, known, strict=True)]
     columns = (free.names, free.units, x.tolist(), free.low.tolist(), free.high.tolist(),
-               information.deviation.tolist(), largest, held_by_bound(space, x).tolist())  # fmt: skip
+               information.deviation.tolist(), largest, found.at_bound[found.space.free].tolist())  # fmt: skip
     return list(zip(*columns, strict=True))

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from armid.errors import ArmidError
+from armid.identifiers import IDENTIFIERS, Identifier
+from armid.identifiers.identifier import options_in
 from armid.report.document import Column, Document, table
 from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve
@@ -25,21 +27,14 @@ from armid.study.results import StudyResults, load_study
 from armid.study.runner import Ending, Progress, run
 from armid.study.tasks import Entry, Study
 
-SWARM_PULLS = {"c1": (0.3, 2.5), "c2": (0.3, 2.5)}
-CMA = {"initial_step": (0.05, 0.5), "n_candidates": (4, 40), "growth": (1.0, 4.0)}
-FIRST_STEP = {"initial_step": (0.005, 0.5)}
+
+def ranges_of(identifier: Identifier) -> dict[str, tuple[float, float]]:
+    options = ((each.name, each.metadata["option"].tune) for each in options_in(identifier.algorithm))
+    return {name: tune for name, tune in options if tune is not None}
+
+
 # Identifier -> option -> range: whole numbers where both ends are; in the logarithm where they are 10 times apart.
-RANGES: dict[str, dict[str, tuple[float, float]]] = {
-    "pso": {"n_particles": (5, 160), **SWARM_PULLS, "first_inertia": (0.4, 1.0), "last_inertia": (0.1, 0.7),
-            "velocity_limit": (0.02, 1.0)},
-    "pymoo_pso": {"pop_size": (5, 100), **SWARM_PULLS, "w": (0.3, 1.0), "max_velocity_rate": (0.02, 1.0)},
-    "ga": {"pop_size": (8, 160)},
-    "de": {"pop_size": (8, 120), "CR": (0.1, 1.0), "F": (0.3, 1.0)},
-    "lshade": {"per_parameter": (2.0, 30.0), "memory": (2, 30)},
-    "cmaes": CMA, "bipop_cmaes": CMA, "tpe": {"n_first": (4, 40)},
-    "nelder_mead": FIRST_STEP, "bobyqa": FIRST_STEP, "sbplx": FIRST_STEP, "cobyla": FIRST_STEP, "lbfgs": FIRST_STEP,
-    "slsqp": FIRST_STEP,
-}  # fmt: skip
+RANGES = {name: ranges for name, identifier in IDENTIFIERS.items() if (ranges := ranges_of(identifier))}
 
 
 @dataclass(frozen=True)
@@ -62,7 +57,7 @@ def tune(
     """Try n configurations of each identifier; return what was found, nothing after Ctrl-C, and how all rounds ended.
 
     first: see `training`. The others are those of `armid.study.runner.run`; progress is told of all rounds as one
-    study. Raises ArmidError without Optuna, and while another runner is at runs of the store.
+    study. Raises ArmidError without Optuna, and while another process is at the store.
     """
     if find_spec("optuna") is None:
         raise ArmidError("armid tune needs the package optuna, which is not installed: "
@@ -83,9 +78,6 @@ def tune(
         endings.append(run(study, file, jobs, dask, out, progress=_with_later(progress, later)))
         if endings[-1].interrupted:
             return [], _together(endings, later)
-        if endings[-1].counts.missing:
-            raise ArmidError(f"{endings[-1].counts.missing} runs of {out} are still with another runner: let it end, "
-                             "the same command goes on then")  # fmt: skip
         areas = scores(study, load_study(out))
     found = []
     for label, own in tried.items():
