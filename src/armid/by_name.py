@@ -28,6 +28,7 @@ from armid.record.schema import Known
 from armid.registry import Registry, load_registry, name_of
 
 if TYPE_CHECKING:
+    from armid.estimation.bootstrap import Refined
     from armid.estimation.examine import Examination
     from armid.estimation.identify import Identification
     from armid.loop import ClosedLoop
@@ -188,8 +189,8 @@ def warn_of_far(fixed: Mapping[str, float], bounds: Bounds, model: Model) -> Non
 def identify(
     campaign: Any, model: Model | None = None, space: "Space | None" = None, fitness: Any = None,
     identifier: Any = None, budget: int | None = None, seed: int = 1, target: float | None = None,
-    accuracy: str | None = None, progress: "Callable[[Meter], None] | None" = None, *,
-    options: Mapping[str, Any] | None = None, paper: bool = False, **given: Any,
+    accuracy: str | None = None, progress: "Callable[[Meter | Refined], None] | None" = None, *,
+    options: Mapping[str, Any] | None = None, paper: bool = False, interval: bool = True, **given: Any,
 ) -> "Identification":  # fmt: skip
     """Identify parameters from the train records of a campaign; `armid.identify("folder")` is enough.
 
@@ -215,9 +216,11 @@ def identify(
     accuracy : {"standard", "fine"}
         Of the engine; None: as the noise of each record asks for.
     progress : callable
-        Called with the meter after each generation.
+        Called with the meter after each generation, and with the draws refined so far while a bootstrap runs.
     paper : bool
         The paper's swarm, similarity degree, budget and window, where nothing else is given.
+    interval : bool
+        Whether intervals are wanted; of a fitness that is no sum of squares they take a bootstrap, some seconds.
     **given
         effects, plugins, window, bounds, fix, plant: see `opened`.
 
@@ -245,7 +248,9 @@ def identify(
     suspicions = screen(there.campaign, there.model, space)
     for suspicion in suspicions:
         warnings.warn(suspicion.sentence, stacklevel=2)
-    found = run(there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, progress)
+    found = run(
+        there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, progress, interval
+    )
     return replace(found, suspicions=suspicions)
 
 

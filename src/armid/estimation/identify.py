@@ -5,7 +5,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from typing import Any, ClassVar
 
@@ -15,8 +15,9 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 
 from armid.errors import ArmidError, quoted
-from armid.estimation.information import MISFIT, Information, information_at
-from armid.estimation.least_squares import held_by_bound, with_fitted_starts
+from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
+from armid.estimation.information import MISFIT, Information, information_at, level_of
+from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.mends import Suspicion
 from armid.identifiers import Identifier, can_run_directly, run_directly
 from armid.model import Array, Model
@@ -46,6 +47,8 @@ OUTSIDE = 1e-9
 
 
 INTERRUPTED = "interrupted"
+# Why there is no interval.
+NOT_ASKED = "none was asked for"
 # Where only noise is left, S2 below the first with S1 above the second: S2 pairs the few intervals between landmarks by
 # order, and a landmark of noise unpairs them, so that neither S2 nor S is usable.
 SHAPE_FALLS, NUMBERS_AGREE = 0.9, 0.95
@@ -87,6 +90,7 @@ class Identification(Result):
 
     candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
     (None without such records). trace: evaluations and best fitness at each improvement. suspicions: of a screen.
+    scatter: of the draws of a bootstrap, where these give the intervals; None where least squares does.
     """
 
     kind: ClassVar[Kind] = IDENTIFICATION
@@ -109,6 +113,7 @@ class Identification(Result):
     seed: int
     stopped: str
     suspicions: tuple[Suspicion, ...] = ()
+    scatter: Scatter | None = None
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
@@ -128,13 +133,15 @@ def identify(
     seed: int = 1,
     target: float | None = None,
     accuracy: str | None = None,
-    progress: Callable[[Meter], None] | None = None,
+    progress: Callable[[Meter | Refined], None] | None = None,
+    interval: bool = True,
 ) -> Identification:
     """Search the free parameters on the train records, then judge the best candidate on train and holdout.
 
     Starts of train records in motion are fitted with the parameters, about those of the least-squares estimate. Holdout
     records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so far is
-    judged, `stopped` is "interrupted". Arguments are those of `armid.identify`. Raises ArmidError for a negative seed,
+    judged, `stopped` is "interrupted". Intervals are those of the estimator: of a sum of squares from sensitivities, of
+    any other fitness from a bootstrap. Arguments are those of `armid.identify`. Raises ArmidError for a negative seed,
     a budget too large, a target that is not finite, a fitness that the identifier cannot minimise, and when every
     candidate diverged.
     """
@@ -173,14 +180,44 @@ def identify(
     holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     errors = campaign_errors(train, candidate)
     assert errors is not None
-    weights = None if fitness.weigh is None else residual_weights(fitness, seen, output_sizes(seen))
-    information = information_at(seen, space, x, weights=weights)
+    information, scatter = judged(fitness, seen, space, x, seed, progress, interval and stopped != INTERRUPTED)
     trace = meter.trace()
     return Identification(
         campaign, model, space, fitness, identifier.name, candidate, value, information,
         errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
-        meter.budget, meter.used, meter.n_failed, int(seed), stopped,
+        meter.budget, meter.used, meter.n_failed, int(seed), stopped, scatter=scatter,
     )  # fmt: skip
+
+
+def judged(
+    fitness: Fitness, replays: tuple[Replay, ...], space: Space, x: Array, seed: int,
+    progress: Callable[[Any], None] | None, interval: bool,
+) -> tuple[Information, Scatter | None]:  # fmt: skip
+    """Return covariance and noise at the estimate of a fitness, and the scatter of a bootstrap where it gives them.
+
+    Whether a record holds more than noise is judged at the least-squares estimate near by: the residual of another
+    estimate may be smooth without anything that the model lacks.
+    """
+    if fitness.weigh is not None:
+        weights = residual_weights(fitness, replays, output_sizes(replays))
+        information = information_at(replays, space, x, weights=weights)
+        return information, None if interval else without(x, NOT_ASKED)
+    levels = tuple(level_of(r, space, refine(replays, space, x)) for r in replays)
+    information = information_at(replays, space, x, levels)
+    if not interval or not len(x):
+        return information, without(x, NOT_ASKED)
+    with ctrl_c_waits() as interrupted:
+
+        def is_over(refined: Refined) -> bool:
+            if progress is not None:
+                progress(refined)
+            return interrupted()
+
+        scatter = bootstrap(fitness, replays, space, x, information, seed, is_over)
+    if len(scatter.draws) > 1:
+        information = replace(information, deviation=scatter.draws.std(axis=0, ddof=1), step=scatter.moved,
+                              correlation=np.atleast_2d(np.corrcoef(scatter.draws.T)))  # fmt: skip
+    return information, scatter
 
 
 def search(
