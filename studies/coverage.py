@@ -12,11 +12,10 @@ width        median half width over 1.96 standard deviations of the estimates of
 bias         mean error of the estimates over their standard deviation
 intervals    number of noises for which armid gives an interval
 
-Every single interval stands in arm.csv.gz and axis.csv.gz.
+Every single interval stands in intervals.csv.gz; what is cut off goes on from there with the same command.
 """
 
 import argparse
-import sys
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -92,28 +91,24 @@ def simulated(model: armid.Model, manoeuvre: armid.Manoeuvre, parameters: dict[s
     return armid.simulate(model, manoeuvre, candidate, armid.Schedule(16)).output[0]
 
 
-def identified(machine: Machine, n_noises: int, seed: int) -> Iterator[dict[str, Any]]:
-    """Give a row for each noise, fitness and parameter: estimate, ends of the interval, whether it is one."""
-    for number in range(n_noises):
-        record = machine.record(np.random.default_rng([seed, number]))
-        for name, fitness in FITNESSES.items():
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                found = armid.identify(record, fitness=fitness, budget=BUDGET, seed=number + 1, **machine.given)
-            parameters = found.to_dict()["parameters"]
-            for parameter in machine.truth:
-                p = parameters[parameter]
-                yield {"machine": machine.name, "fitness": name, "parameter": parameter, "noise": number,
-                       "value": p["value"], "low": p["low"], "high": p["high"], "holds": p["interval_holds"],
-                       "doubt": p["interval_doubt"]}  # fmt: skip
-        print(f"{machine.name}: {number + 1} of {n_noises} noises", file=sys.stderr, end="\r", flush=True)
+def identified(machine: Machine, number: int, seed: int) -> Iterator[dict[str, Any]]:
+    """Give a row for each fitness and parameter of one noise: estimate, ends of the interval, what is against it."""
+    record = machine.record(np.random.default_rng([seed, number]))
+    for name, fitness in FITNESSES.items():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = armid.identify(record, fitness=fitness, budget=BUDGET, seed=number + 1, **machine.given)
+        for parameter in machine.truth:
+            p = found.parameters[parameter]
+            yield {"machine": machine.name, "fitness": name, "parameter": parameter, "noise": number,
+                   "value": p.value, "low": p.low, "high": p.high, "doubt": p.doubt}  # fmt: skip
 
 
 def coverage(rows: pd.DataFrame, machine: Machine) -> pd.DataFrame:
     """Return coverage, width, bias and number of intervals of each fitness and parameter of a machine."""
     found = []
     for (fitness, parameter), group in rows.groupby(["fitness", "parameter"], sort=False):
-        truth, given = machine.truth[str(parameter)], group[group["holds"]]
+        truth, given = machine.truth[str(parameter)], group[group["doubt"].isna()]
         scatter = given["value"].std()
         inside = (given["low"] <= truth) & (truth <= given["high"])
         found.append({
@@ -132,12 +127,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the noises [default: 1]")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    tables = []
-    for machine in (arm(), axis()):
-        rows = pd.DataFrame(identified(machine, given.noises, given.seed))
-        rows.to_csv(given.out / f"{machine.name}.csv.gz", index=False)
-        tables.append(coverage(rows, machine))
-    table = pd.concat(tables)
+    machines, store = (arm(), axis()), given.out / "intervals.csv.gz"
+    done = [pd.read_csv(store)] if store.is_file() else []
+    known = {(m, n) for part in done for m, n in zip(part["machine"], part["noise"], strict=True)}
+    for number in range(given.noises):
+        for machine in machines:
+            if (machine.name, number) not in known:
+                rows = pd.DataFrame(identified(machine, number, given.seed))
+                rows.to_csv(store, index=False, mode="a", header=not store.is_file())
+    rows = pd.read_csv(store)
+    rows = rows[rows["noise"] < given.noises]
+    table = pd.concat([coverage(rows[rows["machine"] == m.name], m) for m in machines])
     table.round(3).to_csv(given.out / "coverage.csv", index=False)
     shown = table.rename(columns=HEADERS)
     text = shown.to_csv(index=False, float_format="%.3g").replace(",", " | ")

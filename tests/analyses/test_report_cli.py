@@ -68,6 +68,15 @@ def test_its_numbers_are_those_of_the_store(reported):
     assert pd.read_csv(reported[0] / "running_time.csv")["n"].tolist() == [2, 2]
 
 
+def test_each_run_has_its_parameters_and_their_errors(store):
+    results = load_study(store)
+    runs = results.runs.set_index("run")
+    for _, row in results.parameters.iterrows():
+        assert runs.loc[row["run"], f"x_{row['parameter']}"] == row["value"]
+        assert runs.loc[row["run"], f"error_{row['parameter']}"] == row["relative_error"]
+    assert len(results.parameters) == 4 * len(runs)
+
+
 def test_the_main_table_and_the_state_are_printed_and_a_users_analysis_is_a_section(store, run, tmp_path, monkeypatch):
     (tmp_path / "study.sqlite").write_bytes((store / "study.sqlite").read_bytes())
     (tmp_path / "mine.py").write_text("def best(runs):\n    return runs.groupby('identifier')[['value']].min()\n")

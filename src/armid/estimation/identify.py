@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,10 @@ from armid.problem.space import Space
 from armid.record import Campaign
 from armid.report.document import finite
 from armid.report.result import IDENTIFICATION, Kind, Result
+from armid.units import angles_in, scale_of
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 # Share of a range within which a parameter is on its bound.
 ROUNDING = 1e-12
@@ -84,6 +88,17 @@ class JointErrors(Errors):
     outputs: Mapping[str, Errors] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """Hold one parameter, SI: value, ends of its 95 % interval, None without one, and why that does not hold, or ""."""
+
+    value: float
+    low: float | None
+    high: float | None
+    unit: str
+    doubt: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Result):
     """The result of one run; it prints itself, and has a table, figures and files.
@@ -114,6 +129,22 @@ class Identification(Result):
     stopped: str
     suspicions: tuple[Suspicion, ...] = ()
     scatter: Scatter | None = None
+
+    @property
+    def parameters(self) -> dict[str, "ParameterEstimate"]:
+        """Name -> value, 95 % interval and what stands against it, SI: `found.parameters["p0"].low`."""
+        keys = {"value": "value", "low": "low", "high": "high", "unit": "unit", "doubt": "interval_doubt"}
+        return {name: ParameterEstimate(**{k: entry.get(key, "") for k, key in keys.items()})
+                for name, entry in self.to_dict()["parameters"].items()}  # fmt: skip
+
+    @property
+    def table(self) -> "DataFrame":
+        """Parameters as people read them; `low` and `high` are numbers in the unit of the value."""
+        with angles_in(self.campaign.angle):
+            scales = [scale_of(p.unit, p.value)[1] for p in self.parameters.values()]
+        ends = {end: [np.nan if getattr(p, end) is None else getattr(p, end) for p in self.parameters.values()]
+                for end in ("low", "high")}  # fmt: skip
+        return super().table.assign(**{end: np.multiply(values, scales) for end, values in ends.items()})
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:

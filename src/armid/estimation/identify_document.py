@@ -44,7 +44,7 @@ from armid.report.document import (
 )
 from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, pyplot
-from armid.units import SHOWN, shown
+from armid.units import scale_of, shown
 
 MOST_FITS_DRAWN = 8
 # Letters of a title that fit above one column.
@@ -240,7 +240,7 @@ def held_text(p: Mapping[str, Any]) -> str:
 def parameter_table(result: Mapping[str, Any]) -> Table:
     rows = []
     for name, p in result["parameters"].items():
-        unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
+        unit, factor = scale_of(p["unit"], p["value"])
         if p["bound_low"] is None:
             rows.append((name, factor * p["value"], unit, "fixed", "", ""))
             continue

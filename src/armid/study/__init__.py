@@ -13,5 +13,5 @@ Where a run goes, in reading order:
 Beside them: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind of
 study that closes the loop), dask_pool (a cluster in place of own processes), tune (options of identifiers, learnt on
 other instances), results (the store as tables), export (the store in formats of others). The report: analyses
-(statistics, a file a topic), document (answer, facts and the sections of the analyses).
+(statistics, a file a topic), answer (to the question of a study), document (facts and the sections of the analyses).
 """
