@@ -54,7 +54,7 @@ def test_a_report_of_a_real_store(reported):
     assert {"overview.csv", "table1.png", "ecdf.svg", "runs.tex"} <= {p.name for p in store.iterdir()}
     page = (store / "report.html").read_text()
     assert page.count("<svg") == len(list(store.glob("*.svg")))
-    for wanted in ("Does a report come out of a real store?", "Nearest to the truth: ", "Complete: 4 of 4 runs.",
+    for wanted in ("Does a report come out of a real store?", "Best: noise-free: ", "Complete: 4 of 4 runs.",
                    "armid study tiny.toml", "d omega/dt", "name = &#34;tiny&#34;"):  # fmt: skip
         assert wanted in page
 

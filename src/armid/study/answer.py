@@ -101,7 +101,8 @@ def best(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
 
 
 def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
-    tests = rank_tests(evidence.of(setting), steps_of(evidence, setting)) if len(own) > 1 else None
+    compared = len(own) > 1 and len(evidence.cases) > 1
+    tests = rank_tests(evidence.of(setting), steps_of(evidence, setting)) if compared else None
     ranked = tests is not None and tests.n_cases > 1
     rows = own.set_index("variant")
     name = str(tests.ranks.index[0] if tests is not None and ranked else rows["largest_median"].idxmin())
