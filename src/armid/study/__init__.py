@@ -4,6 +4,7 @@ Where a run goes, in reading order:
 
 - spec: what the TOML file may hold, and the registered things that it names
 - cases: truths, manoeuvres and campaigns that a study is tried on
+- inputs: what drives the machine in a manoeuvre
 - tasks: builds the list of runs of a study of either kind, and executes a single run
 - runner: run what is missing of a study
 - pool: worker processes on this machine, each run with a time limit

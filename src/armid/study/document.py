@@ -58,7 +58,8 @@ def report_of(
         facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
     else:
         evidence = Evidence(results)
-        found = [Section(a.title, tuple(a.parts(evidence))) for a in (OF_SUITES if evidence.is_suite else ANALYSES)]
+        analyses = OF_SUITES if evidence.is_suite else ANALYSES
+        found = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
         facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, found[0].parts[0])
     sections = (*(s for s in found if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)
@@ -74,7 +75,7 @@ def summary_of(results: StudyResults) -> Document:
     if known_kind(results.study) == IDENTIFIES:
         evidence = Evidence(results)
         main = class_ranks(evidence) if evidence.is_suite else main_table(evidence)
-        answer = answer_of(evidence, main)
+        main, answer = evidence.apart(main), answer_of(evidence, main)
     else:
         runs = loop_runs(results.loops)
         main, answer = verdicts(runs), (counted(runs),)
