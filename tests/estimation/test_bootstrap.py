@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from armid.estimation import bootstrap as bootstraps
-from armid.estimation.bootstrap import Task, bootstrap, coloured, refined
+from armid.estimation import identify as identifications
+from armid.estimation.bootstrap import Scatter, Task, bootstrap, coloured, refined
 from armid.estimation.identify import identify
 from armid.estimation.identify_document import answer, details_of, parameter_table, remarks, result_of
 from armid.estimation.information import Level, information_at
@@ -153,6 +154,22 @@ def test_identify_gives_the_interval_of_its_fitness(lowering, arm, arm_space):
                for text in remarks(found))  # fmt: skip
     biased = replace(found, scatter=replace(found.scatter, bias=np.array([0.0, 0.0, 0.0, 1.0])))
     assert "biased by" in result_of(biased)["parameters"]["n"]["interval_doubt"]
+
+
+def test_the_interval_of_a_local_minimum_does_not_hold(stroke, arm_space, monkeypatch):
+    """Of similarity one search in forty ended far from the truth, and its draws stayed there."""
+    least = minimum(SQUARES, stroke, arm_space)
+    bound = information_at((stroke,), arm_space, least).deviation
+
+    def scattered(fitness, replays, space, x, *_):
+        draws = x + 1.5 * bound * np.random.default_rng(4).standard_normal((100, 4))
+        return Scatter(draws, x - bound, x + bound, np.zeros(4), np.zeros(4))
+
+    monkeypatch.setattr(identifications, "bootstrap", scattered)
+    for moved, doubted in ((1.0, False), (20.0, True)):
+        x = least + moved * bound * [0, 1, 0, 0]
+        _, scatter = identifications.judged(MINIMAX, (stroke,), arm_space, x, 1, None, True)
+        assert ("standard deviations from the least-squares estimate" in scatter.doubt) is doubted
 
 
 @pytest.mark.parametrize("fitness", ["rmse", "similarity"])

@@ -51,6 +51,8 @@ OUTSIDE = 1e-9
 
 
 INTERRUPTED = "interrupted"
+# Two estimates of one model that are more of their standard deviations apart than this are not of the same minimum.
+APART = 5.0
 # Why there is no interval.
 NOT_ASKED = "none was asked for"
 # Where only noise is left, S2 below the first with S1 above the second: S2 pairs the few intervals between landmarks by
@@ -227,13 +229,15 @@ def judged(
     """Return covariance and noise at the estimate of a fitness, and the scatter of a bootstrap where it gives them.
 
     Whether a record holds more than noise is judged at the least-squares estimate near by: the residual of another
-    estimate may be smooth without anything that the model lacks.
+    estimate may be smooth without anything that the model lacks. Where both are further apart than they scatter, the
+    search has ended in a local minimum: no interval holds.
     """
     if fitness.weigh is not None:
         weights = residual_weights(fitness, replays, output_sizes(replays))
         information = information_at(replays, space, x, weights=weights)
         return information, None if interval else without(x, NOT_ASKED)
-    levels = tuple(level_of(r, space, refine(replays, space, x)) for r in replays)
+    least = refine(replays, space, x)
+    levels = tuple(level_of(r, space, least) for r in replays)
     information = information_at(replays, space, x, levels)
     if not interval or not len(x):
         return information, without(x, NOT_ASKED)
@@ -246,6 +250,11 @@ def judged(
 
         scatter = bootstrap(fitness, replays, space, x, information, seed, is_over)
     if len(scatter.draws) > 1:
+        both = np.hypot(scatter.draws.std(axis=0, ddof=1), information.deviation)
+        apart = float(np.max(np.abs(x - scatter.bias - least) / both))
+        if apart > APART and not scatter.doubt:
+            doubt = f"it lies {apart:.3g} standard deviations from the least-squares estimate, as a local minimum does"
+            scatter = replace(scatter, doubt=doubt)
         information = replace(information, deviation=scatter.draws.std(axis=0, ddof=1), step=scatter.moved,
                               correlation=np.atleast_2d(np.corrcoef(scatter.draws.T)))  # fmt: skip
     return information, scatter

@@ -1,7 +1,7 @@
 """Count how often the 95 % intervals of `armid identify` hold the truth, for six fitnesses on two machines.
 
-    python studies/coverage.py --out out/coverage
-    python studies/coverage.py --out out/coverage_short --noises 5
+    python studies/interval_coverage.py --out out/coverage
+    python studies/interval_coverage.py --out out/coverage_short --noises 5
 
 Machines: the paper's arm (one stroke of 0.7 s), and a linear axis with viscous and dry friction, whose start is fitted.
 Each noise makes one record; each fitness is identified on it from the whole box, with the defaults and 1,500
@@ -143,7 +143,7 @@ def main() -> None:
     text = shown.to_csv(index=False, float_format="%.3g").replace(",", " | ")
     lines = [f"| {line} |" for line in text.splitlines()]
     rule = "|" + "---|" * len(table.columns)
-    note = f"{given.noises} noises a machine, seed {given.seed}; the columns are explained in `studies/coverage.py`."
+    note = f"{given.noises} noises a machine, seed {given.seed}; `studies/interval_coverage.py` explains the columns."
     page = ["# Coverage of 95 % intervals", "", note, "", lines[0].replace("coverage |  %", "coverage, %"), rule]
     (given.out / "coverage.md").write_text("\n".join([*page, *lines[1:], ""]), encoding="utf-8")
     print(table.round(3).to_string(index=False))
