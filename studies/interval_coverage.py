@@ -139,13 +139,11 @@ def main() -> None:
     rows = rows[rows["noise"] < given.noises]
     table = pd.concat([coverage(rows[rows["machine"] == m.name], m) for m in machines])
     table.round(3).to_csv(given.out / "coverage.csv", index=False)
-    shown = table.rename(columns=HEADERS)
-    text = shown.to_csv(index=False, float_format="%.3g").replace(",", " | ")
-    lines = [f"| {line} |" for line in text.splitlines()]
-    rule = "|" + "---|" * len(table.columns)
     note = f"{given.noises} noises a machine, seed {given.seed}; `studies/interval_coverage.py` explains the columns."
-    page = ["# Coverage of 95 % intervals", "", note, "", lines[0].replace("coverage |  %", "coverage, %"), rule]
-    (given.out / "coverage.md").write_text("\n".join([*page, *lines[1:], ""]), encoding="utf-8")
+    lines = [[HEADERS.get(name, name) for name in table.columns], ["---"] * len(table.columns)]
+    lines += [[f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in table.itertuples(index=False)]
+    page = ["# Coverage of 95 % intervals", "", note, "", *(f"| {' | '.join(cells)} |" for cells in lines), ""]
+    (given.out / "coverage.md").write_text("\n".join(page), encoding="utf-8")
     print(table.round(3).to_string(index=False))
 
 
