@@ -122,7 +122,7 @@ def coverage(rows: pd.DataFrame, machine: Machine) -> pd.DataFrame:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", type=Path, required=True, help="folder for coverage.csv and coverage.md")
+    parser.add_argument("--out", type=Path, required=True, help="folder for coverage.csv and report.md")
     parser.add_argument("--noises", type=int, default=200, help="noises of each machine [default: 200]")
     parser.add_argument("--seed", type=int, default=1, help="seed of the noises [default: 1]")
     given = parser.parse_args()
@@ -143,7 +143,7 @@ def main() -> None:
     lines = [[HEADERS.get(name, name) for name in table.columns], ["---"] * len(table.columns)]
     lines += [[f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in table.itertuples(index=False)]
     page = ["# Coverage of 95 % intervals", "", note, "", *(f"| {' | '.join(cells)} |" for cells in lines), ""]
-    (given.out / "coverage.md").write_text("\n".join(page), encoding="utf-8")
+    (given.out / "report.md").write_text("\n".join(page), encoding="utf-8")
     print(table.round(3).to_string(index=False))
 
 

@@ -34,7 +34,7 @@ def test_two_noises_of_a_machine_and_its_twin(tmp_path, monkeypatch, capsys):
     assert set(table["fitness"]) == set(FITNESSES)
     assert (table["noises"] == 2).all()
     assert table["machine"].tolist() == ["twin"] * 18 + ["axis"] * 18
-    assert (tmp_path / "coverage.md").read_text().count("\n| twin | rmse |") == 3
+    assert (tmp_path / "report.md").read_text().count("\n| twin | rmse |") == 3
     interval_coverage.main()
     assert (tmp_path / "intervals.csv.gz").read_bytes() == stored
     assert "coverage" in capsys.readouterr().out
