@@ -16,6 +16,7 @@ from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS
 from armid.report.result import MANIFEST, Result, Shown
+from armid.units import angles_in, scale_of
 
 QUICK = {"effects": ["viscous"], "budget": 60}
 
@@ -142,6 +143,57 @@ def test_an_identification_and_its_parts_are_small(found, tmp_path):
     assert "<table" in found.campaign._repr_html_()
     for name in ("identify", "simulate", "close_loop", "examine"):
         assert len(str(inspect.signature(getattr(armid, name)))) < 800
+
+
+def test_parameters_are_read_by_name_and_the_table_holds_numbers(found):
+    stored = found.to_dict()["parameters"]["inertia"]
+    inertia = found.parameters["inertia"]
+    assert (inertia.value, inertia.low, inertia.high) == (stored["value"], stored["low"], stored["high"])
+    assert inertia.low < inertia.value < inertia.high
+    assert (inertia.unit, inertia.doubt) == ("kg m2", "")
+    table = found.table.set_index("parameter")
+    for name in ("value", "low", "high"):
+        assert table[name].dtype == float
+        assert table.loc["inertia", name] == getattr(inertia, name)
+
+
+def recorded(axis, header, factor):
+    """Return the axis' train record with its speed under another header."""
+    table = pd.read_csv(Path(axis) / "synthetic_train.csv")
+    speed = next(name for name in table if name.startswith("angular_velocity"))
+    made = table.rename(columns={speed: header})
+    made[header] *= factor * (np.pi / 180.0 if speed.endswith("deg_s") else 1.0)
+    made.attrs = {"hold": "zero", "constants": {"gain": 1.0}}
+    return made
+
+
+@pytest.mark.parametrize(("header", "factor", "unit"), [
+    ("angular_velocity_rad_s", 1.0, "rad/s"), ("angular_velocity_deg_s", 180.0 / np.pi, "deg/s"),
+    ("angular_velocity_rpm", 30.0 / np.pi, "rpm"),
+])  # fmt: skip
+def test_records_come_back_in_the_unit_in_which_they_were_recorded(axis, header, factor, unit, tmp_path):
+    given = {"plant": "driven_axis", "effects": ["viscous"], "identifier": "least_squares"}
+    found = armid.identify(recorded(axis, header, factor), **given)
+    rmse = found.train.rmse * factor
+    assert f"Error (RMSE): {rmse:.4g} {unit} on the records fitted" in repr(found)
+    assert f"signal [{unit}]" in found.plot().axes[0].get_ylabel().replace("speed", "signal")
+    found.save(tmp_path)
+    assert f"{rmse:.4g} {unit}" in (tmp_path / "report.md").read_text()
+    asked = armid.identify(recorded(axis, header, factor), units="rad", **given)
+    assert f"{found.train.rmse:.4g} rad/s on the records fitted" in repr(asked)
+    with pytest.raises(ArmidError, match="units is 'gon': "):
+        armid.identify(recorded(axis, header, factor), units="gon", **given)
+
+
+def test_sizes_far_from_one_get_a_prefix():
+    cases = {("N m", 2e-5): "uN m", ("N m", 0.5): "N m", ("N m", 2e4): "kN m", ("s", 2e-3): "ms", ("V", 0.0): "V",
+             ("kg m2", 1e-5): "kg m2", ("1", 1e-5): "1", ("Pa", 1.0): "MPa", ("s3/rad2", 1e-4): "s3/rad2"}  # fmt: skip
+    for (unit, size), name in cases.items():
+        assert scale_of(unit, size)[0] == name
+    assert scale_of("N m", 2e-5)[1] * 2e-5 == pytest.approx(20.0)
+    with angles_in("rad"):
+        assert scale_of("rad/s") == ("rad/s", 1.0)
+    assert scale_of("rad/s")[0] == "deg/s"
 
 
 def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):

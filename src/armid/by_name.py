@@ -26,8 +26,10 @@ from armid.progress import announced
 from armid.record import Campaign, read_campaign
 from armid.record.schema import Known
 from armid.registry import Registry, load_registry, name_of
+from armid.units import ANGLES, angles_in
 
 if TYPE_CHECKING:
+    from armid.estimation.bootstrap import Refined
     from armid.estimation.examine import Examination
     from armid.estimation.identify import Identification
     from armid.loop import ClosedLoop
@@ -64,6 +66,7 @@ class Opened(NamedTuple):
 def opened(
     campaign: Any, effects: Named = (), plugins: Iterable[str] = (), window: tuple[float, float] | None = None,
     bounds: Bounds | None = None, fix: Mapping[str, float] | None = None, plant: Any = None, model: Model | None = None,
+    units: str | None = None,
 ) -> Opened:  # fmt: skip
     """Return what is meant by a campaign, its effects and its overrides; plug-ins run their code.
 
@@ -71,7 +74,8 @@ def opened(
     `table.attrs` holds the keys of its [[records]] entry. effects: names or Effects to add to those that the campaign
     declares; NAME takes the first form that fits, NAME:FORM another. plugins: FILE.py:attribute of the user.
     window: (begin, end), s, what is seen of every record. bounds, fix: name -> (low, high), and value, SI. plant: name
-    or Plant, of tables; or a plant of the user that campaign.toml names. model: in place of the declared one.
+    or Plant, of tables; or a plant of the user that campaign.toml names. model: in place of the declared one. units:
+    deg, rad or rpm, in which angles and turning speeds are shown; None: as they were recorded.
     """
     refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
@@ -80,6 +84,9 @@ def opened(
     read = campaign if isinstance(campaign, Campaign) else campaign_of(campaign, plant, registry)
     if window is not None:
         read = read.with_window(*window)
+    if units is not None and units not in ANGLES:
+        raise ArmidError(f"units is {quoted(units)}: {nearest(str(units), ANGLES)}")
+    read = read if units is None else replace(read, angle=units)
     effects_known = registry.effects_for(read.plant)
     if model is None:
         for name in read.effects:
@@ -188,8 +195,8 @@ def warn_of_far(fixed: Mapping[str, float], bounds: Bounds, model: Model) -> Non
 def identify(
     campaign: Any, model: Model | None = None, space: "Space | None" = None, fitness: Any = None,
     identifier: Any = None, budget: int | None = None, seed: int = 1, target: float | None = None,
-    accuracy: str | None = None, progress: "Callable[[Meter], None] | None" = None, *,
-    options: Mapping[str, Any] | None = None, paper: bool = False, **given: Any,
+    accuracy: str | None = None, progress: "Callable[[Meter | Refined], None] | None" = None, *,
+    options: Mapping[str, Any] | None = None, paper: bool = False, interval: bool = True, **given: Any,
 ) -> "Identification":  # fmt: skip
     """Identify parameters from the train records of a campaign; `armid.identify("folder")` is enough.
 
@@ -215,11 +222,13 @@ def identify(
     accuracy : {"standard", "fine"}
         Of the engine; None: as the noise of each record asks for.
     progress : callable
-        Called with the meter after each generation.
+        Called with the meter after each generation, and with the draws refined so far while a bootstrap runs.
     paper : bool
         The paper's swarm, similarity degree, budget and window, where nothing else is given.
+    interval : bool
+        Whether intervals are wanted; of a fitness that is no sum of squares they take a bootstrap, some seconds.
     **given
-        effects, plugins, window, bounds, fix, plant: see `opened`.
+        effects, plugins, window, bounds, fix, plant, units: see `opened`.
 
     Returns
     -------
@@ -242,16 +251,19 @@ def identify(
     if budget is None:
         budget = PAPER_BUDGET if paper or identifier is not None else BUDGET
     space = space or there.space()
-    suspicions = screen(there.campaign, there.model, space)
+    with angles_in(there.campaign.angle):
+        suspicions = screen(there.campaign, there.model, space)
     for suspicion in suspicions:
         warnings.warn(suspicion.sentence, stacklevel=2)
-    found = run(there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, progress)
+    found = run(
+        there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, progress, interval
+    )
     return replace(found, suspicions=suspicions)
 
 
 def expected(given: Mapping[str, Any], asked: Callable[..., Any]) -> dict[str, Any]:
     """Return the named arguments of `opened`, further ones of what was asked; refuse another with ArmidError."""
-    known = ("effects", "plugins", "window", "bounds", "fix", "plant")
+    known = ("effects", "plugins", "window", "bounds", "fix", "plant", "units")
     own = [p.name for p in signature(asked).parameters.values() if p.kind is not p.VAR_KEYWORD]
     for name in given:
         if name not in known:
@@ -298,7 +310,8 @@ def examine(
     there = opened(campaign, model=model, **expected(given, examine))
     box = space or there.space()
     at = free_values(box, x, where) if isinstance(x, Mapping) else x
-    return run(there.campaign, there.model, box, at, noise, by, accuracy)
+    with angles_in(there.campaign.angle):
+        return run(there.campaign, there.model, box, at, noise, by, accuracy)
 
 
 def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array:
@@ -336,7 +349,7 @@ def close_loop(
     within : float
         A parameter is trusted whose 95 % interval is within this share of its value on either side; None: 0.05.
     **given
-        effects, plugins, window, fix, plant: see `opened`.
+        effects, plugins, window, fix, plant, units: see `opened`.
 
     Returns
     -------
@@ -360,9 +373,10 @@ def close_loop(
     chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
     campaign = with_known(there.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
     share = {} if within is None else {"within": positive(within, "within")}
-    found: ClosedLoop = run(
-        there.model, campaign, kept, rng, there.bounds, values, threads, told, curve, progress, chances, **share
-    )
+    with angles_in(campaign.angle):
+        found: ClosedLoop = run(
+            there.model, campaign, kept, rng, there.bounds, values, threads, told, curve, progress, chances, **share
+        )
     return found
 
 

@@ -1,12 +1,27 @@
 """Units as people read them, and as headers of columns write them."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 import numpy as np
 
 DEGREE = np.pi / 180.0
 # SI unit -> (unit on screen, factor).
-SHOWN = {"Pa": ("MPa", 1e-6), "rad/s": ("deg/s", 180.0 / np.pi), "m/s": ("mm/s", 1e3)}
-SHOWN |= {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3)}
+SHOWN = {"Pa": ("MPa", 1e-6), "m/s": ("mm/s", 1e3), "m": ("mm", 1e3)}
 TURN = 2.0 * np.pi
+# The same of angles and turning speeds, in each of the units in which they may be shown.
+ANGLES = {
+    "deg": {"rad": ("deg", 1.0 / DEGREE), "rad/s": ("deg/s", 1.0 / DEGREE)}, "rad": {},
+    "rpm": {"rad": ("deg", 1.0 / DEGREE), "rad/s": ("rpm", 60.0 / TURN)},
+}  # fmt: skip
+DEG = "deg"
+_angle: ContextVar[str] = ContextVar("angle", default=DEG)
+# SI units that take a prefix, and from which sizes on: below a hundredth, and from ten thousand.
+PREFIXED = re.compile(r"(N|V|A|W|J|H|F|ohm)(?![a-z])|s$")
+PREFIXES = {1e-9: "n", 1e-6: "u", 1e-3: "m", 1e3: "k", 1e6: "M", 1e9: "G"}
+LEAST, LARGEST = 1e-2, 1e4
 # SI unit of an output -> {end of the header of a column: factor that turns the column into SI}.
 SUFFIXES = {
     "rad": {"deg": DEGREE, "rad": 1.0, "turns": TURN},
@@ -25,6 +40,37 @@ UNIT_ENDS = {
 }  # fmt: skip
 
 
+@contextmanager
+def angles_in(unit: str) -> Iterator[None]:
+    """Show angles and turning speeds in deg, rad or rpm."""
+    before = _angle.set(unit)
+    try:
+        yield
+    finally:
+        _angle.reset(before)
+
+
+def angle_of(header: str) -> str:
+    """Return in which unit an angle or turning speed is recorded: deg, rad or rpm, by the header of its column."""
+    ends = {"rad": "rad", "rad_s": "rad", "rpm": "rpm"}
+    return next((unit for end, unit in ends.items() if header.endswith(f"_{end}")), DEG)
+
+
+def scale_of(unit: str, size: float = 1.0) -> tuple[str, float]:
+    """Return the unit in which people read values of a size [SI], and the factor from SI.
+
+    >>> scale_of("N m", 2e-5)
+    ('uN m', 1000000.0)
+    """
+    found = (SHOWN | ANGLES[_angle.get()]).get(unit, (unit, 1.0))
+    is_readable = not np.isfinite(size) or size == 0.0 or LEAST <= abs(size) < LARGEST
+    if found[0] != unit or is_readable or not PREFIXED.match(unit):
+        return found
+    sizes = [prefix for prefix in PREFIXES if prefix <= abs(size)]
+    prefix = max(sizes, default=min(PREFIXES))
+    return f"{PREFIXES[prefix]}{unit}", 1.0 / prefix
+
+
 def shown(value: float, unit: str) -> tuple[float, str]:
     """Return a value in the unit that people read.
 
@@ -33,5 +79,5 @@ def shown(value: float, unit: str) -> tuple[float, str]:
     >>> shown(40.0, "N m")
     (40.0, 'N m')
     """
-    name, factor = SHOWN.get(unit, (unit, 1.0))
+    name, factor = scale_of(unit)
     return value * factor, name

@@ -99,7 +99,7 @@ def test_cases_that_not_all_ran_are_left_out_and_two_variants_have_no_friedman_t
 
 def test_tables_and_diagram():
     tests = rank_tests(outcomes_of(1.0 - AUC, NAMES))
-    assert "p = " in mean_ranks(tests, "noise-free", "ranks").caption
+    assert "p = " in mean_ranks(tests, pd.Series(dtype=float), "noise-free", "ranks").caption
     table = pairs(tests, "noise-free", "pairs")
     assert len(table.frame) == 6
     assert (table.frame.iloc[:3][["first", "second"]] == "C4.5+m+cf").any(axis=1).all()

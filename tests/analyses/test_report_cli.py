@@ -54,7 +54,7 @@ def test_a_report_of_a_real_store(reported):
     assert {"overview.csv", "table1.png", "ecdf.svg", "runs.tex"} <= {p.name for p in store.iterdir()}
     page = (store / "report.html").read_text()
     assert page.count("<svg") == len(list(store.glob("*.svg")))
-    for wanted in ("Does a report come out of a real store?", "Nearest to the truth: ", "Complete: 4 of 4 runs.",
+    for wanted in ("Does a report come out of a real store?", "Best: noise-free: ", "Complete: 4 of 4 runs.",
                    "armid study tiny.toml", "d omega/dt", "name = &#34;tiny&#34;"):  # fmt: skip
         assert wanted in page
 
@@ -66,6 +66,15 @@ def test_its_numbers_are_those_of_the_store(reported):
     for (identifier, name), group in own.groupby(["identifier", "parameter"]):
         assert overview.loc[identifier, f"{name}_mean"] == pytest.approx(group["relative_error"].mean())
     assert pd.read_csv(reported[0] / "running_time.csv")["n"].tolist() == [2, 2]
+
+
+def test_each_run_has_its_parameters_and_their_errors(store):
+    results = load_study(store)
+    runs = results.runs.set_index("run")
+    for _, row in results.parameters.iterrows():
+        assert runs.loc[row["run"], f"x_{row['parameter']}"] == row["value"]
+        assert runs.loc[row["run"], f"error_{row['parameter']}"] == row["relative_error"]
+    assert len(results.parameters) == 4 * len(runs)
 
 
 def test_the_main_table_and_the_state_are_printed_and_a_users_analysis_is_a_section(store, run, tmp_path, monkeypatch):

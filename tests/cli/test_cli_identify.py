@@ -80,7 +80,7 @@ def test_fixed_values_and_bounds_and_the_interval_of_the_information(identified,
     from armid.problem.space import space_of
     from armid.record import read_campaign
 
-    text, result = identified("--fix", "n=1.4", "--fix", "k=1", "--bounds", "p0=3.0e6:3.1e6")
+    text, result = identified("--fix", "n=1.4", "--fix", "k=1", "--bounds", "p0=3.0e6:3.1e6", "--fitness", "rmse")
     p = result["parameters"]
     assert p["n"] == {"value": 1.4, "unit": "1", "low": None, "high": None, "bound_low": None, "bound_high": None,
                       "bound_active": False}  # fmt: skip
@@ -108,7 +108,7 @@ def test_an_active_bound_is_flagged(printed, bounds, at):
 
 
 def test_what_is_not_seen_is_not_determined(identified):
-    text, result = identified("--window", "0:0.3", "--fix", "eta3=0.55", "--fix", "n=1.4")
+    text, result = identified("--window", "0:0.3", "--fix", "eta3=0.55", "--fix", "n=1.4", "--fitness", "rmse")
     assert re.search(r"k +│ +[\d.]+ +│ 1 +│[^│]+│ not determined", text)
     assert "k is not determined by these records." in text
     assert (result["parameters"]["k"]["low"], result["parameters"]["k"]["high"]) == (None, None)

@@ -114,7 +114,7 @@ def test_the_answer_comes_first_and_is_that_of_the_page(run, study, small_folder
         assert len(pages) == 2
         assert all(first in page for page in pages)
     ran = run("study", study.parent / "tiny.toml", "--jobs", "1", "--out", study)
-    assert ran.out.splitlines()[0].partition(":")[0] in ("Yes, reproduced and beaten", "Reproduced, not beaten", "No",
+    assert ran.out.splitlines()[0].partition(" (")[0] in ("Yes, reproduced and beaten", "Reproduced, not beaten", "No",
                                                          "Not reproduced by its own method, but beaten")  # fmt: skip
     assert run("report", study).out.splitlines()[0] == ran.out.splitlines()[0]
 

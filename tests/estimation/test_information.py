@@ -7,7 +7,8 @@ import pytest
 from linear_records import linear_records
 from scipy.optimize import least_squares
 
-from armid.engine import calibrate, probes
+from armid.engine import Schedule, calibrate, probes
+from armid.estimation.identify_document import remarks
 from armid.estimation.information import collinear, information_at, information_of, sensitivities
 from armid.model import EFFECTS, Effect, Manoeuvre, Model, Parameter
 from armid.model.plants.driven_axis import linear_axis
@@ -108,6 +109,23 @@ def test_what_the_model_lacks_widens(lowering_replays, arm_space):
     np.testing.assert_allclose(lacking.deviation, widening * plain.deviation)
     # a slightly loud record is still one whose noise is known
     assert not information_at((with_noise(replay, 0.8 * NOISE),), arm_space, TRUTH).levels[0].from_residual
+
+
+def test_what_probes_elsewhere_lose_in_the_engine_hides_no_misfit(lowering_replays, arm_space, lowering_found):
+    """Probes over the top of an unbalanced disc said that the engine is off by more than the whole residual."""
+    replay = with_noise(lowering_replays[0], NOISE)
+    swinging = measuring(replay, replay.measured + 3.0 * DEGREE * np.sin(2 * np.pi * 8.0 * replay.times))
+    off = tuple(replace(c, error=100.0, reached=False) for c in swinging.calibrations)
+    level = information_at((replace(swinging, calibrations=off),), arm_space, TRUTH).levels[0]
+    assert level.from_residual
+    coarse = tuple(replace(r, calibrations=off) for r in lowering_found.train_replays)
+    assert not any("the engine is off" in text for text in remarks(replace(lowering_found, train_replays=coarse)))
+    # where the engine itself is off at the estimate, what it leaves is no misfit
+    rough = tuple(replace(c, schedule=Schedule(1, refinement=1)) for c in replay.calibrations)
+    wrong = replace(with_noise(replay, 1e-9), calibrations=rough)
+    clean = measuring(wrong, replay.signal(TRUTH[np.newaxis])[0])
+    assert clean.engine_error_at(TRUTH) > 0.0
+    assert not information_at((clean,), arm_space, TRUTH).levels[0].from_residual
 
 
 def drawn(rng, n_samples, phi):

@@ -106,6 +106,54 @@ def test_likelihood_needs_noise() -> None:
             FITNESS["likelihood"](x, rows, noise=noise)
 
 
+def noisy() -> tuple[Array, Array]:
+    """Return a sine with noise, and the sine itself, 1.1 times it, and 10 ms later, 1 kHz."""
+    times = 0.001 * np.arange(500)
+    sine = np.sin(2.0 * np.pi * 8.0 * times)
+    later = np.sin(2.0 * np.pi * 8.0 * (times - 0.01))
+    return sine + 0.01 * np.random.default_rng(3).standard_normal(500), np.array([sine, 1.1 * sine, later])
+
+
+def test_the_mean_absolute_error_and_hubers_loss_as_they_are_defined() -> None:
+    x, rows = noisy()
+    np.testing.assert_allclose(FITNESS["mae"](x, rows), np.abs(x - rows).mean(axis=1))
+    ratios = (x - rows) / 0.01
+    losses = np.where(np.abs(ratios) <= 1.345, 0.5 * ratios**2, 1.345 * (np.abs(ratios) - 0.5 * 1.345))
+    np.testing.assert_allclose(FITNESS["huber"](x, rows, noise=0.01), losses.mean(axis=1))
+    # one spike moves the square a hundred times as far
+    spiked = x + 1e3 * (np.arange(x.size) == 77)
+    grown = [FITNESS[name](spiked, rows, noise=0.01)[0] / FITNESS[name](x, rows, noise=0.01)[0]
+             for name in ("huber", "likelihood")]  # fmt: skip
+    assert grown[1] > 100.0 * grown[0]
+
+
+def test_a_spectrum_knows_amplitudes_and_no_phase() -> None:
+    x, rows = noisy()
+    at, larger, later = np.sqrt(FITNESS["spectrum"](x, rows))
+    assert larger > 5.0 * at
+    assert later < 2.0 * at
+    # a sine in the middle of a bin has its amplitude in it and half of it in each neighbour
+    sine, none = rows[0], np.zeros((1, 500))
+    assert FITNESS["spectrum"](sine, none)[0] * 251 == pytest.approx(1.0 + 2.0 * 0.5**2, rel=0.02)
+
+
+def test_warped_time_forgives_what_is_late() -> None:
+    x, rows = noisy()
+    values = np.sqrt(FITNESS["dtw"](x, rows, interval=0.001))
+    squares = np.sqrt(FITNESS["rmse"](x, rows))
+    assert values[2] < 0.2 * squares[2]
+    assert (values <= squares).all()
+    # nothing may be moved: what is left is the rmse
+    alone = Fitness("stiff", partial(FITNESS["dtw"].function, reach=0.0))
+    np.testing.assert_allclose(alone(x, rows, interval=0.001), squares**2)
+
+
+def test_warped_time_names_the_package_that_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dtaidistance.dtw", None)
+    with pytest.raises(ValueError, match="needs the package dtaidistance, which is not installed"):
+        FITNESS["dtw"](*noisy(), interval=0.001)
+
+
 def test_importing_is_light() -> None:
     heavy = ("pymoo", "matplotlib", "seaborn", "pydantic", "pandas")
     script = f"import sys, armid.problem.fitness; print([m for m in {heavy!r} if m in sys.modules])"

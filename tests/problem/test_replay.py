@@ -22,7 +22,7 @@ def test_signal_is_the_simulation_in_the_window(paper_arm, arm, arm_space):
     np.testing.assert_array_equal(replay.measured, record.measured[200:501])
     whole = simulate(arm, record.manoeuvre, TRUTH, Schedule(4)).output[0]
     np.testing.assert_allclose(replay.signal(TRUTH)[0], whole[200:501], atol=1e-5)
-    assert 0.0 < replay.engine_error < 1e-5
+    assert 0.0 < replay.engine_error_at(TRUTH[0]) < 1e-5
 
 
 def test_pieces_stand_end_to_end(write_axis, axis_model, tmp_path):
@@ -55,6 +55,6 @@ def test_noise_decides_the_accuracy(paper_arm, arm, lowering):
 
 def test_a_given_accuracy_wins(lowering, arm, arm_space):
     fine = replay_of(lowering.train[0], arm, arm_space, "fine")
-    assert fine.engine_error < 2e-7
+    assert fine.engine_error_at(TRUTH[0]) < 2e-7
     with pytest.raises(ArmidError, match="'finest' is unknown: standard or fine"):
         replay_of(lowering.train[0], arm, arm_space, "finest")

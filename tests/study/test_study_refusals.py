@@ -18,7 +18,8 @@ REFUSED = [
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nbugdet = 3',
      "identifier 'pso+least_squares': key 'bugdet' is unknown, did you mean 'budget'?"),
     ("shell = true", "shel = true", "case 'row 1', manoeuvre 1: key 'shel' is unknown, did you mean 'shell'?"),
-    ("budget = 40", "", "small.toml: key 'budget' is missing, a whole number of simulations above 0 is expected"),
+    ("budget = 40", "", "small.toml: key 'budget' is missing, a whole number of simulations above 0, or a rising list "
+     "of such is expected"),
     ("budget = 40", "budget = 0", "key 'budget' is 0, a whole number of simulations above 0"),
     ("budget = 40", "budget = true", "key 'budget' is true, a whole number"),
     ("seeds = 2", "seeds = []", "key 'seeds' is []"),
@@ -65,7 +66,7 @@ REFUSED = [
      "manoeuvres to simulate or a campaign to read is expected, both are given"),
     ("duration_s = 0.3 }]", 'duration_s = 0.3, role = "holdout" }]', "no manoeuvre has the role 'train'"),
     ("[bounds]\n", "[fixed]\np0 = 3.2e6\nk = 1\neta3 = 0.62\nn = 1\n", "case 'row 1': every parameter is fixed"),
-    ('plant = "shell_transfer_arm"', 'plant = "driven_axis"', "which no manoeuvre tells: a campaign is expected"),
+    ('plant = "shell_transfer_arm"', 'plant = "driven_axis"', "key 'start_angle_deg' is unknown, known: "),
     ("manoeuvres = [{ start", 'campaign = "../c" #', "campaign '../c' leads out of the folder of the study"),
     ("manoeuvres = [{ start", 'campaign = "/c" #', "campaign '/c' leads out of the folder of the study"),
     ("manoeuvres = [{ start", 'campaign = "c" #', "does not exist, a folder with a campaign.toml is expected"),

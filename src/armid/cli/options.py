@@ -153,6 +153,9 @@ seed_option = click.option(
     "--seed", default=1, show_default=True, type=click.IntRange(0),
     help="Seed of everything random; the same gives the same result.",
 )  # fmt: skip
+units_option = click.option(
+    "--units", metavar="deg|rad|rpm", help="Show angles and turning speeds in this unit. [default: as recorded]"
+)
 window_option = click.option("--window", default="", metavar="A:B", help="What is seen of every record, s.")
 
 
@@ -162,20 +165,22 @@ def out_option(text: str, required: bool = False) -> Callable[[Any], Any]:
 
 def problem_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command CAMPAIGN and the options that say which model is fitted to what of it, see `given`."""
-    options = (campaign_argument, effects_option, bounds_option, fix_option, window_option, plugin_option)
+    options = (campaign_argument, effects_option, bounds_option, fix_option, window_option, units_option,
+               plugin_option)  # fmt: skip
     for option in reversed(options):
         function = option(function)
     return function
 
 
 def given(
-    effects: str, plugins: Iterable[str], window: str = "", bounds: Iterable[str] = (), fix: Iterable[str] = ()
-) -> dict[str, Any]:
-    """Return what --effects, --plugin, --window, --bounds and --fix stand for, as `armid.by_name.opened` takes it."""
+    effects: str, plugins: Iterable[str], window: str = "", bounds: Iterable[str] = (), fix: Iterable[str] = (),
+    units: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Return --effects, --plugin, --window, --bounds, --fix and --units as `armid.by_name.opened` takes them."""
     return {
         "effects": [name for name in effects.split(",") if name.strip()], "plugins": tuple(plugins),
         "window": interval(window, "--window") if window else None, "bounds": intervals(bounds, "--bounds"),
-        "fix": numbers(fix, "--fix"),
+        "fix": numbers(fix, "--fix"), "units": units,
     }  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from armid.report.document import (
 )
 from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, look, pyplot
-from armid.units import SHOWN, shown
+from armid.units import scale_of, shown
 
 PACKAGES = ("armid", "numpy", "scipy", "numba")
 MOST_OFFERS, MOST_COLUMNS, MOST_NAMED = 8, 5, 6
@@ -96,7 +96,7 @@ def deviation_of(result: Mapping[str, Any], name: str, deviation: float | None) 
 def parameter_table(result: Mapping[str, Any]) -> Table:
     rows = []
     for name, p in result["parameters"].items():
-        unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
+        unit, factor = scale_of(p["unit"], p["value"])
         curved = "not determined" if p["low"] is None else interval_text(factor * p["low"], factor * p["high"])
         profile = p["profile"]
         bounded = {(True, True): "", (True, False): "not above", (False, True): "not below"}.get(
@@ -262,7 +262,7 @@ def group_remark(found: Examination, group: Group) -> str:
 
 def profile_remark(found: Examination, profile: Profile) -> str:
     """Return the sentence for a profile that is not bounded, or that tells another interval than the curvature."""
-    value, factor = profile.name, SHOWN.get(profile.unit, ("", 1.0))[1]
+    value, factor = profile.name, scale_of(profile.unit)[1]
     null = found.model.parameters[profile.name].null
     low, high = profile.bounded
     if not (low or high):
@@ -356,7 +356,7 @@ def profile_figure(found: Examination) -> Any:
 
 
 def draw_profile(axis: Any, profile: Profile) -> None:
-    unit, factor = SHOWN.get(profile.unit, (profile.unit, 1.0))
+    unit, factor = scale_of(profile.unit)
     left, right = view(profile)
     grid = np.linspace(left, right, 200)
     if np.isfinite(profile.deviation):

@@ -5,16 +5,17 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError, quoted
-from armid.estimation.information import MISFIT, Information, information_at
-from armid.estimation.least_squares import held_by_bound, with_fitted_starts
+from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
+from armid.estimation.information import MISFIT, Information, information_at, level_of
+from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.mends import Suspicion
 from armid.identifiers import Identifier, run
 from armid.model import Array, Model
@@ -36,6 +37,10 @@ from armid.problem.space import Space
 from armid.record import Campaign
 from armid.report.document import finite
 from armid.report.result import IDENTIFICATION, Kind, Result
+from armid.units import angles_in, scale_of
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 # Share of a range within which a parameter is on its bound.
 ROUNDING = 1e-12
@@ -44,6 +49,10 @@ OUTSIDE = 1e-9
 
 
 INTERRUPTED = "interrupted"
+# Two estimates of one model that are more of their standard deviations apart than this are not of the same minimum.
+APART = 5.0
+# Why there is no interval.
+NOT_ASKED = "none was asked for"
 # Where only noise is left, S2 below the first with S1 above the second: S2 pairs the few intervals between landmarks by
 # order, and a landmark of noise unpairs them, so that neither S2 nor S is usable.
 SHAPE_FALLS, NUMBERS_AGREE = 0.9, 0.95
@@ -79,6 +88,17 @@ class JointErrors(Errors):
     outputs: Mapping[str, Errors] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """Hold one parameter, SI: value, ends of its 95 % interval, None without one, and why that does not hold, or ""."""
+
+    value: float
+    low: float | None
+    high: float | None
+    unit: str
+    doubt: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Result):
     """The result of one run; it prints itself, and has a table, figures and files.
@@ -86,6 +106,7 @@ class Identification(Result):
     candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
     (None without such records). trace: evaluations and best fitness at each improvement. improved: the free parameters
     at each improvement, SI, (n_improvements, n_free). suspicions: of a screen.
+    scatter: of the draws of a bootstrap, where these give the intervals; None where least squares does.
     """
 
     kind: ClassVar[Kind] = IDENTIFICATION
@@ -109,6 +130,23 @@ class Identification(Result):
     stopped: str
     improved: Array
     suspicions: tuple[Suspicion, ...] = ()
+    scatter: Scatter | None = None
+
+    @property
+    def parameters(self) -> dict[str, "ParameterEstimate"]:
+        """Name -> value, 95 % interval and what stands against it, SI: `found.parameters["p0"].low`."""
+        keys = {"value": "value", "low": "low", "high": "high", "unit": "unit", "doubt": "interval_doubt"}
+        return {name: ParameterEstimate(**{k: entry.get(key, "") for k, key in keys.items()})
+                for name, entry in self.to_dict()["parameters"].items()}  # fmt: skip
+
+    @property
+    def table(self) -> "DataFrame":
+        """Parameters as people read them; `low` and `high` are numbers in the unit of the value."""
+        with angles_in(self.campaign.angle):
+            scales = [scale_of(p.unit, p.value)[1] for p in self.parameters.values()]
+        ends = {end: [np.nan if getattr(p, end) is None else getattr(p, end) for p in self.parameters.values()]
+                for end in ("low", "high")}  # fmt: skip
+        return super().table.assign(**{end: np.multiply(values, scales) for end, values in ends.items()})
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
@@ -128,13 +166,15 @@ def identify(
     seed: int = 1,
     target: float | None = None,
     accuracy: str | None = None,
-    progress: Callable[[Meter], None] | None = None,
+    progress: Callable[[Meter | Refined], None] | None = None,
+    interval: bool = True,
 ) -> Identification:
     """Search the free parameters on the train records, then judge the best candidate on train and holdout.
 
     Starts of train records in motion are fitted with the parameters, about those of the least-squares estimate. Holdout
     records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so far is
-    judged, `stopped` is "interrupted". Arguments are those of `armid.identify`. Raises ArmidError for a negative seed,
+    judged, `stopped` is "interrupted". Intervals are those of the estimator: of a sum of squares from sensitivities, of
+    any other fitness from a bootstrap. Arguments are those of `armid.identify`. Raises ArmidError for a negative seed,
     a budget too large, a target that is not finite, a fitness that the identifier cannot minimise, and when every
     candidate diverged.
     """
@@ -150,13 +190,13 @@ def identify(
     identifier.build(Meter(budget, target).budget)
     train = with_fitted_starts(replays(campaign.train, model, space, accuracy), space)
     holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
-    return identified(campaign, train, holdout, space, fitness, identifier, budget, seed, target, progress)
+    return identified(campaign, train, holdout, space, fitness, identifier, budget, seed, target, progress, interval)
 
 
 def identified(
     campaign: Campaign, train: tuple[Replay, ...], holdout: tuple[Replay, ...], space: Space, fitness: Fitness,
     identifier: Identifier, budget: int, seed: int, target: float | None = None,
-    progress: Callable[[Meter], None] | None = None,
+    progress: Callable[[Any], None] | None = None, interval: bool = False,
 ) -> Identification:  # fmt: skip
     """Identify from records that are ready to be simulated, all of one model; arguments and errors as `identify`."""
     meter, seen, model = Meter(budget, target), judged_by(fitness, train), train[0].model
@@ -182,14 +222,51 @@ def identified(
     candidate = space.complete(x[np.newaxis])[0]
     errors = campaign_errors(train, candidate)
     assert errors is not None
-    weights = None if fitness.weigh is None else residual_weights(fitness, seen, output_sizes(seen))
-    information = information_at(seen, space, x, weights=weights)
+    information, scatter = judged(fitness, seen, space, x, seed, progress, interval and stopped != INTERRUPTED)
     trace = meter.trace()
     return Identification(
         campaign, model, space, fitness, identifier.name, candidate, value, information,
         errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
         meter.budget, meter.used, meter.n_failed, int(seed), stopped, meter.log().X[trace.evaluation - 1],
+        scatter=scatter,
     )  # fmt: skip
+
+
+def judged(
+    fitness: Fitness, replays: tuple[Replay, ...], space: Space, x: Array, seed: int,
+    progress: Callable[[Any], None] | None, interval: bool,
+) -> tuple[Information, Scatter | None]:  # fmt: skip
+    """Return covariance and noise at the estimate of a fitness, and the scatter of a bootstrap where it gives them.
+
+    Whether a record holds more than noise is judged at the least-squares estimate near by: the residual of another
+    estimate may be smooth without anything that the model lacks. Where both are further apart than they scatter, the
+    search has ended in a local minimum: no interval holds.
+    """
+    if fitness.weigh is not None:
+        weights = residual_weights(fitness, replays, output_sizes(replays))
+        information = information_at(replays, space, x, weights=weights)
+        return information, None if interval else without(x, NOT_ASKED)
+    if not interval or not len(x):
+        return information_at(replays, space, x), without(x, NOT_ASKED)
+    least = refine(replays, space, x)
+    information = information_at(replays, space, x, tuple(level_of(r, space, least) for r in replays))
+    with ctrl_c_waits() as interrupted:
+
+        def is_over(refined: Refined) -> bool:
+            if progress is not None:
+                progress(refined)
+            return interrupted()
+
+        scatter = bootstrap(fitness, replays, space, x, information, seed, is_over)
+    if len(scatter.draws) > 1:
+        both = np.hypot(scatter.draws.std(axis=0, ddof=1), information.deviation)
+        apart = float(np.max(np.abs(x - scatter.bias - least) / both))
+        if apart > APART and not scatter.doubt:
+            doubt = f"it lies {apart:.3g} standard deviations from the least-squares estimate, as a local minimum does"
+            scatter = replace(scatter, doubt=doubt)
+        information = replace(information, deviation=scatter.draws.std(axis=0, ddof=1), step=scatter.moved,
+                              correlation=np.atleast_2d(np.corrcoef(scatter.draws.T)))  # fmt: skip
+    return information, scatter
 
 
 def search(

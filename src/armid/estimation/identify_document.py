@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from armid.engine.calibrate import NOISE_HIDES
+from armid.estimation.bootstrap import FAR
 from armid.estimation.identify import Identification, errors_by_file, errors_entry, outputs_entry, versions_of
 from armid.estimation.information import collinear
 from armid.model import Array
@@ -42,7 +44,7 @@ from armid.report.document import (
 )
 from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, pyplot
-from armid.units import SHOWN, shown
+from armid.units import scale_of, shown
 
 MOST_FITS_DRAWN = 8
 # Letters of a title that fit above one column.
@@ -146,6 +148,8 @@ OLD = (
 )
 # A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
 FAR_FROM_MINIMUM = 4.0
+# An estimate that is biased by more standard deviations has an interval that misses the truth in more than 8 %.
+BIASED = 0.5
 # A mean square on held-out records of more times that on the fitted ones than this.
 CARRIES_OVER = 1.5
 # Of more records than this one sentence tells.
@@ -207,7 +211,7 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
               f"the noise is {noise:.3g} {unit}.{others_text(train, holdout)}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
-    lost = [name for name, p in free.items() if p["low"] is None]
+    lost = [name for name, p in free.items() if p["low"] is None and "bias" not in p]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
     doubts += details.get("warnings", ())
@@ -222,6 +226,8 @@ def lead(free: Mapping[str, Mapping[str, Any]], judged: bool) -> str:
     doubts = {p.get("interval_doubt", "") for p in free.values()}
     if not any(doubts):
         return f"Found, with 95 % intervals{'' if judged else ' that hold only if the model lacks nothing'}"
+    if len(doubts) == 1 and all(p["low"] is None for p in free.values()):
+        return f"Found, without intervals: {doubts.pop()}"
     if len(doubts) == 1:
         return f"Found, but no interval holds, since {doubts.pop()}"
     return "Found, with 95 % intervals where they hold"
@@ -234,14 +240,15 @@ def held_text(p: Mapping[str, Any]) -> str:
 def parameter_table(result: Mapping[str, Any]) -> Table:
     rows = []
     for name, p in result["parameters"].items():
-        unit, factor = SHOWN.get(p["unit"], (p["unit"], 1.0))
+        unit, factor = scale_of(p["unit"], p["value"])
         if p["bound_low"] is None:
             rows.append((name, factor * p["value"], unit, "fixed", "", ""))
             continue
-        interval = "not determined" if p["low"] is None else f"{factor * p['low']:.6g} to {factor * p['high']:.6g}"
+        absent = "none" if "bias" in p else "not determined"
+        interval = absent if p["low"] is None else f"{factor * p['low']:.6g} to {factor * p['high']:.6g}"
         bounds = f"{factor * p['bound_low']:.4g} to {factor * p['bound_high']:.4g}"
         holds = p.get("interval_holds", True)
-        remark = "AT ITS BOUND" if p["bound_active"] else "" if holds else "does not hold"
+        remark = "AT ITS BOUND" if p["bound_active"] else "" if holds or p["low"] is None else "does not hold"
         shown_interval = interval if holds or p["low"] is None else Struck(interval)
         rows.append((name, factor * p["value"], unit, remark, shown_interval, bounds))
     columns = ["parameter", Column("value", "value", ".6g"), "unit", "remark", "95 % interval", "bounds"]
@@ -303,7 +310,7 @@ def result_of(found: Identification) -> dict[str, Any]:
         "seed": found.seed,
         "noise": noises,
         "outputs": outputs_entry(replays),
-        "engine_error": finite(max(r.engine_error for r in found.train_replays)),
+        "engine_error": finite(max(r.engine_error_at(found.candidate) for r in found.train_replays)),
         "model": str(found.model),
         "versions": versions_of(PACKAGES),
     }
@@ -314,22 +321,31 @@ def entry(found: Identification, i: int, doubts: Mapping[str, str]) -> dict[str,
     space, value = found.space, float(found.candidate[i])
     ends: dict[str, Any] = dict.fromkeys(("low", "high", "bound_low", "bound_high"))
     if space.free[i]:
-        half = found.information.half_width[found.information.names.index(space.names[i])]
-        doubt = doubts[space.names[i]]
-        ends = {"low": finite(value - half), "high": finite(value + half),
+        k, doubt = found.information.names.index(space.names[i]), doubts[space.names[i]]
+        half, scatter = found.information.half_width[k], found.scatter
+        low, high = (value - half, value + half) if scatter is None else (scatter.low[k], scatter.high[k])
+        ends = {"low": finite(low), "high": finite(high),
                 "bound_low": float(space.low[i]), "bound_high": float(space.high[i]),
                 "interval_holds": not doubt, "interval_doubt": doubt}  # fmt: skip
+        ends |= {} if scatter is None else {"bias": finite(scatter.bias[k])}
     return {"value": value, "unit": space.units[i], **ends, "bound_active": bool(found.at_bound[i])}
 
 
 def interval_doubts(found: Identification) -> dict[str, str]:
     """Return, for each free parameter, why its interval does not hold, "" where it does."""
     information, held = found.information, [found.space.names[i] for i in np.flatnonzero(found.at_bound)]
+    if found.scatter is not None and found.scatter.doubt:
+        return dict.fromkeys(information.names, found.scatter.doubt)
     if far_from_minimum(found):
         return dict.fromkeys(information.names, "the search has not come to the minimum")
     if any(level.from_residual for level in information.levels):
         return dict.fromkeys(information.names, "what the model leaves is more than the noise")
-    doubts = dict.fromkeys(information.names, "") | dict.fromkeys(held, "its bound holds it")
+    doubts = dict.fromkeys(information.names, "")
+    if found.scatter is not None:
+        shares = found.scatter.bias / information.deviation
+        doubts |= {name: f"its estimate is biased by {share:.2g} standard deviations"
+                   for name, share in zip(information.names, shares, strict=True) if abs(share) > BIASED}  # fmt: skip
+    doubts |= dict.fromkeys(held, "its bound holds it")
     for pair in (pair[:2] for pair in collinear(information)):
         for name, other in (pair, pair[::-1]):
             if other in held and not doubts[name]:
@@ -338,6 +354,8 @@ def interval_doubts(found: Identification) -> dict[str, str]:
 
 
 def far_from_minimum(found: Identification) -> bool:
+    if found.scatter is not None:
+        return found.scatter.doubt == FAR.format(found.fitness.name)
     return bool(np.nan_to_num(np.abs(found.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
 
 
@@ -382,11 +400,26 @@ def ranked(found: Identification) -> list[str]:
                     "by the other.")  # fmt: skip
     if found.n_failed:
         said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
-    return said + [
-        "{}: the engine is off by up to {:.2g} {} even at its finest steps: the equations are stiff there, or switch "
-        "somewhere without a guard.".format(r.name, *shown(r.engine_error, r.record.unit))
-        for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)
+    # that probes elsewhere miss the accuracy says nothing about the estimate
+    coarse = [r for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)]
+    off = {r: r.engine_error_at(found.candidate) for r in coarse}
+    return said + bootstrap_remarks(found) + [
+        "{}: the engine is off by up to {:.2g} {} at the estimate, even at its finest steps: the equations change too "
+        "fast there, or switch somewhere without a guard.".format(r.name, *shown(error, r.record.unit))
+        for r, error in off.items() if error > r.record.noise.rms / NOISE_HIDES
     ]  # fmt: skip
+
+
+def bootstrap_remarks(found: Identification) -> list[str]:
+    """Return from how many draws intervals come, and the bias of the estimate, in one sentence."""
+    scatter, names = found.scatter, found.information.names
+    if scatter is None or not len(scatter.draws):
+        return []
+    units = [unit for unit, free in zip(found.space.units, found.space.free, strict=True) if free]
+    biases = [f"{name} {'{:+.2g} {}'.format(*shown(bias, unit)).removesuffix(' 1')}"
+              for name, bias, unit in zip(names, scatter.bias, units, strict=True)]  # fmt: skip
+    return [f"The intervals come from {len(scatter.draws)} draws of the noise, each minimised again by "
+            f"{found.fitness.name}. Bias of the estimate: {', '.join(biases)}."]  # fmt: skip
 
 
 def bound_remark(found: Identification, i: int) -> str:
@@ -404,9 +437,12 @@ def convergence_remarks(found: Identification) -> list[str]:
     if far_from_minimum(found):
         steps = np.abs(np.nan_to_num(found.information.step))
         name = found.information.names[int(np.argmax(steps))]
-        said.append(f"The search has not come to the least-squares minimum: a step from here would move {name} by "
-                    f"{steps.max():.3g} of its standard deviations, so the intervals do not hold; identifier "
-                    "least_squares on fitness rmse, a larger budget or another seed may get there.")  # fmt: skip
+        of, better = "least-squares minimum", "Identifier least_squares on fitness rmse, a"
+        if found.scatter is not None:
+            of, better = f"minimum of {found.fitness.name}", "A"
+        said.append(f"The search has not come to the {of}: a step from here would move {name} by {steps.max():.3g} of "
+                    f"its standard deviations, so the intervals do not hold. {better} larger budget or another seed "
+                    "may get there.")  # fmt: skip
     train, holdout = found.train.chi2_per_sample, None if found.holdout is None else found.holdout.chi2_per_sample
     if train is not None and holdout is not None and holdout > CARRIES_OVER * max(train, 1.0):
         said.append(f"The fit does not carry over: its mean square is {holdout:.3g} times that of the noise on the "

@@ -228,10 +228,11 @@ def collinear(information: Information) -> list[tuple[str, str, float]]:
 
 def level_of(replay: Replay, space: Space, x: Array) -> Level:
     noise = replay.record.noise
-    residual = replay.measured - replay.signal(space.complete(x[np.newaxis]))[0]
+    candidate = space.complete(x[np.newaxis])
+    residual = replay.measured - replay.signal(candidate)[0]
     rms = float(np.sqrt(np.mean(residual**2)))
     known = Level(noise.rms, noise.effective_fraction)
-    if not np.isfinite(rms) or (np.isfinite(replay.engine_error) and rms <= ENGINE_ERRORS * replay.engine_error):
+    if not np.isfinite(rms) or rms <= ENGINE_ERRORS * replay.engine_error_at(candidate[0]):
         return known
     if not is_noise(residual, noise):
         return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)

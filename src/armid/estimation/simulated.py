@@ -125,7 +125,11 @@ def simulated_piece(
         raise ArmidError(f"record '{record.file}': the simulation diverges with these parameters")
     if not calibration.reached:
         off = f"the engine is off by up to {calibration.error:.2g} {model.plant.output_unit} even at its finest steps"
-        warnings.warn(f"{record.file}: {off}: with these parameters the equations are stiff", stacklevel=2)
+        warnings.warn(
+            f"{record.file}: {off}: these parameters move too fast for them, or near a "
+            "point from which neighbours part",
+            stacklevel=2,
+        )
     speed = model.plant.aliases.get("omega", "omega")
     columns = {"time_s": piece.manoeuvre.times()}
     recorded = {

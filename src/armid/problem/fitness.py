@@ -179,6 +179,51 @@ def inverse_noise(noise: float) -> float:
     return 1.0 / noise
 
 
+def mean_absolute(measured: Array, simulated: Array) -> Array:
+    """Return the mean of |x - x'| [signal's unit], (n_candidates,)."""
+    return np.asarray(np.abs(simulated - measured).mean(axis=1))
+
+
+def huber(measured: Array, simulated: Array, noise: float, delta: float = 1.345) -> Array:
+    """Return the mean of Huber's loss, (n_candidates,): r^2/2 below delta, linear above, r = (x - x')/noise.
+
+    delta: in units of the noise; 1.345 loses 5 % of the efficiency of least squares under normal noise.
+    """
+    size = np.abs(simulated - measured) * inverse_noise(noise)
+    inner = np.minimum(size, delta)
+    return np.asarray((inner * (size - 0.5 * inner)).mean(axis=1))
+
+
+def spectral_mean_square(measured: Array, simulated: Array) -> Array:
+    """Return the mean square difference of amplitude spectra [signal's unit squared], (n_candidates,).
+
+    A spectrum is that of the whole series under Hann's window; a sine has its amplitude there, whatever its phase.
+    """
+    window = np.hanning(measured.size + 2)[1:-1]
+    scale = 2.0 / window.sum()
+    own, others = (scale * np.abs(np.fft.rfft(window * series)) for series in (measured, simulated))
+    return np.asarray(((own - others) ** 2).mean(axis=1))
+
+
+def warped_mean_square(measured: Array, simulated: Array, interval: float, reach: float = 0.02) -> Array:
+    """Return the least sum of (x - x')^2 over paths of dynamic time warping, per sample, (n_candidates,).
+
+    reach: how far samples may be paired in time [s]. Raises ArmidError without the package dtaidistance.
+    """
+    from armid.problem.similarity import has_failed
+
+    try:
+        from dtaidistance.dtw import distance_fast
+    except ImportError as error:
+        raise ArmidError('fitness \'dtw\' needs the package dtaidistance, which is not installed: pip install '
+                         '"armid[dtw]" is expected') from error  # fmt: skip
+    window = 1 + round(reach / interval)
+    # a row that is not finite has no path; pruning loses a path along the diagonal to rounding
+    rows = [np.inf if failed else distance_fast(measured, row, window=window, use_pruning=False) ** 2
+            for row, failed in zip(simulated, has_failed(simulated), strict=True)]  # fmt: skip
+    return np.array(rows) / measured.size
+
+
 def unity(noise: float) -> float:
     return 1.0
 
@@ -215,6 +260,11 @@ _FITNESSES = (
     Fitness("nrmse", relative_mean_square, "samples", np.sqrt, "1", "rmse with each record divided by its own rms"),
     Fitness("likelihood", chi_square, "sum", None, "1", "sum of (x - x')^2 / noise^2: -2 log likelihood, white noise",
             inverse_noise),
+    Fitness("mae", mean_absolute, "samples", None, "signal", "mean absolute error over all samples"),
+    Fitness("huber", huber, "samples", None, "1", "Huber's loss: square up to 1.345 times the noise, linear above"),
+    Fitness("spectrum", spectral_mean_square, "samples", np.sqrt, "signal", "rmse of amplitude spectra, Hann's window"),
+    Fitness("dtw", warped_mean_square, "samples", np.sqrt, "signal",
+            "rmse after dynamic time warping by at most 0.02 s (extra: armid[dtw])"),
 )  # fmt: skip
 
 FITNESS: dict[str, Fitness] = {fitness.name: fitness for fitness in _FITNESSES}

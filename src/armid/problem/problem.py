@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armid.engine import Calibration, Prepared, Simulation, accuracy_against, calibrate, prepare, probes
+from armid.engine import Calibration, Prepared, Schedule, Simulation, accuracy_against, calibrate, prepare, probes
 from armid.errors import ArmidError, nearest
 from armid.model import Array, Model
 from armid.problem.fitness import Fitness, joined, record_weights
@@ -81,11 +81,11 @@ class Replay:
     def times(self) -> Array:
         return np.concatenate([p.manoeuvre.times()[p.samples] for p in self.pieces])
 
-    @property
-    def engine_error(self) -> float:
-        """Largest error of the engine that was measured on the probes [unit of the record]."""
-        sizes = self.model.plant.sizes
-        return max(c.error for c in self.calibrations) * (sizes[self.place] / sizes[0])
+    def engine_error_at(self, candidate: Array) -> float:
+        """Return the largest error of the engine at one whole candidate [unit of the record], from halved steps."""
+        halved = (replace(c, schedule=Schedule(2 * c.schedule.substeps)) for c in self.calibrations)
+        coarse, fine = (r.signal(candidate[np.newaxis]) for r in (self, replace(self, calibrations=tuple(halved))))
+        return float(np.max(np.abs(coarse - fine))) * 16.0 / 15.0
 
 
 def replay_of(

@@ -23,7 +23,7 @@ from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, load_toml, unknown_name, validated
 from armid.record.table import write_table
 from armid.report.result import Shown
-from armid.units import DEGREE
+from armid.units import DEG, DEGREE, angle_of
 
 if TYPE_CHECKING:
     from armid.report.document import Document
@@ -46,7 +46,8 @@ class Campaign(Shown):
     manoeuvre holds all that apply to it. gyro_range: [rad/s], None when not given. tolerances: constant -> relative
     half-range within which it is known. rough: those of a tenth or more, with parameters of the plant that are fixed.
     chances: effect -> its probability before the records. known: parameter of the plant -> what is known of it before.
-    taken_as_exact: constants of which neither the plant nor the campaign says how well they are known.
+    taken_as_exact: constants of which neither the plant nor the campaign says how well they are known. angle: deg, rad
+    or rpm, in which results show angles and turning speeds.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Campaign(Shown):
     taken_as_exact: tuple[str, ...] = ()
     chances: Mapping[str, float] = field(default_factory=dict)
     known: Mapping[str, Known] = field(default_factory=dict)
+    angle: str = DEG
 
     def __repr__(self) -> str:
         named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
@@ -187,6 +189,7 @@ def read_campaign(
     values = {c.name: c.value for c in plant.constants} | dict(sheet.constants) | fixed
     # of what is 0 in every record nothing is known by a share of it
     sized = {name for name, value in values.items() if any(r.constants.get(name, value) for r in records)}
+    recorded_in = {angle_of(own.header) for r in records for own in r.each if own.unit in ("rad", "rad/s")}
     return Campaign(
         name=sheet.name,
         folder=toml.parent,
@@ -202,6 +205,7 @@ def read_campaign(
                              and not {c.name, DEFAULT} & {*sheet.tolerances, *set_by_records(plant)}),
         unmeasured=tuple(o for o in whole.outputs if o.name not in recorded),
         chances=chances,
+        angle=recorded_in.pop() if len(recorded_in) == 1 else DEG,
         known={name: one for name, one in known.items() if name in {p.name for p in plant.parameters} - fixed.keys()},
     )  # fmt: skip
 

@@ -80,6 +80,7 @@ def read_record(
             data=None if signal.data.all() else signal.data,
             sensor=signal.sensor,
             broken=signal.broken,
+            header=found[output],
         )
         for output, signal in signals.items()
     )

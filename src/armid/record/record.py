@@ -140,6 +140,7 @@ class Record:
     irregularity: None where the file's times were even. output: name of the output, "" for a plant's only one.
     others: records of the file's other outputs, with the same manoeuvres. data: which samples were measured,
     (n_samples,), None: all. sensor: what the values tell of it. broken: samples that are no data by what is wrong.
+    header: of the column.
     """
 
     file: str
@@ -161,6 +162,7 @@ class Record:
     data: Mask | None = None
     sensor: Sensor = field(default_factory=Sensor)
     broken: tuple[Broken, ...] = ()
+    header: str = ""
 
     def __repr__(self) -> str:
         return (f"<Record {self.file} ({self.role}): {len(self.measured)} samples of {self.manoeuvre.interval:g} s, "

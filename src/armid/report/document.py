@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 
 from armid.report.style import Array, place_labels, pyplot, thinned
-from armid.units import shown
+from armid.units import DEG, scale_of, shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -199,8 +199,8 @@ class Document:
     """A whole document.
 
     of: what made it, in a word or two. answer: a few sentences, the first of them alone enough. warning: what must be
-    known first, "" for nothing. facts: how it was made, a sentence each. main: the parts of the sections that a
-    terminal shows.
+    known first, "" for nothing. facts: how it was made, a sentence each. angle: unit in which figures show angles.
+    main: the parts of the sections that a terminal shows.
     """
 
     title: str
@@ -210,6 +210,7 @@ class Document:
     sections: tuple[Section, ...]
     warning: str = field(default="", kw_only=True)
     facts: tuple[str, ...] = field(default=(), kw_only=True)
+    angle: str = field(default=DEG, kw_only=True)
     main: tuple[Part, ...] = field(default=(), kw_only=True)
 
     @property
@@ -276,11 +277,12 @@ def finite(value: float | None) -> float | None:
 
 def value_text(entry: Mapping[str, Any]) -> str:
     """Return a stored parameter (value, unit, low, high) with its 95 % interval in units that people read."""
-    value, name = shown(entry["value"], entry["unit"])
+    name, factor = scale_of(entry["unit"], entry["value"])
+    value = factor * entry["value"]
     unit = "" if name == "1" else f" {name}"
     if entry["low"] is None or entry["high"] is None:
         return f"{value:.5g}{unit}"
-    low, high = (shown(entry[end], entry["unit"])[0] for end in ("low", "high"))
+    low, high = (factor * entry[end] for end in ("low", "high"))
     return f"{value:.5g}{unit} ({low:.5g} to {high:.5g})"
 
 

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from armid.report.document import Document, Table
 from armid.report.style import save
 
@@ -61,9 +63,12 @@ def frame_of(table: Table) -> "DataFrame":
     from pandas import DataFrame
 
     heads = [c.header or c.key for c in table.columns]
-    rows = [[c.number * column.factor if column.digits and c.number is not None else c.text or None
-             for c, column in zip(row, table.columns, strict=True)] for row in table.cells()]  # fmt: skip
-    return DataFrame(rows, columns=heads)
+    frame = DataFrame([[c.text or None for c in row] for row in table.cells()], columns=heads)
+    for i, column in enumerate(table.columns):
+        if column.digits:
+            numbers = [np.nan if row[i].number is None else row[i].number for row in table.cells()]
+            frame.isetitem(i, column.factor * np.array(numbers, dtype=float))
+    return frame
 
 
 def latex(table: Table) -> str:

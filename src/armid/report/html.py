@@ -12,6 +12,7 @@ from markupsafe import Markup
 from armid.errors import ArmidError
 from armid.report.document import Document, Figure, Table, varying
 from armid.report.style import svg_text
+from armid.units import angles_in
 
 
 def html(document: Document, stored: Mapping[str, str] | None = None) -> str:
@@ -36,7 +37,8 @@ def html(document: Document, stored: Mapping[str, str] | None = None) -> str:
     digest = b64encode(sha256(script.encode()).digest()).decode()
     page = environment.get_template("page.html")
     given = {"page": document, "sections": sections, "first": first, "script": script, "style": style}
-    return str(page.render(**given, digest=digest))
+    with angles_in(document.angle):
+        return str(page.render(**given, digest=digest))
 
 
 def fragment(document: Document) -> str:

@@ -5,7 +5,7 @@ import os
 import platform
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from importlib import import_module
@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from armid.errors import ArmidError, printable
+from armid.units import DEG, angles_in
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -61,10 +62,11 @@ class Kind:
     def figures(self) -> tuple[str, ...]:
         return tuple(import_module(self.module).FIGURES)
 
-    @property
-    def document(self) -> "Callable[..., Document]":
-        made: Callable[..., Document] = getattr(import_module(self.module), self.function)
-        return made
+    def document(self, result: Mapping[str, Any], *others: Any) -> "Document":
+        """Return the document of a stored result; others: details, SVG by name, command."""
+        with angles_in(result.get("angle", DEG)):
+            made: Document = getattr(import_module(self.module), self.function)(result, *others)
+        return replace(made, angle=result.get("angle", DEG))
 
     def parts_of(self, found: object) -> Parts:
         made: Parts = import_module(self.module).parts_of(found)
@@ -105,11 +107,14 @@ class Result(Shown):
     """Show and store the result of a command on a campaign, the same way from Python and from the command."""
 
     kind: ClassVar[Kind]
+    campaign: Any
 
     @cached_property
     def parts(self) -> Parts:
         """What is stored of it; made once."""
-        return self.kind.parts_of(self)
+        with angles_in(self.campaign.angle):
+            made = self.kind.parts_of(self)
+        return made._replace(result={**made.result, "angle": self.campaign.angle})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as the command stores it as JSON, SI throughout; what is not known is None."""
@@ -123,7 +128,8 @@ class Result(Shown):
         figures = self.parts.figures
         if name and name not in figures:
             raise ArmidError(f"there is no figure '{name}': {', '.join(figures)} are known")
-        return figures[name or next(iter(figures))]()
+        with angles_in(self.campaign.angle):
+            return figures[name or next(iter(figures))]()
 
     def save(self, folder: str | Path, made_by: Mapping[str, Any] | None = None) -> list[str]:
         """Write JSON, figures, page and Markdown to a folder, all or none, and return their names.
@@ -133,7 +139,7 @@ class Result(Shown):
         from armid.report.style import save
 
         kind, (result, details, figures) = self.kind, self.parts
-        with NewFiles(Path(folder), MANIFEST) as files:
+        with NewFiles(Path(folder), MANIFEST) as files, angles_in(self.campaign.angle):
             files.path(kind.file).write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
             for name, draw in figures.items():
                 endings = ("png", "svg") if name in kind.figures else ("png",)

@@ -4,6 +4,7 @@ Where a run goes, in reading order:
 
 - spec: what the TOML file may hold, and the registered things that it names
 - cases: truths, manoeuvres and campaigns that a study is tried on
+- inputs: what drives the machine in a manoeuvre
 - tasks: builds the list of runs of a study of either kind, and executes a single run
 - runner: run what is missing of a study
 - pool: worker processes on this machine, each run with a time limit
@@ -13,5 +14,5 @@ Where a run goes, in reading order:
 Beside them: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind of
 study that closes the loop), dask_pool (a cluster in place of own processes), tune (options of identifiers, learnt on
 other instances), results (the store as tables), export (the store in formats of others). The report: analyses
-(statistics, a file a topic), document (answer, facts and the sections of the analyses).
+(statistics, a file a topic), answer (to the question of a study), document (facts and the sections of the analyses).
 """

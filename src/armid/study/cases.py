@@ -20,6 +20,7 @@ from armid.record import Campaign, Noise, Override, Piece, Record, read_campaign
 from armid.record.reader import NAME, campaign_path, record_constants
 from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
+from armid.study.inputs import input_values, inputs_of
 from armid.study.spec import (
     WHOLE,
     CaseSpec,
@@ -78,7 +79,7 @@ def cases_of(spec: StudySpec, model: Model, registry: StudyRegistry, folder: Pat
     if spec.suite is not None:
         cases += suite_cases(spec, f"{where}, suite")
     if spec.random_cases is not None:
-        cases += _random_cases(spec, model, f"{where}, random_cases")
+        cases += _random_cases(spec, model, folder, f"{where}, random_cases")
     if not cases:
         raise ArmidError(f"{where}: there is no case, a table [[cases]], [random_cases] or [suite] is expected")
     for name, count in Counter(case.name for case in cases).items():
@@ -128,7 +129,7 @@ def _case(
         raise ArmidError(f"{where}: 'records' are files of a campaign, and no campaign is given")
     space = _space(model, {}, spec, entry, where)
     case = Case(entry.name, model, space, dict(entry.truth), dict(entry.published))
-    return _simulated_case(case, entry.manoeuvres, spec, where)
+    return _simulated_case(case, entry.manoeuvres, spec, folder, where)
 
 
 def _space(
@@ -209,13 +210,12 @@ def digest_of(folder: Path, files: Iterable[str]) -> str:
     return digest.hexdigest()
 
 
-def _simulated_case(case: Case, manoeuvres: Sequence[Mapping[str, Any]], spec: StudySpec, where: str) -> Case:
+def _simulated_case(
+    case: Case, manoeuvres: Sequence[Mapping[str, Any]], spec: StudySpec, folder: Path, where: str
+) -> Case:
     """Return a case with manoeuvres to simulate, and with the true value of every parameter."""
     plant = case.model.plant
-    if plant.inputs:
-        raise ArmidError(f"{where}: plant '{plant.name}' is driven by {plant.inputs[0].name}, which no manoeuvre "
-                         "tells: a campaign is expected")  # fmt: skip
-    strokes = tuple(_stroke(m, spec, plant, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
+    strokes = tuple(_stroke(m, spec, plant, folder, f"{where}, manoeuvre {i + 1}") for i, m in enumerate(manoeuvres))
     if not any(s["role"] == "train" for s in strokes):
         raise ArmidError(f"{where}: no manoeuvre has the role 'train', at least one is expected")
     case = replace(case, truth=_completed(case.truth, case.model, where), strokes=strokes)
@@ -224,14 +224,18 @@ def _simulated_case(case: Case, manoeuvres: Sequence[Mapping[str, Any]], spec: S
     return case
 
 
-def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, where: str) -> dict[str, Any]:
+def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, folder: Path, where: str) -> dict[str, Any]:
     manoeuvre = validated(ManoeuvreSpec, table, where, [key.key for key in plant.keys])
     record = RecordSheet(file="", role=manoeuvre.role, constants=manoeuvre.constants, keys=manoeuvre.keys)
     constants = record_constants(plant, spec.constants, record, where)
     if not FEWEST_SAMPLES - 1 <= manoeuvre.duration_s / spec.interval_s <= MOST_SAMPLES:
         raise ArmidError(f"{where}: duration_s is {manoeuvre.duration_s:g}, {FEWEST_SAMPLES} to {MOST_SAMPLES} samples "
                          f"of {spec.interval_s:g} s are expected")  # fmt: skip
-    return {"constants": constants, "duration_s": manoeuvre.duration_s, "role": manoeuvre.role}
+    times = spec.interval_s * np.arange(round(manoeuvre.duration_s / spec.interval_s) + 1, dtype=np.float64)
+    inputs = inputs_of(manoeuvre.inputs, plant, folder, times, where)
+    # a plant without inputs keeps the settings, and with them the runs, that it had
+    driven = {"inputs": inputs} if plant.inputs else {}
+    return {"constants": constants, "duration_s": manoeuvre.duration_s, "role": manoeuvre.role, **driven}
 
 
 def _completed(truth: Mapping[str, float], model: Model, where: str) -> dict[str, float]:
@@ -273,7 +277,7 @@ def _check_windows(case: Case, spec: StudySpec, where: str) -> None:
                                  f"{stroke['duration_s']:g} s, at least {FEWEST_SAMPLES} are expected")  # fmt: skip
 
 
-def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:
+def _random_cases(spec: StudySpec, model: Model, folder: Path, where: str) -> list[Case]:
     """Return n cases whose truths are a Latin hypercube over the bounds, a margin kept free at each side.
 
     Written out, as the points that a library draws from a seed change between its versions, and with them the cases.
@@ -289,7 +293,7 @@ def _random_cases(spec: StudySpec, model: Model, where: str) -> list[Case]:
     points = (parts + rng.random(parts.shape)) / n
     whole = space.complete(low + (high - low) * (wanted.margin + (1.0 - 2.0 * wanted.margin) * points))
     truths = [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
-    first = _simulated_case(Case("", model, space, truths[0]), wanted.manoeuvres, spec, where)
+    first = _simulated_case(Case("", model, space, truths[0]), wanted.manoeuvres, spec, folder, where)
     names = [f"random {i:0{len(str(n))}d}" for i in range(1, n + 1)]
     return [replace(first, name=name, truth=_completed(t, model, where)) for name, t in zip(names, truths, strict=True)]
 
@@ -300,7 +304,10 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
     interval, records = settings["interval_s"], []
     for i, stroke in enumerate(settings["strokes"], 1):
         name, n_samples = f"manoeuvre {i}", round(stroke["duration_s"] / interval) + 1
-        manoeuvre = Manoeuvre(interval, n_samples, stroke["constants"])
+        times, given = interval * np.arange(n_samples), stroke.get("inputs", {})
+        inputs = {each.name: input_values(given[each.name], times) if each.name in given else
+                  np.full(n_samples, each.default) for each in model.plant.inputs}  # fmt: skip
+        manoeuvre = Manoeuvre(interval, n_samples, stroke["constants"], inputs)
         coarse = calibrate(model, manoeuvre, truth, FINE, spans=False).schedule
         run = simulate(model, manoeuvre, truth, Schedule(FINER * coarse.substeps))
         if run.failed[0]:

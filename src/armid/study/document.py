@@ -1,11 +1,8 @@
 """The document of a study from its stored results: the answer, how it was made, and the sections of its analyses."""
 
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from armid.errors import ArmidError
 from armid.report.document import Document, Line, Listing, Part, Section, listing
@@ -13,18 +10,16 @@ from armid.report.files import write_files
 from armid.report.html import html
 from armid.report.markdown import markdown
 from armid.report.result import NewFiles
-from armid.study.analyses.analysis import PAPER, Evidence, is_swarm, wide_runs
+from armid.study.analyses.analysis import Evidence, wide_runs
 from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, own_sections
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
-from armid.study.analyses.ranks import class_ranks, suite_answer
+from armid.study.analyses.ranks import class_ranks
+from armid.study.answer import answer_of
 from armid.study.results import StudyResults
 from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
 
 BESIDE = "each table is there as CSV and LaTeX too, each figure as SVG."
-MOST_SETTINGS = 2
-# Of the paper's simulations: what its table is to be beaten with.
-QUARTER = 0.25
 ALONE = "A seed decides the search alone; the noise is the records' own."
 PAIRED = "The same seed gives the same noise to all identifiers, so that they are compared in pairs."
 SYNTHETIC = (
@@ -63,7 +58,8 @@ def report_of(
         facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
     else:
         evidence = Evidence(results)
-        found = [Section(a.title, tuple(a.parts(evidence))) for a in (OF_SUITES if evidence.is_suite else ANALYSES)]
+        analyses = OF_SUITES if evidence.is_suite else ANALYSES
+        found = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
         facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, found[0].parts[0])
     sections = (*(s for s in found if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)
@@ -79,43 +75,12 @@ def summary_of(results: StudyResults) -> Document:
     if known_kind(results.study) == IDENTIFIES:
         evidence = Evidence(results)
         main = class_ranks(evidence) if evidence.is_suite else main_table(evidence)
-        answer = answer_of(evidence, main)
+        main, answer = evidence.apart(main), answer_of(evidence, main)
     else:
         runs = loop_runs(results.loops)
         main, answer = verdicts(runs), (counted(runs),)
     return Document(results.study["name"], "Study", str(results.study.get("question", "")),
                     (*answer, state_of(results.study)), (), main=(main,))  # fmt: skip
-
-
-def answer_of(evidence: Evidence, overview: Any) -> tuple[str, ...]:
-    """Return the answer to the question of a study that identifies; overview: its main table."""
-    if evidence.is_suite:
-        return suite_answer(evidence)
-    if not evidence.knows_truth:
-        return (lowest_fitness(evidence),)
-    return (*beside_paper(evidence, overview.frame), *nearest(overview, evidence.settings))
-
-
-def beside_paper(evidence: Evidence, frame: Any) -> tuple[str, ...]:
-    """Return whether the paper's table is reproduced, and beaten at a quarter of the cost; nothing without its row."""
-    setting = evidence.settings[0]
-    ours = frame[(frame["variant"] != PAPER) & (frame["setting"] == setting)].set_index("variant")
-    swarms = ours.loc[[v for v in ours.index if is_swarm(v)]]
-    printed = frame.loc[frame["variant"] == PAPER, "largest_median"]
-    if printed.empty or swarms.empty:
-        return ()
-    paper, swarm = float(printed.iloc[0]), swarms.iloc[0]
-    cheap = ours[ours["used"] <= QUARTER * swarm["used"]]
-    best = cheap.loc[cheap["largest_median"].idxmin()] if len(cheap) else None
-    reproduced = swarm["largest_median"] <= paper
-    beaten = best is not None and best["largest_median"] < min(paper, swarm["largest_median"])
-    words = {(True, True): "Yes, reproduced and beaten", (True, False): "Reproduced, not beaten",
-             (False, True): "Not reproduced by its own method, but beaten", (False, False): "No"}  # fmt: skip
-    cost = "" if best is None else (f"; with at most a quarter of these, {best.name} is off by "
-                                    f"{percent(best['largest_median'])} with {best['used']:,.0f}")  # fmt: skip
-    return (f"{words[bool(reproduced), bool(beaten)]}: the paper's printed values are off by {percent(paper)} (largest "
-            f"error of a run, median), its own swarm here ({swarm.name}) by {percent(swarm['largest_median'])} with "
-            f"{swarm['used']:,.0f} simulations{cost}.",)  # fmt: skip
 
 
 def write_report(document: Document, files: NewFiles) -> None:
@@ -134,43 +99,6 @@ def known_kind(study: dict[str, Any]) -> str:
     if kind not in KIND_NAMES:
         raise ArmidError(f"study '{study['name']}' is of kind '{kind}', one of {', '.join(KIND_NAMES)} is expected")
     return kind
-
-
-def nearest(overview: Any, settings: Sequence[str]) -> tuple[str, ...]:
-    """Return who came nearest to the truth, and how the others (or the paper's result) stand to that."""
-    is_paper = overview.frame["variant"] == PAPER
-    ours, paper = overview.frame[~is_paper], overview.frame[is_paper]
-    said = []
-    known = ours.dropna(subset="largest_median")  # not where no truth is known, or each run failed
-    settings = [s for s in settings if (known["setting"] == s).any()]
-    for setting in settings[:MOST_SETTINGS]:
-        own = known[known["setting"] == setting]
-        best = own.loc[own["largest_median"].idxmin()]
-        said.append(f"{setting}: {best['variant']}, median largest error of a run {percent(best['largest_median'])}, "
-                    f"95 % of its {best['n']} runs within {percent(best['largest_p95'])}")  # fmt: skip
-    more = len(settings) - MOST_SETTINGS
-    first = f"Nearest to the truth: {'; '.join(said)}{f'; {more} more settings below' if more > 0 else ''}."
-    medians = ours[ours["setting"] == settings[0]].set_index("variant")["largest_median"]
-    if len(paper):
-        error = float(paper["largest_median"].iloc[0])
-        return first, (f"{PAPER[0].upper()}{PAPER[1:]}, from its printed values on its own data, has {percent(error)}; "
-                       f"{(medians < error).sum()} of {len(medians)} identifiers are below that.")  # fmt: skip
-    if len(medians) == 1:
-        return (first,)
-    return first, f"Of {len(medians)} identifiers the furthest is {medians.idxmax()} with {percent(medians.max())}."
-
-
-def lowest_fitness(evidence: Evidence) -> str:
-    done = evidence.runs[evidence.runs["status"] == "done"]
-    if done.empty:
-        return "No run has a result."
-    medians = done.groupby(["fitness", "variant"], sort=False)["value"].median()
-    said = [f"{medians.loc[f].idxmin()}, {medians.loc[f].min():.6g} of {f}" for f in dict.fromkeys(done["fitness"])]
-    return f"No truth is known. Lowest median fitness: {'; '.join(said)}."
-
-
-def percent(value: float) -> str:
-    return "not finite" if not np.isfinite(value) else f"{100.0 * value:.3g} %"
 
 
 def state_of(study: dict[str, Any]) -> str:

@@ -60,7 +60,7 @@ class StudyResults(Shown):
     identifiers (labels in order), published, versions, n_planned, n_done, n_failed and more.
     runs: one row a finished run. noise_deg_s: that the study added, NaN for records that are read. used, n_failed:
     simulations. value: best fitness. train_rmse, holdout_rmse: SI. status: "done" or "failed", with the reason in
-    `error`. model, versions: hashes, see `text_of`.
+    `error`. model, versions: hashes, see `text_of`. x_NAME: value of a parameter, SI; error_NAME: its relative error.
     parameters: one row a run and free parameter, SI. deviation: one sigma as of `armid.identify`, the Cramer-Rao bound
     at the solution where the fitness weighs records by their noise. relative_error: abs(value - truth)/abs(truth),
     NaN where the truth is not known.
@@ -194,7 +194,8 @@ def load_study(path: str | Path) -> StudyResults:
         with corruption_guard(file, "what it says of its study, its runs or their versions"):
             study |= {"versions": _versions(connection), "folder": str(file.parent)}
             study["parameters"] = list(dict.fromkeys(str(name) for case in study["cases"] for name in case["bounds"]))
-            return StudyResults(file, study, _runs(connection), _parameters(connection, study))
+            parameters = _parameters(connection, study)
+            return StudyResults(file, study, _with_parameters(_runs(connection), parameters), parameters)
 
 
 def frame_of(connection: sqlite3.Connection, query: str) -> pd.DataFrame:
@@ -209,6 +210,14 @@ def _runs(connection: sqlite3.Connection) -> pd.DataFrame:
     runs[list(NUMBERS)] = runs[list(NUMBERS)].astype(np.float64)
     runs[list(COUNTED)] = runs[list(COUNTED)].fillna(0).astype(np.int64)
     return runs.fillna({"stopped": ""})
+
+
+def _with_parameters(runs: pd.DataFrame, parameters: pd.DataFrame) -> pd.DataFrame:
+    """Return the runs with x_NAME, the value of each parameter, SI, and error_NAME, its relative error."""
+    for prefix, column in (("x_", "value"), ("error_", "relative_error")):
+        wide = parameters.pivot(index="run", columns="parameter", values=column).add_prefix(prefix)
+        runs = runs.join(wide[[f"{prefix}{name}" for name in dict.fromkeys(parameters["parameter"])]], on="run")
+    return runs
 
 
 def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:

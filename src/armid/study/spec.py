@@ -113,6 +113,7 @@ QUESTION = key(any_text, "a text")
 KIND = key(text, "the kind of a study")
 SEEDS = key(seeds, "at most 1,000,000 seeds or a list")
 PER_PARAMETER = key(rising_counts, "a whole number above 0, or a rising list of such")
+BUDGETS = key(rising_counts, "a whole number of simulations above 0, or a rising list of such")
 SEED = key(whole_number, "a whole number of at least 0")
 
 
@@ -123,6 +124,7 @@ class ManoeuvreSpec:
     duration_s: float = field(metadata=key(above_zero, "a length in seconds above 0"))
     role: str = field(default="train", metadata=key(one_of("train", "holdout"), "'train' or 'holdout'"))
     constants: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
+    inputs: Mapping[str, Any] = field(default_factory=dict, metadata=key(any_table, "a table of inputs"))
     keys: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -165,7 +167,7 @@ class SuiteSpec:
 class EntrySpec:
     name: str = field(metadata=key(text, "the name of an identifier"))
     label: str | None = field(default=None, metadata=LINE)
-    budget: int | None = field(default=None, metadata=key(count, "a whole number above 0"))
+    budget: tuple[int, ...] | None = field(default=None, metadata=BUDGETS)
     budget_per_parameter: tuple[int, ...] | None = field(default=None, metadata=PER_PARAMETER)
     fitness: tuple[str, ...] | None = field(default=None, metadata=NAMES)
     noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=LEVELS)
@@ -182,7 +184,7 @@ class StudySpec:
     identifiers: tuple[dict[str, Any], ...] = field(
         metadata=key(list_of(any_table, 1), "at least one table headed [[identifiers]]")
     )
-    budget: int = field(metadata=key(count, "a whole number of simulations above 0"))
+    budget: tuple[int, ...] = field(metadata=BUDGETS)
     seeds: tuple[int, ...] = field(metadata=SEEDS)
     question: str = field(default="", metadata=QUESTION)
     kind: str = field(default=IDENTIFIES, metadata=KIND)

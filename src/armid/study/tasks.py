@@ -149,7 +149,7 @@ def versions() -> dict[str, str]:
 class Entry:
     """One identifier of a study with all that was left to the study filled in.
 
-    budget: of a run at most; per_parameter: budgets in simulations a free parameter, empty: the budget alone.
+    budget: of a run at most; per_parameter: budgets in simulations a free parameter, empty: the budgets in `several`.
     """
 
     label: str
@@ -160,9 +160,10 @@ class Entry:
     noise_deg_s: tuple[float, ...]
     seeds: tuple[int, ...]
     per_parameter: tuple[int, ...] = ()
+    several: tuple[int, ...] = ()
 
     def budgets(self, n_free: int) -> list[int]:
-        return sorted({min(self.budget, each * n_free) for each in self.per_parameter}) or [self.budget]
+        return sorted({min(self.budget, each * n_free) for each in self.per_parameter}) or [*self.several]
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +261,7 @@ class Study:
             "plant": spec.plant,
             "unit": self.cases[0].model.plant.output_unit,
             "effects": list(spec.effects),
-            "budget": spec.budget,
+            "budget": max(spec.budget),
             "fitness": list(dict.fromkeys(f for e in entries for f in e.fitness)),
             "identifiers": list(dict.fromkeys(self.labels)),
             "noise_deg_s": list(dict.fromkeys(n for e in entries for n in e.noise_deg_s)),
@@ -359,9 +360,10 @@ def _entries(spec: StudySpec, registry: StudyRegistry, where: str) -> tuple[Entr
         at = f"{where}, identifier {quoted(name) if isinstance(name, str) else i + 1}"
         own = validated(EntrySpec, table, at)
         noise = spec.noise_deg_s if own.noise_deg_s is None else own.noise_deg_s
-        entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
+        budgets = own.budget or spec.budget
+        entry = Entry(own.label or own.name, own.name, dict(own.options), max(budgets),
                       own.fitness or spec.fitness, noise, own.seeds or spec.seeds,
-                      own.budget_per_parameter or spec.budget_per_parameter)  # fmt: skip
+                      own.budget_per_parameter or spec.budget_per_parameter, budgets)  # fmt: skip
         _check_built(entry, registry, at)
         entries.append(entry)
     for i, entry in enumerate(entries):
@@ -396,7 +398,7 @@ def _check_apart(entry: Entry, other: Entry, where: str) -> None:
                          "a label of its own is expected for each")  # fmt: skip
     shared = (entry.fitness, other.fitness), (entry.noise_deg_s, other.noise_deg_s), (entry.seeds, other.seeds)
     same_run = all(set(one) & set(two) for one, two in shared)
-    if same_run and (same_label or (same_thing and other.budget == entry.budget)):
+    if same_run and (same_label or (same_thing and set(other.several) & set(entry.several))):
         raise ArmidError(f"{where}: identifier '{entry.label}' is there twice with the same fitness, noise and "
                          "seeds, each run once is expected")  # fmt: skip
 

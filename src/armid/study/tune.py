@@ -101,7 +101,8 @@ def training(study: Study, seed: int) -> Study:
     both = {case.name for case in cases} & set(study.case_names)
     if both:
         raise ArmidError(f"study '{study.name}': {min(both)} is in train and in instances, each in one is expected")
-    entries = [replace(e, seeds=(seed,), per_parameter=e.per_parameter[-1:]) for e in tunable(study)]
+    entries = [replace(e, seeds=(seed,), per_parameter=e.per_parameter[-1:], several=e.several[-1:])
+               for e in tunable(study)]  # fmt: skip
     if not entries:
         raise ArmidError(f"study '{study.name}' has nothing to tune, one of {', '.join(RANGES)} without options is "
                          "expected")  # fmt: skip
@@ -159,7 +160,7 @@ def tuned_study(study: Study, found: list[Tuned]) -> str:
             while label in entries:  # of a study that was tuned before
                 label += " again"
             text += f"label = {json.dumps(label, ensure_ascii=False)}\n"
-            text += f"budget = {entry.budget}\n" if entry.budget != spec.budget else ""
+            text += f"budget = {list(entry.several)}\n" if entry.several != spec.budget else ""
             if entry.per_parameter != spec.budget_per_parameter:
                 text += f"budget_per_parameter = {list(entry.per_parameter)}\n"
             text += f"seeds = {list(entry.seeds)}\n" if entry.seeds != spec.seeds else ""

@@ -1,20 +1,21 @@
 """What an analysis is, and what it is given: the runs of a study beside their truths, names and settings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pandas import DataFrame, Series
 
 from armid.model import Array
-from armid.report.document import Column, Part
+from armid.report.document import Column, Part, Table
 from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
 
 Small = NDArray[np.float32]
+P = TypeVar("P", bound=Part)
 # 51 targets, as COCO takes, five a decade: largest relative errors of the parameters from 100 % to 1e-8 %, and shares
 # of the way from a first candidate to the best fitness that anyone found.
 TARGETS = 10.0 ** (-np.arange(51) / 5.0)
@@ -114,6 +115,8 @@ NOISE_FREE = "noise-free"
 PAPER = "the paper's pso"
 # Variants that a table of every row and parameter is printed for, beside the paper's own method.
 MOST_OTHERS = 3
+# What a setting is made of.
+APART = ("noise", "window", "budget")
 # The columns by which most tables tell their rows apart.
 SETTING, VARIANT = Column("setting", "noise"), Column("variant", "identifier")
 # The same column in a report of a suite, where budgets take the place of noise levels.
@@ -143,13 +146,35 @@ class Evidence:
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
         self.runs = ordered(outcomes(results.runs, self.parameters), self.study)
+        budgets = Series("", index=self.runs.index)
         if self.study.get("budget_per_parameter"):
-            texts = Series(budget_texts(self.runs, self.study), index=self.runs.index)
+            budgets = Series(budget_texts(self.runs, self.study), index=self.runs.index)
             as_recorded = self.runs["noise_deg_s"].isna()
-            self.runs["setting"] = texts.where(as_recorded, self.runs["setting"] + ", " + texts)
+            self.runs["setting"] = budgets.where(as_recorded, self.runs["setting"] + ", " + budgets)
+        elif (self.runs.groupby(["identifier", "case"])["budget"].nunique() > 1).any():
+            budgets = self.runs["budget"].map("{:,}".format)
+            self.runs["setting"] += ", " + budgets + " simulations"
+        whole = self.runs.assign(noise=self.runs["noise_deg_s"].map(noise_text), budget=budgets)
+        self._apart = whole.drop_duplicates("setting").set_index("setting")[list(APART)]
         keys = ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]
         done = self.runs.loc[self.runs["status"] == "done", keys]
         self.estimates = done.merge(self.parameters, on="run", how="inner", sort=False)
+
+    def apart(self, part: P) -> P:
+        """Return a table in which noise, window and budget have columns of their own, as far as they differ."""
+        several = [key for key in APART if self._apart[key].nunique() > 1]
+        if not isinstance(part, Table) or not isinstance(part.frame, DataFrame) or not several:
+            return part
+        place = next((i for i, column in enumerate(part.columns) if column.key == "setting"), None)
+        if place is None:
+            return part
+        settings = part.frame["setting"]
+        columns = {f"setting_{key}": settings.map(self._apart[key]).fillna("") for key in several}
+        # a row of no run of ours, such as the paper's, says itself where it comes from
+        columns[f"setting_{several[0]}"] += settings.where(~settings.isin(self._apart.index), "")
+        own = tuple(Column(f"setting_{key}", key) for key in several)
+        kept = (*part.columns[:place], *own, *part.columns[place + 1 :])
+        return replace(part, frame=part.frame.assign(**columns), columns=kept)
 
     @property
     def is_suite(self) -> bool:

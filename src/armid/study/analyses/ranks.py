@@ -2,7 +2,7 @@
 
 import warnings
 from bisect import bisect
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
@@ -19,6 +19,10 @@ from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, i
 
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
 FLOOR = 1e-8
+# With noise, a smaller difference than this share of the Cramer-Rao standard deviation is no difference.
+SHARE_OF_BOUND = 0.01
+# An identifier has arrived when more than this share of its runs has.
+HALF = 0.5
 # A critical-difference diagram of fewer cases would say little.
 LEAST_CASES = 20
 # Of so many cases every way to set the signs is counted (8,192), of more Wilcoxon's test is asymptotic.
@@ -26,8 +30,10 @@ MOST_EXACT = 13
 INTRODUCTION = "How sure is it that one identifier is better than another on cases like these?"
 RANK_CAPTION = (
     "Largest relative error of a run, median over the seeds: one number a case and identifier. A case is one block, "
-    "since its seeds are repeats and no independent evidence. Errors of 1e-6 % and below count as equal. Rank 1 is the "
-    "best of a case; the table shows the mean over the cases."
+    "since its seeds are repeats and no independent evidence. Errors of 1e-6 % and below count as equal, and so do "
+    "those that differ by less than a hundredth of the Cramer-Rao bound. Rank 1 is the best of a case; the table shows "
+    "the mean over the cases. arrived: share of the runs of which no parameter is more than that from the run with the "
+    "lowest fitness on the same noise."
 )
 PAIRS_CAPTION = (
     "Wilcoxon's signed-rank test of the logarithms of the same block values (two-sided, Pratt's rule for ties), "
@@ -44,19 +50,20 @@ FIGURE_CAPTION = (
 def parts(evidence: Evidence) -> Sequence[Part]:
     if not evidence.knows_truth or len(evidence.variants) < 2 or len(evidence.cases) < 2:
         return ()
-    tables, figures = [], []
+    tables, figures, said = [], [], []
     for setting in evidence.settings:
-        tests = rank_tests(evidence.of(setting))
+        tests, reached = rank_tests(evidence.of(setting), steps_of(evidence, setting)), arrived(evidence, setting)
         if tests.n_cases < 2 or len(tests.ranks) < 2:
             continue
         end = "" if len(evidence.settings) == 1 else setting
-        tables += [mean_ranks(tests, setting, slug("ranks", end)), pairs(tests, setting, slug("pairs", end))]
+        said += [arrived_sentence(reached, setting)] if len(reached) else []
+        tables += [mean_ranks(tests, reached, setting, slug("ranks", end)), pairs(tests, setting, slug("pairs", end))]
         if tests.n_cases >= LEAST_CASES and len(tests.ranks) > 2:
             draw = partial(critical_difference_figure, tests, setting)
             name = slug("critical_difference", end)
             figures.append(Figure(name, f"Critical differences, {setting}", FIGURE_CAPTION, draw))
     note = "" if figures else f" A critical-difference diagram wants {LEAST_CASES} cases or more."
-    return Text(INTRODUCTION + note), *tables, *figures
+    return Text(" ".join([INTRODUCTION + note, *said])), *tables, *figures
 
 
 RANKS = Analysis("ranks", "Ranks", parts, "which identifiers differ: Friedman, Wilcoxon with Holm, effect sizes")
@@ -81,17 +88,64 @@ class RankTests:
         return len(self.blocks)
 
 
-def rank_tests(runs: DataFrame) -> RankTests:
+def rank_tests(runs: DataFrame, steps: Mapping[str, float] | None = None) -> RankTests:
     """Compare the largest errors of the variants of one setting on the cases that all of them ran.
 
     A case is one block, its value the median over the seeds, which are no independent evidence about other cases.
+    steps: case -> difference of errors below which two are alike, see `steps_of`.
     Source: Demsar, J. Mach. Learn. Res. 7 (2006) 1.
     """
     raised = runs.assign(largest_error=runs["largest_error"].clip(lower=FLOOR))
-    blocks = blocks_of(raised, "largest_error")
+    blocks = tied(blocks_of(raised, "largest_error"), steps or {})
     statistic, p = friedman(blocks.to_numpy())
     ranks = blocks.rank(axis=1).mean(axis=0).sort_values(kind="stable")
     return RankTests(blocks, ranks, statistic, p, pair_tests(blocks, raised))
+
+
+def tied(blocks: DataFrame, steps: Mapping[str, float]) -> DataFrame:
+    """Return blocks in which values of a case that differ by less than its step are alike: the least of their chain."""
+    values = blocks.to_numpy(float, copy=True)
+    for row, case in zip(values, blocks.index, strict=True):
+        order = np.argsort(row, kind="stable")
+        with np.errstate(invalid="ignore"):
+            begins = np.flatnonzero(np.append(True, np.diff(row[order]) >= max(steps.get(str(case), 0.0), 1e-300)))
+        row[order] = np.repeat(row[order][begins], np.diff(np.append(begins, len(row))))
+    return DataFrame(values, index=blocks.index, columns=blocks.columns)
+
+
+def steps_of(evidence: Evidence, setting: str) -> dict[str, float]:
+    """Return case -> a hundredth of the Cramer-Rao bound, relative, at the run with the least error."""
+    own = evidence.estimates[evidence.estimates["setting"] == setting]
+    own = own.assign(bound=SHARE_OF_BOUND * own["deviation"] / own["truth"].abs())
+    runs = own.groupby(["case", "run"], sort=False)[["relative_error", "bound"]].max().reset_index("case")
+    least = runs.sort_values("relative_error").drop_duplicates("case").set_index("case")["bound"]
+    return {str(case): float(step) for case, step in least.items() if np.isfinite(step)}
+
+
+def arrived(evidence: Evidence, setting: str) -> Series:
+    """Return the share of the runs of each variant that end where the lowest fitness on the same noise lies.
+
+    A run has arrived of which no parameter is further from it than a hundredth of the Cramer-Rao bound. Variants that
+    nobody shares a fitness with are left out.
+    """
+    problem, runs = ["case", "seed", "fitness"], evidence.of(setting)
+    shared = runs[runs.groupby(problem)["variant"].transform("nunique") > 1]
+    done = shared[shared["status"] == "done"]
+    if done.empty:
+        return Series(dtype=float)
+    lowest = done.sort_values("value").drop_duplicates(problem)[[*problem, "run"]]
+    own = evidence.estimates[evidence.estimates["run"].isin(done["run"])][["run", *problem, "parameter", "value"]]
+    best = evidence.parameters.merge(lowest, on="run")[[*problem, "parameter", "value", "deviation"]]
+    both = own.merge(best, on=[*problem, "parameter"], suffixes=("", "_best"))
+    bound = np.where(np.isfinite(both["deviation"]), both["deviation"], 0.0)
+    reach = np.maximum(SHARE_OF_BOUND * bound, FLOOR * both["value_best"].abs())
+    near = ((both["value"] - both["value_best"]).abs() <= reach).groupby(both["run"]).all()
+    return shared.assign(near=shared["run"].map(near).eq(True)).groupby("variant", sort=False)["near"].mean()
+
+
+def arrived_sentence(reached: Series, setting: str) -> str:
+    return (f"{setting}: {(reached > HALF).sum()} of {len(reached)} identifiers arrive at the lowest fitness in more "
+            "than half of their runs.")  # fmt: skip
 
 
 def blocks_of(runs: DataFrame, quantity: str) -> DataFrame:
@@ -169,10 +223,12 @@ def size_in_words(value: float) -> str:
     return ("negligible", "small", "medium", "large")[bisect((0.06, 0.14, 0.21), abs(value - 0.5))]
 
 
-def mean_ranks(tests: RankTests, setting: str, name: str) -> Table:
+def mean_ranks(tests: RankTests, reached: Series, setting: str, name: str) -> Table:
     medians = tests.blocks[tests.ranks.index].median()
-    frame = DataFrame({"variant": tests.ranks.index, "rank": tests.ranks.to_numpy(), "median": medians.to_numpy()})
-    columns = (VARIANT, Column("rank", "mean rank", ".2f"), Column("median", "median of the cases [%]", ".3g", 100.0))
+    frame = DataFrame({"variant": tests.ranks.index, "rank": tests.ranks.to_numpy(), "median": medians.to_numpy(),
+                       "arrived": reached.reindex(tests.ranks.index).to_numpy(float)})  # fmt: skip
+    columns = (VARIANT, Column("rank", "mean rank", ".2f"), Column("median", "median of the cases [%]", ".3g", 100.0),
+               Column("arrived", "arrived [%]", ".3g", 100.0))  # fmt: skip
     title = f"Mean ranks over {tests.n_cases} cases, {setting}"
     return Table(name, title, f"{RANK_CAPTION} {friedman_sentence(tests)}", frame, columns)
 
@@ -229,9 +285,10 @@ def critical_difference_figure(tests: RankTests, setting: str) -> Any:
 
 CLASS_CAPTION = (
     "Rank of the fitness that a run ends with, median over the seeds, among all identifiers on a case; a fitness below "
-    "that of the truth, which fits the noise, counts as equal to it. Mean over the cases, in brackets the 95 % "
-    "interval of a bootstrap over the problems, whose instances are alike. first: cases in which nobody is better. "
-    "Then the mean in each class of difficulty, which was measured before any search."
+    "that of the truth, which fits the noise, counts as equal to it, and two that differ by less than 1e-8 are alike. "
+    "Mean over the cases, in brackets the 95 % interval of a bootstrap over the problems, whose instances are alike. "
+    "first: cases in which nobody is better. Then the mean in each class of difficulty, which was measured before any "
+    "search."
 )
 CLASSES = ("smooth", "valley", "rugged", "plateau", "stair")
 # A fitness this near to that of the truth is not told from it: [rad/s], or of a similarity 1.
@@ -248,7 +305,8 @@ def final_values(evidence: Evidence, setting: str) -> DataFrame:
     runs = evidence.of(setting)
     floors = runs["case"].map({c["name"]: c["floor"] for c in evidence.study["cases"]}).astype(float) + NEAR_TRUTH
     reached = np.maximum(runs["value"].where(runs["status"] == "done", np.inf), floors)
-    return blocks_of(runs.assign(value=reached), "value")
+    blocks = blocks_of(runs.assign(value=reached), "value")
+    return tied(blocks, dict.fromkeys(map(str, blocks.index), NEAR_TRUTH))
 
 
 def class_ranks(evidence: Evidence) -> Table:

@@ -1,0 +1,282 @@
+"""Intervals of an estimate that minimises no sum of squares: parametric bootstrap (Efron, Tibshirani 1993, chapter 6).
+
+Records are simulated at the estimate, noise as it was measured is added, and the same fitness is minimised again from
+the estimate: once for each draw of the noise. The scatter of the draws is that of the estimator.
+All draws are refined side by side, each by a CMA-ES of its own (Hansen 2016, arXiv:1604.00772), so that one step of all
+of them is one population of the engine. Parameters are whitened by the Cramer-Rao covariance at the estimate.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.stats import skew
+
+from armid.estimation.information import NORMAL_95, Information, Level, start_changes
+from armid.estimation.least_squares import WeightedRecords
+from armid.model import Array
+from armid.problem.fitness import Fitness
+from armid.problem.problem import LANES, MOST_VALUES, Replay, fitness_of, output_sizes, signals_of, weights_of
+from armid.problem.space import Space
+
+# Draws, enough for a standard deviation to 7 %; where the estimates are skewed so many, for quantiles.
+DRAWS, MANY_DRAWS = 100, 400
+# Skewness above which a standard deviation says too little; of 100 normal draws it scatters by 0.24.
+SKEWED = 0.5
+# First step of a refinement, and the step at which it has converged, in standard deviations of the Cramer-Rao bound.
+FIRST_STEP, LAST_STEP = 2.0, 0.02
+# Generations after which a draw does not converge, and the share of such draws that leaves no interval.
+MOST_GENERATIONS, MOST_LOST = 400, 0.05
+# The search has ended at the minimum when its refinement moves no parameter by more standard deviations than this.
+AT_MINIMUM = 0.5
+FAR = "the search has not come to the minimum of {}"
+
+
+@dataclass
+class Refined:
+    """How far a bootstrap has come, as a progress bar reads it."""
+
+    budget: int
+    used: int = 0
+    best_f: float = float("nan")
+    what: str = "draws of the noise"
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """How the estimates of a bootstrap scatter.
+
+    draws: estimates that converged, SI, (n_draws, n_free). low, high: ends of the 95 % interval, SI, (n_free,): the
+    estimate +- 1.96 standard deviations, and the quantiles of the draws where these are skewed. bias: their mean less
+    the estimate, SI, (n_free,). moved: how far the estimate itself moves when it is refined, in standard deviations.
+    doubt: why there is no interval, "" where there is one.
+    """
+
+    draws: Array
+    low: Array
+    high: Array
+    bias: Array
+    moved: Array
+    doubt: str = ""
+
+
+def bootstrap(
+    fitness: Fitness, replays: tuple[Replay, ...], space: Space, x: Array, information: Information, seed: int = 1,
+    progress: Callable[[Refined], bool] = lambda _: False,
+) -> Scatter:  # fmt: skip
+    """Return the scatter of an estimate over draws of the noise.
+
+    Parameters
+    ----------
+    fitness, replays, space
+        What was minimised, the records that it sees, ready to be simulated, and the box.
+    x : array, SI, (n_free,)
+        The estimate.
+    information : Information
+        Covariance at the estimate, which scales the steps, and the noise of each record.
+    seed : int
+        Of the noise that is drawn.
+    progress : callable
+        Told how many draws have converged, after each generation; where it returns True the bootstrap ends.
+
+    Returns
+    -------
+    Scatter
+    """
+    if any(level.rms == 0.0 for level in information.levels):
+        return without(x, "a record holds no noise, from which the scatter would follow")
+    unknown = [name for name, d in zip(information.names, information.deviation, strict=True) if not np.isfinite(d)]
+    if unknown:
+        return without(x, f"the records do not determine {', '.join(unknown)}")
+    task = Task(fitness, replays, space, x, information)
+    rng = np.random.default_rng(seed)
+    found = refined(task, task.noises(rng, DRAWS), rng, progress)
+    if not found.doubt and np.abs(skew(found.draws)).max() > SKEWED:
+        found = refined(task, task.noises(rng, MANY_DRAWS), rng, progress)
+    return found
+
+
+def without(x: Array, doubt: str) -> Scatter:
+    """Return the scatter of a bootstrap that gives no interval."""
+    unknown = np.full(len(x), np.nan)
+    return Scatter(np.empty((0, len(x))), unknown, unknown, unknown, unknown, doubt)
+
+
+class Task:
+    """A fitness about an estimate: draws of the noise, and the value of candidates against each of them."""
+
+    def __init__(
+        self, fitness: Fitness, replays: tuple[Replay, ...], space: Space, x: Array, information: Information
+    ) -> None:
+        self.fitness, self.replays, self.space, self.x = fitness, replays, space, x
+        self.levels = information.levels
+        covariance = information.correlation * np.outer(information.deviation, information.deviation)
+        values, vectors = np.linalg.eigh(information.correlation)
+        self.deviation = np.sqrt(np.diag(covariance))
+        # in units of the deviations, as parameters differ by orders of magnitude
+        self.white = self.deviation[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, 0.0))
+        self.weights, self.sizes = weights_of(fitness, replays), output_sizes(replays)
+        self.ends = np.cumsum([r.record.n_samples for r in replays])[:-1]
+        self.measured = np.concatenate([r.measured for r in replays])
+
+    def noises(self, rng: np.random.Generator, n_draws: int) -> Array:
+        """Return the measured signals and those of the draws, the records end to end, (1 + n_draws, n_samples)."""
+        candidate = self.space.complete(self.x[np.newaxis])
+        clean = np.concatenate(signals_of(self.replays, candidate), axis=1)
+        drawn = [coloured(rng, (n_draws, r.record.n_samples), level)
+                 for r, level in zip(self.replays, self.levels, strict=True)]  # fmt: skip
+        noise = np.concatenate(drawn, axis=1)
+        for change in self.changes_of_starts():
+            noise += rng.standard_normal((n_draws, 1)) * change
+        return np.concatenate([self.measured[np.newaxis], clean + self.beyond_starts(noise)])
+
+    def changes_of_starts(self) -> list[Array]:
+        """Return what one standard deviation of each measured start does to the signals, (n_samples,) each."""
+        records = WeightedRecords(self.replays, self.space, (1.0,) * len(self.replays))
+        return list(start_changes(records, records.shares(self.x)))
+
+    def beyond_starts(self, noise: Array) -> Array:
+        """Return noise less what starts that are fitted beside the parameters take up of it."""
+        parts = np.split(noise, self.ends, axis=1)
+        left = [part.copy() for part in parts]
+        first = [np.cumsum([0, *(p.n_samples for p in r.pieces)]) for r in self.replays]
+        groups: dict[tuple[int, ...], list[int]] = {}
+        for i, replay in enumerate(self.replays):
+            groups.setdefault(replay.simulated, []).append(i)
+        for group in groups.values():
+            for k, piece in enumerate(self.replays[group[0]].pieces):
+                correction = piece.correction
+                if correction is None:
+                    continue
+                places = {self.replays[i].place: i for i in group}
+                rows = {place: slice(first[i][k], first[i][k + 1]) for place, i in places.items()}
+                absent = [place for place in correction.places if place not in places]
+                if absent:
+                    continue
+                seen = np.concatenate([parts[places[p]][:, rows[p]] for p in correction.places], axis=1)
+                starts = seen @ correction.gain.T
+                pairs = zip(correction.places, correction.slopes.swapaxes(0, 1), correction.samples, strict=True)
+                for place, slopes, samples in pairs:
+                    left[places[place]][:, rows[place]] -= starts @ slopes[:, samples]
+        return np.concatenate(left, axis=1)
+
+    def candidates(self, u: Array) -> Array:
+        """Return free parameters, SI, of whitened ones, moved into the box, (..., n_free)."""
+        low, high = self.space.low[self.space.free], self.space.high[self.space.free]
+        return np.asarray(np.clip(self.x + u @ self.white.T, low, high))
+
+    def values(self, U: Array, measured: Array) -> Array:
+        """Return the fitness of the candidates of each draw, (n_draws, n_candidates), from U with a last axis more."""
+        n_draws, n_candidates, n = U.shape
+        size = max(MOST_VALUES // (n_candidates * measured.shape[1]), LANES)
+        found = np.empty((n_draws, n_candidates))
+        for begin in range(0, n_draws, size):
+            part = slice(begin, begin + size)
+            whole = self.space.complete(self.candidates(U[part]).reshape(-1, n))
+            signals = [s.reshape(-1, n_candidates, s.shape[1]) for s in signals_of(self.replays, whole)]
+            for i, row in enumerate(measured[part]):
+                found[begin + i] = fitness_of(self.fitness, self.replays, np.split(row, self.ends),
+                                              [s[i] for s in signals], self.weights, self.sizes)  # fmt: skip
+        return found
+
+
+def coloured(rng: np.random.Generator, shape: tuple[int, int], level: Level) -> Array:
+    """Return normal noise of a level, correlated from sample to sample as its effective fraction says."""
+    white = rng.standard_normal(shape)
+    memory = (1.0 - level.effective_fraction) / (1.0 + level.effective_fraction)
+    if memory > 0.0:
+        white[:, 1:] *= np.sqrt(1.0 - memory**2)
+        white = np.asarray(lfilter([1.0], [1.0, -memory], white, axis=1))
+    return level.rms * white
+
+
+def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Callable[[Refined], bool]) -> Scatter:
+    """Minimise the fitness for each draw from the estimate; the first of them is the measurement itself."""
+    state, told = Swarm(len(measured), len(task.x)), Refined(len(measured) - 1)
+    for _ in range(MOST_GENERATIONS):
+        moving = state.moving
+        told.used = int(np.count_nonzero(~moving[1:]))
+        if progress(told):
+            return without(task.x, "the bootstrap was interrupted")
+        if not moving.any():
+            break
+        state.step(moving, rng, partial(task.values, measured=measured[moving]))
+    lost, draws = state.moving, task.candidates(state.best)
+    if not np.isfinite(state.value).all() or lost[1:].mean() > MOST_LOST:
+        return without(task.x, f"the fitness does not converge in {lost[1:].sum()} of {told.budget} draws of the noise")
+    x, kept = task.x, draws[1:][~lost[1:]]
+    deviation = np.std(kept, axis=0, ddof=1)
+    low, high = x - NORMAL_95 * deviation, x + NORMAL_95 * deviation
+    skewed = np.abs(skew(kept)) > SKEWED
+    if len(kept) > DRAWS:
+        ends = np.quantile(kept, (0.025, 0.975), axis=0)
+        low, high = np.where(skewed, ends[0], low), np.where(skewed, ends[1], high)
+    moved = (draws[0] - x) / np.maximum(deviation, 1e-300)
+    found = Scatter(kept, low, high, kept.mean(axis=0) - x, moved)
+    if lost[0] or np.abs(moved).max() > AT_MINIMUM:
+        return replace(found, doubt=FAR.format(task.fitness.name))
+    return found
+
+
+class Swarm:
+    """A CMA-ES for each draw, all of them arrays over the draws; the start is 0, the unit a standard deviation."""
+
+    def __init__(self, n_draws: int, n: int) -> None:
+        self.n, self.size = n, 4 + int(3 * np.log(n))
+        parents = self.size // 2
+        weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
+        self.weights = weights / weights.sum()
+        self.mass = 1.0 / float(np.sum(self.weights**2))
+        mass = self.mass
+        self.c_step = (mass + 2.0) / (n + mass + 5.0)
+        self.damping = 1.0 + 2.0 * max(0.0, np.sqrt((mass - 1.0) / (n + 1.0)) - 1.0) + self.c_step
+        self.c_path = (4.0 + mass / n) / (n + 4.0 + 2.0 * mass / n)
+        self.c_one = 2.0 / ((n + 1.3) ** 2 + mass)
+        self.c_many = min(1.0 - self.c_one, 2.0 * (mass - 2.0 + 1.0 / mass) / ((n + 2.0) ** 2 + mass))
+        self.expected = np.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n**2))
+        self.mean, self.best = np.zeros((n_draws, n)), np.zeros((n_draws, n))
+        self.value = np.full(n_draws, np.inf)
+        self.sigma = np.full(n_draws, FIRST_STEP)
+        self.covariance = np.tile(np.eye(n), (n_draws, 1, 1))
+        self.step_path, self.path = np.zeros((n_draws, n)), np.zeros((n_draws, n))
+
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        widest = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2).max(axis=1))
+        return np.asarray(self.sigma * widest > LAST_STEP)
+
+    def step(self, moving: NDArray[np.bool_], rng: np.random.Generator, value: Callable[[Array], Array]) -> None:
+        """Move the draws that have not converged by one generation."""
+        values, vectors = np.linalg.eigh(self.covariance[moving])
+        axes = vectors * np.sqrt(np.maximum(values, 1e-20))[:, np.newaxis, :]
+        steps = rng.standard_normal((len(axes), self.size, self.n)) @ axes.swapaxes(1, 2)
+        sigma = self.sigma[moving]
+        tried = self.mean[moving][:, np.newaxis] + sigma[:, np.newaxis, np.newaxis] * steps
+        F = value(tried)
+        order = np.argsort(F, axis=1, kind="stable")
+        first = np.take_along_axis(tried, order[:, :1, np.newaxis], axis=1)[:, 0]
+        least = np.take_along_axis(F, order[:, :1], axis=1)[:, 0]
+        better = least < self.value[moving]
+        self.best[moving] = np.where(better[:, np.newaxis], first, self.best[moving])
+        self.value[moving] = np.where(better, least, self.value[moving])
+        parents = np.take_along_axis(steps, order[:, : len(self.weights), np.newaxis], axis=1)
+        mean = np.einsum("p,dpn->dn", self.weights, parents)
+        self.mean[moving] += sigma[:, np.newaxis] * mean
+        whitened = np.einsum("dij,dj->di", vectors / np.sqrt(np.maximum(values, 1e-20))[:, np.newaxis, :],
+                             np.einsum("dji,dj->di", vectors, mean))  # fmt: skip
+        gain = np.sqrt(self.c_step * (2.0 - self.c_step) * self.mass)
+        self.step_path[moving] = (1.0 - self.c_step) * self.step_path[moving] + gain * whitened
+        length = np.linalg.norm(self.step_path[moving], axis=1)
+        slow = (length < (1.4 + 2.0 / (self.n + 1.0)) * self.expected)[:, np.newaxis]
+        gain = np.sqrt(self.c_path * (2.0 - self.c_path) * self.mass)
+        self.path[moving] = (1.0 - self.c_path) * self.path[moving] + slow * gain * mean
+        path = self.path[moving]
+        kept = 1.0 - self.c_one - self.c_many + (~slow[:, :, np.newaxis]) * self.c_one * self.c_path * (2 - self.c_path)
+        self.covariance[moving] = (
+            kept * self.covariance[moving] + self.c_one * path[:, :, np.newaxis] * path[:, np.newaxis]
+            + self.c_many * np.einsum("p,dpi,dpj->dij", self.weights, parents, parents)
+        )  # fmt: skip
+        self.sigma[moving] = sigma * np.exp(self.c_step / self.damping * (length / self.expected - 1.0))

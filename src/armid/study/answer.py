@@ -1,0 +1,147 @@
+"""The answer to the question of a study that identifies, a sentence for its kind."""
+
+from typing import Any
+
+import numpy as np
+from pandas import DataFrame, Series
+
+from armid.report.document import listed
+from armid.study.analyses.analysis import PAPER, Evidence, is_swarm
+from armid.study.analyses.ranks import arrived, arrived_sentence, rank_tests, steps_of, suite_answer
+
+# Of more settings the table tells.
+MOST_SETTINGS = 3
+# Of the paper's simulations: what its table is to be beaten with.
+QUARTER = 0.25
+# Identifiers that cannot be told from the best and are named.
+MOST_ALIKE = 4
+# A parameter whose mean error is more times its scatter than this is off, whatever the search does.
+OFF = 3.0
+SURE = 0.05
+
+
+def answer_of(evidence: Evidence, overview: Any) -> tuple[str, ...]:
+    """Return the answer to the question of a study; overview: its main table."""
+    if evidence.is_suite:
+        return suite_answer(evidence)
+    if not evidence.knows_truth:
+        return (lowest_fitness(evidence),)
+    kind = evidence.study.get("report")
+    frame = overview.frame
+    first = {"table1": beside_paper, "table2": repeats}.get(str(kind), by_fitness)(evidence, frame)
+    return (*first, *best(evidence, frame), *own(evidence, frame))
+
+
+def noisy_first(evidence: Evidence) -> list[str]:
+    """Return the settings, those with noise before those without."""
+    with_noise = set(evidence.runs.loc[evidence.runs["noise_deg_s"] != 0.0, "setting"])
+    return sorted(evidence.settings, key=lambda s: s not in with_noise)
+
+
+def beside_paper(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
+    """Return whether the paper's table is reproduced, and beaten at a quarter of the cost; nothing without its row."""
+    setting = noisy_first(evidence)[0]
+    ours = frame[(frame["variant"] != PAPER) & (frame["setting"] == setting)].set_index("variant")
+    swarms = ours.loc[[v for v in ours.index if is_swarm(v)]]
+    printed = frame.loc[frame["variant"] == PAPER, "largest_median"]
+    if printed.empty or swarms.empty:
+        return ()
+    paper, swarm = float(printed.iloc[0]), swarms.iloc[0]
+    cheap = ours[ours["used"] <= QUARTER * swarm["used"]]
+    best = cheap.loc[cheap["largest_median"].idxmin()] if len(cheap) else None
+    reproduced = swarm["largest_median"] <= paper
+    beaten = best is not None and best["largest_median"] < min(paper, swarm["largest_median"])
+    words = {(True, True): "Yes, reproduced and beaten", (True, False): "Reproduced, not beaten",
+             (False, True): "Not reproduced by its own method, but beaten", (False, False): "No"}  # fmt: skip
+    cost = "" if best is None else (f"; with at most a quarter of these, {best.name} is off by "
+                                    f"{percent(best['largest_median'])} with {best['used']:,.0f}")  # fmt: skip
+    return (f"{words[bool(reproduced), bool(beaten)]} ({setting}): the paper's printed values are off by "
+            f"{percent(paper)} (largest error of a run, median), its own swarm here ({swarm.name}) by "
+            f"{percent(swarm['largest_median'])} with {swarm['used']:,.0f} simulations{cost}.",)  # fmt: skip
+
+
+def repeats(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
+    """Return how well repeats agree on each record, and which parameters are off beyond their scatter."""
+    runs = evidence.estimates.assign(signed=evidence.estimates["value"] / evidence.estimates["truth"] - 1.0)
+    groups = runs.groupby(["setting", "variant", "case", "parameter"], sort=False)["signed"]
+    within = groups.std(ddof=0).groupby(["setting", "variant"], sort=False).max()
+    if within.empty:
+        return ()
+    setting = noisy_first(evidence)[0]
+    searches: Series[float] = within[within.index.get_level_values("setting") == setting].droplevel("setting")
+    tight, wide = searches.idxmin(), searches.idxmax()
+    own = runs[(runs["setting"] == setting) & (runs["variant"] == tight)].groupby("parameter", sort=False)["signed"]
+    mean, scatter = own.mean(), own.std(ddof=0)
+    off = [f"{name} by {percent(abs(mean[name]))}" for name in mean.index if abs(mean[name]) > OFF * scatter[name]]
+    lacks = f"; off is {listed(off)}, since the model lacks an effect of these records" if off else ""
+    return (f"Repeats on a record agree to {percent(searches.min())} with {tight}, to {percent(searches.max())} with "
+            f"{wide} ({setting}; standard deviation of the worst parameter){lacks}.",)  # fmt: skip
+
+
+def by_fitness(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
+    """Return, where identifiers ran on several fitnesses, which of these comes nearest to the truth at each noise."""
+    runs = evidence.runs
+    if runs.groupby("identifier")["fitness"].nunique().max() < 2:
+        return ()
+    said = []
+    for setting in noisy_first(evidence)[:MOST_SETTINGS]:
+        medians = runs[runs["setting"] == setting].groupby("fitness", sort=False)["largest_error"].median()
+        ordered = medians.sort_values(kind="stable")
+        said.append(f"{setting}: {', '.join(f'{name} {percent(value)}' for name, value in ordered.items())}")
+    return (f"Largest error of a run by fitness, median, the nearest to the truth first. {'; '.join(said)}.",)
+
+
+def best(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
+    """Return who is best at each setting, whom the tests cannot tell from it, and how many arrived."""
+    known = frame[frame["variant"] != PAPER].dropna(subset="largest_median")
+    settings = [s for s in noisy_first(evidence) if (known["setting"] == s).any()]
+    said = [best_at(evidence, known[known["setting"] == setting], setting) for setting in settings[:MOST_SETTINGS]]
+    more = len(settings) - MOST_SETTINGS
+    return (f"Best: {'; '.join(said)}{f'; {more} more settings below' if more > 0 else ''}.",) if said else ()
+
+
+def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
+    compared = len(own) > 1 and len(evidence.cases) > 1
+    tests = rank_tests(evidence.of(setting), steps_of(evidence, setting)) if compared else None
+    ranked = tests is not None and tests.n_cases > 1
+    rows = own.set_index("variant")
+    name = str(tests.ranks.index[0] if tests is not None and ranked else rows["largest_median"].idxmin())
+    row: Any = rows.loc[name]
+    text = (f"{setting}: {name}, largest error of a run {percent(row['largest_median'])} (median), "
+            f"{percent(row['largest_p95'])} (95 % of {row['n']} runs)")  # fmt: skip
+    if tests is None or not ranked:
+        return text
+    pairs = tests.pairs[(tests.pairs["first"] == name) | (tests.pairs["second"] == name)]
+    named = zip(pairs["first"], pairs["second"], pairs["p_holm"], strict=True)
+    alike = [str(a if b == name else b) for a, b, p in named if not p < SURE]
+    some = listed(alike[:MOST_ALIKE]) + (f" and {len(alike) - MOST_ALIKE} more" if len(alike) > MOST_ALIKE else "")
+    text += f"; the tests cannot tell {some} from it" if alike else "; it is better than each other by the tests"
+    reached = arrived(evidence, setting)
+    return f"{text}; {arrived_sentence(reached, setting).partition(': ')[2].rstrip('.')}" if len(reached) else text
+
+
+def own(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
+    """Return where the identifiers of plug-ins stand."""
+    names = [str(plugin).rpartition(":")[2] for plugin in evidence.study.get("plugins", ())]
+    said = []
+    for setting in noisy_first(evidence)[:MOST_SETTINGS]:
+        there = frame[(frame["setting"] == setting) & (frame["variant"] != PAPER)]
+        medians = there.set_index("variant")["largest_median"]
+        for variant in medians.index:
+            if any(variant == name or variant.startswith((f"{name} ", f"{name}+")) for name in names):
+                place = 1 + int((medians < medians[variant]).sum())
+                said.append(f"{variant} is number {place} of {len(medians)} ({setting}, {percent(medians[variant])})")
+    return (f"Your own: {'; '.join(said)}.",) if said else ()
+
+
+def lowest_fitness(evidence: Evidence) -> str:
+    done = evidence.runs[evidence.runs["status"] == "done"]
+    if done.empty:
+        return "No run has a result."
+    medians = done.groupby(["fitness", "variant"], sort=False)["value"].median()
+    said = [f"{medians.loc[f].idxmin()}, {medians.loc[f].min():.6g} of {f}" for f in dict.fromkeys(done["fitness"])]
+    return f"No truth is known. Lowest median fitness: {'; '.join(said)}."
+
+
+def percent(value: float) -> str:
+    return "not finite" if not np.isfinite(value) else f"{100.0 * value:.3g} %"

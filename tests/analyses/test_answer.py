@@ -1,0 +1,76 @@
+"""Where the noise decides ranks stop, and the first sentence of a study answers the question of its kind."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from armid.study.analyses.analysis import Evidence
+from armid.study.analyses.overview import main_table
+from armid.study.analyses.ranks import RANKS, arrived, rank_tests, steps_of, tied
+from armid.study.answer import answer_of
+
+
+def on_the_same_noise(made, offsets, **more):
+    """Return evidence in which each identifier ends so many Cramer-Rao deviations from the minimum of its noise."""
+    results = made(identifiers=dict.fromkeys(offsets, 1e-9), noises=(0.3,), **more)
+    runs, rows = results.runs, results.parameters.merge(results.runs[["run", "case", "seed", "identifier"]], on="run")
+    draws = {key: np.random.default_rng(i).normal() for i, key in enumerate(sorted({*zip(rows["case"], rows["seed"])}))}
+    noise = np.array([draws[key] for key in zip(rows["case"], rows["seed"])])
+    offset = rows["identifier"].map(offsets).to_numpy()
+    rows["value"] = rows["truth"] + (np.abs(noise) + 1.0 + offset) * rows["deviation"]
+    rows["relative_error"] = (rows["value"] / rows["truth"] - 1.0).abs()
+    runs["value"] = 1.0 + runs["identifier"].map(offsets).abs()
+    return Evidence(replace(results, runs=runs, parameters=rows.drop(columns=["case", "seed", "identifier"])))
+
+
+def test_differences_below_a_hundredth_of_the_bound_are_ties_and_those_who_arrived_are_counted(made):
+    evidence = on_the_same_noise(made, {"exact": 0.0, "near": 0.004, "far": 0.5})
+    steps = steps_of(evidence, "0.3 deg/s")
+    assert list(steps.values()) == pytest.approx([0.01 * 2e-3] * 5)
+    tests = rank_tests(evidence.of("0.3 deg/s"), steps)
+    assert tests.ranks.to_dict() == {"exact": 1.5, "near": 1.5, "far": 3.0}
+    assert rank_tests(evidence.of("0.3 deg/s")).ranks["near"] == 2.0
+    assert arrived(evidence, "0.3 deg/s").to_dict() == {"exact": 1.0, "near": 1.0, "far": 0.0}
+    text, ranks, *_ = RANKS.parts(evidence)
+    assert "0.3 deg/s: 2 of 3 identifiers arrive at the lowest fitness in more than half of their runs." in text.text
+    assert ranks.frame["arrived"].tolist() == [1.0, 1.0, 0.0]
+
+
+def test_ties_are_chains_and_the_floor_of_a_suite_is_the_same_rule():
+    blocks = pd.DataFrame([[1.0, 1.4, 1.8, 3.0], [1.0, 1.4, 1.8, np.inf]], index=["a", "b"], columns=[*"wxyz"])
+    assert tied(blocks, {"a": 0.5}).loc["a"].tolist() == [1.0, 1.0, 1.0, 3.0]
+    assert tied(blocks, {"a": 0.5}).loc["b"].tolist() == [1.0, 1.4, 1.8, np.inf]
+
+
+def test_the_answer_says_who_is_best_with_noise_who_is_like_it_and_where_a_plugin_stands(made):
+    cases = [{"name": f"case {i}", "truth": {"p0": 3e6, "k": 0.8, "eta3": 0.6, "n": 1.2}} for i in range(12)]
+    evidence = on_the_same_noise(made, {"exact": 0.0, "near": 0.004, "mine": 0.5}, cases=cases, seeds=2)
+    evidence.study["plugins"] = ["folder/mine.py:mine"]
+    first, yours = answer_of(evidence, main_table(evidence))
+    assert first.startswith("Best: 0.3 deg/s: exact, largest error of a run ")
+    assert "; the tests cannot tell near from it; 2 of 3 identifiers arrive" in first
+    assert yours.startswith("Your own: mine is number 3 of 3 (0.3 deg/s, ")
+
+
+def test_no_answer_tells_of_the_case_without_noise_first(made):
+    for study in ({"report": "table1"}, {"fitness": ("similarity", "rmse")}, {}):
+        evidence = Evidence(made(noises=(0.0, 0.3), seeds=2, **study))
+        answer = answer_of(evidence, main_table(evidence))
+        assert "0.3 deg/s" in answer[0]
+        assert answer[0].find("0.3 deg/s") < answer[0].find("noise-free") or "noise-free" not in answer[0]
+        if "fitness" in study:
+            assert re.match(r"Largest error of a run by fitness, median.* 0.3 deg/s: (rmse|similarity) ", answer[0])
+
+
+def test_the_answer_to_table_2_is_how_repeats_agree_and_what_is_off(made):
+    results = made(report="table2", noises=(0.3,), identifiers={"pso": 1e-3, "cmaes": 1e-5})
+    rows = results.parameters
+    is_eta = rows["parameter"] == "eta3"
+    rows.loc[is_eta, "value"] = 1.1 * rows.loc[is_eta, "truth"]
+    evidence = Evidence(replace(results, parameters=rows))
+    said = answer_of(evidence, main_table(evidence))[0]
+    assert re.match(r"Repeats on a record agree to [\d.e-]+ % with cmaes, to [\d.]+ % with pso \(0.3 deg/s", said)
+    assert said.endswith("off is eta3 by 10 %, since the model lacks an effect of these records.")
