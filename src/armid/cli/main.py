@@ -37,7 +37,7 @@ COMMANDS = {
     "list": "listing:list_command", "check": "check:check_command", "doctor": "doctor:doctor_command",
     "bench": "check:bench_command", "study": "study:study_command", "tune": "study:tune_command",
     "report": "report:report_command", "import": "transfer:import_group", "export": "transfer:export_group",
-    "new": "new:new_command",
+    "new": "new:new_command", "schema": "new:schema_command",
 }  # fmt: skip
 
 
