@@ -10,8 +10,7 @@ import jsonschema
 import pytest
 
 from armid import ArmidError, read_campaign, read_study
-from armid.by_name import toml
-from armid.record.schema import CampaignSheet, Known, Override, RecordSheet
+from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, toml
 from armid.study.spec import CaseSpec, EntrySpec, LoopSpec, ManoeuvreSpec, RandomCasesSpec, StudySpec, SuiteSpec
 
 SHEETS = (CampaignSheet, RecordSheet, Override, Known, StudySpec, LoopSpec, CaseSpec, EntrySpec, ManoeuvreSpec,

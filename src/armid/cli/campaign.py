@@ -2,9 +2,6 @@
 
 import json
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +28,8 @@ from armid.cli.options import (
     value_of,
 )
 from armid.cli.report import show_and_save
-from armid.errors import ArmidError, nearest, printable
+from armid.errors import ArmidError, nearest
+from armid.progress import search_bar, status_line
 from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_unwritable
 
 
@@ -127,31 +125,12 @@ def identify_command(
     goal = 1.0 - target if target is not None and minimised.partition(":")[0] in SIMILARITIES else target
     named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
     refuse_unwritable(out, IDENTIFICATION.file)
-    with progress_bar() as update:
+    with search_bar(speaks()) as update:
         found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), update,
                     options=named, paper=paper, **given(**problem))  # fmt: skip
     show_and_save(found, out)
     if found.stopped == INTERRUPTED:
         sys.exit(130)
-
-
-@contextmanager
-def progress_bar() -> Iterator[Callable[[Any], None]]:
-    """Yield what shows the state of a search, with rate and time left, on a terminal; nothing is shown elsewhere."""
-    if not (sys.stderr.isatty() and speaks()):
-        yield lambda meter: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TimeRemainingColumn
-
-    columns = ("{task.completed:.0f}/{task.fields[budget]} simulations", BarColumn(), "{task.fields[rate]:.0f}/s",
-               TimeRemainingColumn(), "best {task.fields[best]:.6g}")  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=None, budget="", best=float("inf"), rate=0.0)
-        # rich does not know a speed until it has seen two steps
-        yield lambda m: bar.update(
-            task, total=m.budget, budget=m.budget, completed=m.used, best=m.best_f, rate=bar.tasks[0].speed or 0.0
-        )
 
 
 @command("identifiability", short_help="Say how well the records pin down the parameters.", epilog=examples(
@@ -212,8 +191,6 @@ def read_point(path: Path) -> dict[str, float]:
                          "expected") from error  # fmt: skip
 
 
-# Where the output is no terminal, so many seconds pass between two lines.
-SILENT_S = 60.0
 PROGRESS = "progress.jsonl"
 
 
@@ -257,7 +234,7 @@ def close_loop_command(
     refuse_unwritable(out, LOOP.file)
     kept = out / PROGRESS
     try:
-        with status_line() as show_status:
+        with status_line(speaks()) as show_status:
             found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
                                without=without, curve=not no_curve, progress=kept, within=within,
                                **given(**problem))  # fmt: skip
@@ -267,26 +244,3 @@ def close_loop_command(
             tell(f"armid: what was fitted is kept in {kept}: the same command goes on from there")
         raise
     kept.unlink(missing_ok=True)
-
-
-@contextmanager
-def status_line() -> Iterator[Callable[[str], None]]:
-    """Yield what shows a sentence and the time on a terminal; elsewhere a line is printed once a minute."""
-    if not (sys.stderr.isatty() and speaks()):
-        began = last = time.monotonic()
-
-        def now_and_then(sentence: str) -> None:
-            nonlocal last
-            if speaks() and time.monotonic() - last >= SILENT_S:
-                last = time.monotonic()
-                tell(f"{last - began:.0f} s: {sentence}")
-
-        yield now_and_then
-        return
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("identifying the declared model (compiling at first)", total=None)
-        yield lambda sentence: bar.update(task, description=printable(sentence))

@@ -14,6 +14,7 @@ from armid.identifiers.least_squares import LEAST_SQUARES
 from armid.identifiers.nlopt import NLOPT
 from armid.identifiers.pso import PaperPSO
 from armid.identifiers.pymoo_adapter import built_search
+from armid.model import Catalogue
 
 
 def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
@@ -63,7 +64,7 @@ _IDENTIFIERS = (
     *FOREIGN,
 )
 
-IDENTIFIERS: dict[str, Identifier] = {identifier.name: identifier for identifier in _IDENTIFIERS}
+IDENTIFIERS = Catalogue[Identifier]({identifier.name: identifier for identifier in _IDENTIFIERS})
 """Name -> identifier, in the order in which `armid list` shows them."""
 
 RANGE = "share of the range"

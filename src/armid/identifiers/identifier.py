@@ -47,6 +47,9 @@ class Identifier:
     needs_residuals: bool = False
     package: str = ""
 
+    def __repr__(self) -> str:
+        return f"<Identifier {self.name}: {self.note or 'no note'}>"
+
     def with_options(self, options: Mapping[str, Any]) -> "Identifier":
         """Return the identifier with options of its own, such as `velocity_limit` of the swarm.
 

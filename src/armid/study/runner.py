@@ -1,7 +1,6 @@
 """Run what is missing of a study."""
 
 import json
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -11,9 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, StudyError, caused_by, nearest
 from armid.estimation.identify import ctrl_c_waits
-from armid.progress import announced
+from armid.progress import announced, console
 from armid.report.result import refuse_unwritable
 from armid.study.outcome import Outcome
 from armid.study.pool import LocalPool, WorkerSetup, performed_apart
@@ -48,6 +47,7 @@ class Ending:
     others: tuple[int, ...]
 
 
+@caused_by(StudyError)
 def run_study(
     path: str | Path,
     jobs: int | None = None,
@@ -57,6 +57,7 @@ def run_study(
     time_limit: float = TIME_LIMIT_S,
     only: str = "*",
     retry: bool = False,
+    progress: bool = False,
 ) -> "StudyResults":
     """Run what is missing of a study and return all that its store holds.
 
@@ -78,6 +79,8 @@ def run_study(
         CASE/IDENTIFIER, patterns with * and ?.
     retry
         Whether failed runs are performed anew.
+    progress
+        Show a bar, in a terminal or a notebook.
 
     Returns
     -------
@@ -86,15 +89,16 @@ def run_study(
 
     Raises
     ------
-    ArmidError
+    StudyError
         For a study that cannot be run.
     KeyboardInterrupt
         After Ctrl-C; finished runs are kept.
     """
     from armid.study.results import load_study
 
-    study = read_study(path, absolute(plugins))
-    ending = run(study, path, jobs, dask, out, time_limit, only, retry)
+    with progress_bar(progress) as shown:
+        study = read_study(path, absolute(plugins))
+        ending = run(study, path, jobs, dask, out, time_limit, only, retry, shown)
     if ending.interrupted:
         raise KeyboardInterrupt
     return load_study(ending.folder)
@@ -210,16 +214,16 @@ def absolute(plugins: Iterable[str]) -> tuple[str, ...]:
 
 @contextmanager
 def progress_bar(is_shown: bool) -> Iterator[Progress]:
-    """Yield what shows how far a study is, with rate and time left, on a terminal; nothing is shown elsewhere."""
-    if not (is_shown and sys.stderr.isatty()):
+    """Yield what shows how far a study is, with rate and time left; nothing where no bar can be drawn."""
+    drawn_on = console() if is_shown else None
+    if drawn_on is None:
         yield lambda counts, outcome: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn
     from rich.progress import Progress as Bar
 
     columns = "{task.completed:.0f}/{task.total:.0f} runs", BarColumn(), "{task.fields[rate]}", "{task.fields[left]}"
-    with Bar(*columns, console=Console(stderr=True), refresh_per_second=4) as bar:
+    with Bar(*columns, console=drawn_on, refresh_per_second=4) as bar:
         task = bar.add_task("", total=1, visible=False, rate="", left="")
         began, finished, simulations = time.monotonic(), 0, 0
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from armid.errors import ArmidError, MachineError, quoted
+from armid.errors import ArmidError, MachineError, StudyError, caused_by, quoted
 from armid.estimation.identify import INTERRUPTED, campaign_errors, search, versions_of
 from armid.estimation.information import information_at
 from armid.estimation.least_squares import held_by_bound
@@ -64,6 +64,7 @@ PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
 
+@caused_by(StudyError)
 def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
     """Read a study's TOML file; nothing is simulated.
 
@@ -80,7 +81,7 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
 
     Raises
     ------
-    ArmidError
+    StudyError
         With one sentence (file, key, found, expected) for whatever cannot be run: an unknown key or name, impossible
         bounds, a truth outside them, an option that an identifier refuses, a fitness that it cannot use.
     """
