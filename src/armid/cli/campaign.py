@@ -13,6 +13,7 @@ from armid.cli.options import (
     assignments,
     campaign_argument,
     command,
+    completes,
     effects_option,
     examples,
     give,
@@ -81,7 +82,7 @@ DEFAULT = (
 ))  # fmt: skip
 @problem_options
 @click.option(
-    "--identifier", show_default=DEFAULT,
+    "--identifier", show_default=DEFAULT, shell_complete=completes("identifiers"),
     help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.",
 )  # fmt: skip
 @click.option(
@@ -89,7 +90,7 @@ DEFAULT = (
     help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
     "0.5:0.3 for three phases), pso.velocity_limit=0.2; `armid list identifiers --long`. Repeatable.",
 )  # fmt: skip
-@click.option("--fitness", show_default="rmse",
+@click.option("--fitness", show_default="rmse", shell_complete=completes("fitness"),
               help="What is minimised: see `armid list fitness`; rmse:OUTPUT for one output.")  # fmt: skip
 @click.option(
     "--budget", type=int, show_default="3,000; 12,000 with --paper or --identifier",
@@ -151,6 +152,7 @@ def identify_command(
 )  # fmt: skip
 @click.option(
     "--rank", default="volume", show_default=True, metavar="volume|worst|shrinkage",
+    shell_complete=completes(words=("volume", "worst", "shrinkage")),
     help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.",
 )  # fmt: skip
 @out_option("Folder for identifiability.html, identifiability.json and the figures.")
@@ -201,8 +203,10 @@ PROGRESS = "progress.jsonl"
 ))  # fmt: skip
 @problem_options
 @out_option("Folder for report.html, report.md, report.json and the figures.", required=True)
-@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]")
-@click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
+@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]",
+              shell_complete=completes("effects", commas=True))  # fmt: skip
+@click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.",
+              shell_complete=completes("effects", commas=True))  # fmt: skip
 @click.option("--no-curve", is_flag=True, help="Do not recover the missing signal where no effect will do.")
 @click.option(
     "--within",

@@ -16,7 +16,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.options import command, examples, give, plugin_option, say
+from armid.cli.options import command, completes, examples, give, plugin_option, say
 from armid.errors import ArmidError, nearest, quoted
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
@@ -45,7 +45,7 @@ DIGITS = 6
 @command("new", short_help="Write a starting file of your own.", epilog=examples(
     "armid new effect my_drag", "armid check my_drag.py:my_drag", "armid new campaign my_axis --out studies/campaigns",
 ))  # fmt: skip
-@click.argument("kind", metavar="effect|fitness|identifier|plant|analysis|campaign|study")
+@click.argument("kind", metavar="|".join(KINDS), shell_complete=completes(words=KINDS))
 @click.argument("name", metavar="NAME")
 @click.option(
     "--style", default="", metavar="function",
@@ -108,7 +108,7 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
 @command("schema", short_help="Print the JSON Schema of a campaign or a study.", epilog=examples(
     "armid schema study > study.schema.json", "armid schema campaign --plugin mine.py:my_plant",
 ))  # fmt: skip
-@click.argument("what", metavar="campaign|study")
+@click.argument("what", metavar="campaign|study", shell_complete=completes(words=(CAMPAIGN, STUDY)))
 @plugin_option
 def schema_command(what: str, plugins: tuple[str, ...]) -> None:
     """Print the JSON Schema of campaign.toml or of a study's file.

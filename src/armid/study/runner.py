@@ -114,11 +114,12 @@ def run(
     only: str = "*",
     retry: bool = False,
     progress: Progress = lambda counts, outcome: None,
+    command: str = "",
 ) -> Ending:
     """Run what is missing of a study that was read; arguments and errors as `run_study`.
 
     file: the study's, as the command named it. progress: called with the counts at the start once, then with each
-    finished run. Ctrl-C ends it without an error.
+    finished run. command: the line that runs it, for its report. Ctrl-C ends it without an error.
     """
     began = time.monotonic()
     chosen = _patterns(only, study)
@@ -133,7 +134,7 @@ def run(
     folder, named = OUT / study.name if out is None else Path(out), Path(file)
     # a whole path says something on this machine alone
     told = named.name if named.is_absolute() else named.as_posix()
-    description = study.description(folder) | {"file": told}
+    description = study.description(folder) | {"file": told, "command": command}
     json.dumps(description, ensure_ascii=False).encode()  # what no store can hold is refused before there is one
     is_new = not (folder / FILE_NAME).exists()
     if is_new:
