@@ -50,8 +50,8 @@ def test_list_plants(run):
 
 
 def test_list_fitness_and_identifiers(run):
-    names = re.findall(r"^(\w+): .* \(records join by (\w+)\)$", run("list", "fitness", "--long").out.replace("\n      ", " "),
-                       re.MULTILINE)  # fmt: skip
+    fitness = run("list", "fitness", "--long").out.replace("\n      ", " ")
+    names = re.findall(r"^(\w+): .* \(records join by (\w+)\)$", fitness, re.MULTILINE)
     assert dict(names) == {"similarity": "duration", "numerical_similarity": "duration",
                            "shape_similarity": "duration", "rmse": "samples", "nrmse": "samples",
                            "likelihood": "sum"}  # fmt: skip

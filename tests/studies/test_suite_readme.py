@@ -17,7 +17,7 @@ PACKAGES = ("cma", "scipy", "nevergrad", "optuna", "ioh", "pymoo")
 
 @pytest.fixture(scope="module")
 def blocks(root):
-    text = (root / "studies" / "suite" / "README.md").read_text(encoding="utf-8")
+    text = (root / "studies" / "guide" / "pages" / "suite.md").read_text(encoding="utf-8")
     return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
 
 
@@ -73,7 +73,7 @@ def test_the_notebook_runs(root, tmp_path):
     pytest.importorskip("ipykernel", reason="ipykernel is not installed: pip install -e '.[notebook]'")
     import nbformat
 
-    notebook = nbformat.read(root / "studies" / "tour" / "tour.ipynb", as_version=4)
+    notebook = nbformat.read(root / "studies" / "guide" / "tour.ipynb", as_version=4)
     committed = [last_errors(cell) for cell in notebook.cells if cell.cell_type == "code"][-1]
     assert len(json.dumps(notebook)) < MOST_COMMITTED
     os.environ.setdefault("PYTHONPATH", str(root / "src"))
