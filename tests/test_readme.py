@@ -296,7 +296,8 @@ def test_table_1_is_that_of_the_committed_csv(readme, root):
     """Mean and median of every row and parameter, to the digits that are shown."""
     of = read_csv(root / "results" / "table1" / "overview.csv")
     variants = {"the paper's": "the paper's pso", "velocity limit": "pso, literal limit, 12,000",
-                "limit 0.2": "pso, limit 0.2, 12,000", "cmaes": "cmaes on rmse", "pso+least": "pso+least_squares"}  # fmt: skip
+                "limit 0.2": "pso, limit 0.2, 12,000", "cmaes": "cmaes on rmse",
+                "pso+least": "pso+least_squares"}  # fmt: skip
     rows = [line.split("|")[1:-1] for line in readme.partition("## Table I")[2].splitlines() if "%" in line][:5]
     for (start, variant), (name, _, *cells) in zip(variants.items(), rows, strict=True):
         assert start in name
