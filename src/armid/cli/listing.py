@@ -34,7 +34,7 @@ def complete_name(context: click.Context, parameter: click.Parameter, incomplete
 @command("list", short_help="List what is registered.",
          epilog=examples("armid list plants", "armid list effects coulomb --long", "armid list identifiers --long",
                          "armid list effects --plugin mine.py:my_drag"))  # fmt: skip
-@click.argument("what", metavar="|".join(KINDS), shell_complete=completes(words=KINDS))
+@click.argument("what", metavar="effects|plants|fitness|identifiers|analyses", shell_complete=completes(words=KINDS))
 @click.argument("names", nargs=-1, metavar="[NAME]...", shell_complete=complete_name)
 @click.option("--long", "is_long", is_flag=True, help="Everything: equations, and the options of identifiers.")
 @plugin_option
