@@ -1,7 +1,9 @@
 """Calls by names or objects alike, results that print themselves, and searches that ignore their budget."""
 
 import inspect
+import logging
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pandas as pd
 import pytest
 from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.core.algorithm import Algorithm
+from rich.console import Console
 
 import armid
 from armid.cli.new import INERTIA
@@ -16,6 +19,7 @@ from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS
 from armid.report.result import MANIFEST, Result, Shown
+from armid.report.style import pyplot
 from armid.units import angles_in, scale_of
 
 QUICK = {"effects": ["viscous"], "budget": 60}
@@ -142,7 +146,7 @@ def test_an_identification_and_its_parts_are_small(found, tmp_path):
     assert list(found.campaign.table["record"]) == [record.file for record in found.campaign.records]
     assert "<table" in found.campaign._repr_html_()
     for name in ("identify", "simulate", "close_loop", "examine"):
-        assert len(str(inspect.signature(getattr(armid, name)))) < 800
+        assert "<" not in str(inspect.signature(getattr(armid, name)))
 
 
 def test_parameters_are_read_by_name_and_the_table_holds_numbers(found):
@@ -211,8 +215,11 @@ def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
     (lambda a: armid.identify(a, fitness=3), "3"),
     (lambda a: armid.identify(a, identifier=3), "is 3, expected"),
     (lambda a: armid.identify(a, effects=["viscos"]), "did you mean 'viscous'"),
-    (lambda a: armid.identify(a, identifer="pso"), "there is no argument 'identifer': did you mean 'identifier'"),
-    (lambda a: armid.identify(a, efects=["viscous"]), "there is no argument 'efects': did you mean 'effects'"),
+    (lambda a: armid.identify(a, bounds={"inertia": (3.0, 2.0)}), "3 and 2"),
+    (lambda a: armid.close_loop(a, without=["viscos"]), "^without: effect 'viscos' is not known"),
+    (lambda a: armid.close_loop(armid.Model(PLANTS["driven_axis"])), "a Model and its campaign"),
+    (lambda a: armid.simulate(armid.Model(PLANTS["driven_axis"])), "a manoeuvre and a population are expected"),
+    (lambda a: armid.set_log_level("loud"), "debug, info, warning, error"),
     (lambda a: armid.identify(a, window=(0.5, 0.1)), "0.5"),
     (lambda a: armid.identify(a, bounds={"inertai": (0.0, 1.0)}), "did you mean 'inertia'"),
     (lambda a: armid.identify(a, effects=3), "effects is 3: names or Effects are expected"),
@@ -240,6 +247,80 @@ def test_what_is_wrong_is_one_sentence(axis, call, said):
     with pytest.raises(ArmidError, match=said) as caught:
         call(axis)
     assert "\n" not in str(caught.value)
+    assert "--" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("kind", "call"), [
+    (armid.DataError, lambda a: armid.identify("nowhere")),
+    (armid.DataError, lambda a: armid.identify(3)),
+    (armid.DataError, lambda a: armid.identify(a, window=(0.5, 0.1))),
+    (armid.DataError, lambda a: armid.identify({"x": pd.DataFrame({"time_s": [0.0]})}, plant="driven_axis")),
+    (armid.ModelError, lambda a: armid.identify(a, effects=["viscos"])),
+    (armid.ModelError, lambda a: armid.identify(a, fix={"inertai": 1.0})),
+    (armid.ModelError, lambda a: armid.simulate(a, inertai=0.05)),
+    (armid.ModelError, lambda a: armid.Model(PLANTS["driven_axis"]) - "coulomb"),
+    (armid.ModelError, lambda a: armid.Effect("mine", (), {})),
+    (armid.StudyError, lambda a: armid.run_study("nowhere.toml")),
+    (armid.StudyError, lambda a: armid.load_study("nowhere")),
+])  # fmt: skip
+def test_an_exception_says_its_cause(axis, kind, call):
+    with pytest.raises(kind) as caught:
+        call(axis)
+    assert isinstance(caught.value, ArmidError)
+
+
+@pytest.mark.parametrize("name", ["identify", "simulate", "examine", "close_loop", "run_study", "read_campaign"])
+def test_arguments_are_spelt_out_with_their_types(name, axis):
+    function = getattr(armid, name)
+    arguments = inspect.signature(function).parameters
+    assert all(p.annotation is not p.empty for p in arguments.values())
+    assert [p.name for p in arguments.values() if p.kind is p.VAR_KEYWORD] == (["values"] if name == "simulate" else [])
+    assert len(str(inspect.signature(function))) < 1_200
+    if name != "simulate":
+        with pytest.raises(TypeError, match="unexpected keyword argument 'efects'"):
+            function(axis, efects=["viscous"])
+
+
+def test_catalogues_and_their_things_show_themselves_in_a_few_lines():
+    things = (armid.EFFECTS, armid.IDENTIFIERS, armid.PLANTS, armid.FITNESS, armid.suite(), EFFECTS["coulomb"],
+              armid.IDENTIFIERS["pso"], PLANTS["shell_transfer_arm"], armid.Model(PLANTS["rotary_arm"]))  # fmt: skip
+    for thing in things:
+        assert 20 < len(repr(thing)) < 1_000
+        assert " at 0x" not in repr(thing)
+    assert all(name in repr(armid.EFFECTS) for name in EFFECTS)
+
+
+def test_a_bar_is_drawn_when_it_is_asked_for(axis, monkeypatch, capsys):
+    monkeypatch.setattr("armid.progress.console", lambda: Console(file=sys.stderr, force_terminal=True, width=100))
+    armid.identify(axis, progress=True, **QUICK)
+    assert "/60 simulations" in capsys.readouterr().err
+    armid.identify(axis, **QUICK)
+    assert capsys.readouterr().err == ""
+    used = []
+    armid.identify(axis, progress=lambda meter: used.append(meter.used), **QUICK)
+    assert used
+    assert max(used) <= 60
+
+
+def test_the_log_is_printed_from_a_level_on(capsys):
+    try:
+        armid.set_log_level("info")
+        armid.set_log_level("info")
+        logging.getLogger("armid").info("compiling")
+        armid.set_log_level("warning")
+        logging.getLogger("armid").info("once more")
+    finally:
+        for handler in [h for h in logging.getLogger("armid").handlers if h.name == "armid"]:
+            logging.getLogger("armid").removeHandler(handler)
+    assert capsys.readouterr().err == "armid: compiling\n"
+
+
+def test_a_figure_is_shown_once_and_a_table_in_a_notebook_has_no_button(found):
+    before = pyplot().get_fignums()
+    assert found.plot().axes
+    assert pyplot().get_fignums() == before
+    assert "<table" in found._repr_html_()
+    assert "<button" not in found._repr_html_()
 
 
 @pytest.mark.slow

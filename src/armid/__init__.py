@@ -7,7 +7,8 @@ from importlib import import_module
 from typing import Any
 
 WHERE = {
-    "armid.errors": ("ArmidError",),
+    "armid.errors": ("ArmidError", "DataError", "ModelError", "StudyError"),
+    "armid.progress": ("set_log_level",),
     "armid.model": (
         "EFFECTS", "PLANTS", "Constant", "Delay", "Effect", "Guard", "Input", "Manoeuvre", "ManoeuvreKey", "Model",
         "Output", "Parameter", "Plant", "Scales", "State",

@@ -1,44 +1,68 @@
 """Simulate, identify, examine and close the loop by names: a campaign's folder, an identifier, a fitness, effects.
 
 Every name may be the object itself: a Campaign or tables of pandas, a Plant, an Effect, a Fitness or a function, an
-Identifier, an algorithm of pymoo. The commands and `armid` itself call these functions.
+Identifier, an algorithm of pymoo. The commands and `armid` itself call these functions. What several of them take:
+
+campaign : path, Campaign, or pandas DataFrames
+    The folder of a campaign, or its campaign.toml; or one or several tables with the headers of a campaign's CSV files,
+    whose `table.attrs` holds the keys of its [[records]] entry.
+effects : names or Effects
+    Added to those that the campaign declares; NAME takes the first form that fits, NAME:FORM another.
+plugins : list of FILE.py:attribute
+    Things of the user, whose code is run.
+window : (begin, end), s
+    What is seen of every record.
+bounds, fix : mappings of parameter to (low, high) and to value, SI
+    Of the search; a parameter with bounds is free.
+plant : name or Plant
+    Of tables; or a plant of the user that campaign.toml names.
 """
 
-import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
-from inspect import signature
 from math import inf, isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, nearest, quoted
+from armid.errors import ArmidError, DataError, ModelError, nearest, quoted
 from armid.model import Effect, Manoeuvre, Model, Plant, fitting_form, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
-from armid.progress import announced
+from armid.progress import announced, search_bar, status_line
 from armid.record import Campaign, read_campaign
-from armid.record.schema import Known
+from armid.record.schema import Known, toml
 from armid.registry import Registry, load_registry, name_of
 from armid.units import ANGLES, angles_in
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from pandas import DataFrame
+    from pymoo.core.algorithm import Algorithm
+
+    from armid.engine import Schedule
     from armid.estimation.bootstrap import Refined
     from armid.estimation.examine import Examination
     from armid.estimation.identify import Identification
+    from armid.identifiers import Identifier
     from armid.loop import ClosedLoop
+    from armid.problem.fitness import Fitness
     from armid.problem.meter import Meter
     from armid.problem.space import Space
 
+    CampaignLike: TypeAlias = str | Path | Campaign | DataFrame | Sequence[DataFrame] | Mapping[str, DataFrame]
+    FitnessLike: TypeAlias = str | Fitness | Callable[..., Any]
+    IdentifierLike: TypeAlias = str | Identifier | Algorithm | Callable[..., Any]
+
 Array = NDArray[np.float64]
-Named = Iterable[Any] | str
-Bounds = Mapping[str, tuple[float, float]]
+Named: TypeAlias = Iterable[str | Effect] | str | Effect
+Bounds: TypeAlias = Mapping[str, tuple[float, float]]
+Window: TypeAlias = tuple[float, float]
 # Of studies/benchmark.toml (30 arms, 20 identifiers, with and without noise) no identifier ends nearer to the truth
 # than this one on the rmse with 3,000 simulations, and the swarm before it looks at the whole box.
 IDENTIFIER, FITNESS, BUDGET = "pso+least_squares", "rmse", 3_000
@@ -64,19 +88,11 @@ class Opened(NamedTuple):
 
 
 def opened(
-    campaign: Any, effects: Named = (), plugins: Iterable[str] = (), window: tuple[float, float] | None = None,
-    bounds: Bounds | None = None, fix: Mapping[str, float] | None = None, plant: Any = None, model: Model | None = None,
-    units: str | None = None,
+    campaign: Any, effects: Named = (), plugins: Iterable[str] = (), window: Window | None = None,
+    bounds: Bounds | None = None, fix: Mapping[str, float] | None = None, plant: str | Plant | None = None,
+    model: Model | None = None, units: str | None = None,
 ) -> Opened:  # fmt: skip
-    """Return what is meant by a campaign, its effects and its overrides; plug-ins run their code.
-
-    campaign: a path, a Campaign, or one or several pandas DataFrames with the headers of a campaign's CSV files, whose
-    `table.attrs` holds the keys of its [[records]] entry. effects: names or Effects to add to those that the campaign
-    declares; NAME takes the first form that fits, NAME:FORM another. plugins: FILE.py:attribute of the user.
-    window: (begin, end), s, what is seen of every record. bounds, fix: name -> (low, high), and value, SI. plant: name
-    or Plant, of tables; or a plant of the user that campaign.toml names. model: in place of the declared one. units:
-    deg, rad or rpm, in which angles and turning speeds are shown; None: as they were recorded.
-    """
+    """Return what is meant by a campaign, its effects and its overrides; model: in place of the declared one."""
     refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
     if isinstance(plant, Plant):
@@ -129,14 +145,14 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
     several = given.values() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
     tables: list[Any] = list(several)
     if not tables or not all(hasattr(each, "to_csv") for each in tables):
-        raise ArmidError(f"the campaign is a {type(given).__name__}: a folder, a Campaign or pandas DataFrames are "
+        raise DataError(f"the campaign is a {type(given).__name__}: a folder, a Campaign or pandas DataFrames are "
                          "expected")  # fmt: skip
     if plant is None:
-        raise ArmidError("a campaign of tables needs its plant: plant='driven_axis' or another is expected")
+        raise DataError("a campaign of tables needs its plant: plant='driven_axis' or another is expected")
     names = [str(n) for n in given] if isinstance(given, Mapping) else [f"table_{i + 1}" for i in range(len(tables))]
     for name in names:
         if {"/", "\\"} & {*name}:
-            raise ArmidError(f"the table {quoted(name)} is called like a path: a name without a folder is expected")
+            raise DataError(f"the table {quoted(name)} is called like a path: a name without a folder is expected")
     lines = ['name = "tables"', f"plant = {toml(plant.name if isinstance(plant, Plant) else plant)}"]
     with TemporaryDirectory(prefix="armid-") as folder:
         for name, each in zip(names, tables, strict=True):
@@ -145,21 +161,6 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
             lines += ["[[records]]", *(f"{key} = {toml(value)}" for key, value in keys.items())]
         (Path(folder) / "campaign.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
         return read_campaign(folder, registry.plants, registry.effects)
-
-
-def toml(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(toml, value))}]"
-    text = str(value).lower() if isinstance(value, bool | np.bool_) else repr(getattr(value, "item", lambda: value)())
-    if isinstance(value, str):
-        text = '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    try:
-        tomllib.loads(f"x = {text}")
-    except tomllib.TOMLDecodeError as error:
-        raise ArmidError(f"{text} cannot stand in a campaign: a text, a number, true or false is expected") from error
-    return text
 
 
 def each_of(given: Any) -> Iterator[Any]:
@@ -179,39 +180,42 @@ def effect_of(given: Any, effects: Mapping[str, Effect], plant: Plant) -> Effect
 
 def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
     if name not in known:
-        raise ArmidError(f"{what} '{name}' is not known: {nearest(str(name), known)}")
+        raise ModelError(f"{what} '{name}' is not known: {nearest(str(name), known)}")
     return known[name]
 
 
 def warn_of_far(fixed: Mapping[str, float], bounds: Bounds, model: Model) -> None:
     """Warn of fixed values and bounds far outside the declared range, as a forgotten factor gives."""
-    told = {name: ([v], f"--fix {name}={v:g}") for name, v in fixed.items() if isfinite(v)}
-    told |= {n: ([a, b], f"--bounds {n}={a:g}:{b:g}") for n, (a, b) in bounds.items() if -inf < a < b < inf}
+    told = {name: ([v], f"fix {name} = {v:g}") for name, v in fixed.items() if isfinite(v)}
+    told |= {n: ([a, b], f"bounds {n} = {a:g} to {b:g}") for n, (a, b) in bounds.items() if -inf < a < b < inf}
     for name, (values, text) in told.items():
         if name in model.parameters:
             warn_if_far(model.parameters[name], values, text)
 
 
 def identify(
-    campaign: Any, model: Model | None = None, space: "Space | None" = None, fitness: Any = None,
-    identifier: Any = None, budget: int | None = None, seed: int = 1, target: float | None = None,
-    accuracy: str | None = None, progress: "Callable[[Meter | Refined], None] | None" = None, *,
-    options: Mapping[str, Any] | None = None, paper: bool = False, interval: bool = True, **given: Any,
+    campaign: "CampaignLike", model: Model | None = None, space: "Space | None" = None,
+    fitness: "FitnessLike | None" = None, identifier: "IdentifierLike | None" = None, budget: int | None = None,
+    seed: int = 1, target: float | None = None, accuracy: str | None = None,
+    progress: "Callable[[Meter | Refined], None] | bool | None" = None, *, options: Mapping[str, Any] | None = None,
+    paper: bool = False, interval: bool = True, effects: Named = (), plugins: Iterable[str] = (),
+    window: Window | None = None, bounds: Bounds | None = None, fix: Mapping[str, float] | None = None,
+    plant: str | Plant | None = None, units: str | None = None,
 ) -> "Identification":  # fmt: skip
     """Identify parameters from the train records of a campaign; `armid.identify("folder")` is enough.
 
-    The records are screened first: a sign, unit, clock or manoeuvre that looks wrong is told as a warning.
+    The records are screened first: a sign, unit, clock or manoeuvre that looks wrong gives a warning.
 
     Parameters
     ----------
     campaign : path, Campaign, or pandas DataFrames
-        The records, see `opened`.
+        The records; a table has the headers of a CSV file, and `table.attrs` the keys of its [[records]] entry.
     model, space : optional
-        The model and the box of its parameters, in place of what `given` says.
+        The model and the box of its parameters, in place of those that the other arguments describe.
     fitness : name, Fitness or function (measured, simulated), default "rmse"; "rmse:hub_angle" for one output
         What is minimised.
     identifier : name, Identifier, pymoo algorithm or function
-        Who searches; by default "pso+least_squares", and "cmaes" for a fitness that is no sum of squares.
+        The optimiser; by default "pso+least_squares", and "cmaes" for a fitness that is no sum of squares.
     budget : int
         Simulations, one candidate through all train records counting as one; by default 3,000, and 12,000 (the paper's)
         for an identifier that is named.
@@ -221,19 +225,41 @@ def identify(
         Fitness at which to stop (the paper's step 7).
     accuracy : {"standard", "fine"}
         Of the engine; None: as the noise of each record asks for.
-    progress : callable
-        Called with the meter after each generation, and with the draws refined so far while a bootstrap runs.
+    progress : True or callable
+        True shows a bar, in a terminal or a notebook; a function is called with the meter after each
+        generation, and with the draws refined so far while a bootstrap runs.
     paper : bool
         The paper's swarm, similarity degree, budget and window, where nothing else is given.
     interval : bool
         Whether intervals are wanted; of a fitness that is no sum of squares they take a bootstrap, some seconds.
-    **given
-        effects, plugins, window, bounds, fix, plant, units: see `opened`.
+    effects : names or Effects
+        Added to those that the campaign declares; NAME takes the first form that fits, NAME:FORM another.
+    plugins : list of FILE.py:attribute
+        Things of your own, whose code is run.
+    window : (begin, end), s
+        What is seen of every record.
+    bounds : mapping of parameter to (low, high), SI
+        Bounds of the search; a parameter with bounds is free.
+    fix : mapping of parameter to value, SI
+        Parameters that are not searched.
+    plant : name or Plant
+        The plant of tables; or a plant of your own that campaign.toml names.
+    units : {"deg", "rad", "rpm"}
+        In which angles and turning speeds are shown; None: as they were recorded.
 
     Returns
     -------
     Identification
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
+
+    Raises
+    ------
+    DataError
+        For records that cannot be used.
+    ModelError
+        For an unknown effect, parameter or value.
+    ArmidError
+        For all else that cannot be used: an identifier, its options, a fitness, a budget.
     """
     from armid.estimation.identify import identify as run
     from armid.estimation.screen import screen
@@ -241,8 +267,8 @@ def identify(
 
     if not isinstance(options or {}, Mapping):
         raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
-    window = {"window": PAPER_WINDOW} if paper and given.get("window") is None else {}
-    there = opened(campaign, model=model, **expected(given, identify) | window)
+    window = PAPER_WINDOW if paper and window is None else window
+    there = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
     fitness = fitness or (PAPER_FITNESS if paper else FITNESS)
     distance = (fitness_of_name(fitness, there.registry.fitness) if isinstance(fitness, str) else
                 as_fitness(name_of(fitness, getattr(fitness, "__name__", "own")), fitness))  # fmt: skip
@@ -255,20 +281,12 @@ def identify(
         suspicions = screen(there.campaign, there.model, space)
     for suspicion in suspicions:
         warnings.warn(suspicion.sentence, stacklevel=2)
-    found = run(
-        there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, progress, interval
-    )
+    with search_bar(progress is True) as shown:
+        followed = progress if callable(progress) else shown
+        found = run(
+            there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, followed, interval
+        )
     return replace(found, suspicions=suspicions)
-
-
-def expected(given: Mapping[str, Any], asked: Callable[..., Any]) -> dict[str, Any]:
-    """Return the named arguments of `opened`, further ones of what was asked; refuse another with ArmidError."""
-    known = ("effects", "plugins", "window", "bounds", "fix", "plant", "units")
-    own = [p.name for p in signature(asked).parameters.values() if p.kind is not p.VAR_KEYWORD]
-    for name in given:
-        if name not in known:
-            raise ArmidError(f"there is no argument '{name}': {nearest(name, dict.fromkeys((*known, *own)))}")
-    return dict(given)
 
 
 def identifier_of(given: Any, registry: Registry) -> Any:
@@ -286,17 +304,26 @@ def identifier_of(given: Any, registry: Registry) -> Any:
 
 
 def examine(
-    campaign: Any, model: Model | None = None, space: "Space | None" = None, x: Any = None,
-    noise: float | None = None, by: str = "volume", accuracy: str | None = None, *, where: str = "x", **given: Any,
+    campaign: "CampaignLike", model: Model | None = None, space: "Space | None" = None,
+    x: "Mapping[str, float] | ArrayLike | None" = None, noise: float | None = None, by: str = "volume",
+    accuracy: str | None = None, *, where: str = "x", effects: Named = (), plugins: Iterable[str] = (),
+    window: Window | None = None, bounds: Bounds | None = None, fix: Mapping[str, float] | None = None,
+    plant: str | Plant | None = None, units: str | None = None,
 ) -> "Examination":  # fmt: skip
     """Say what the train records of a campaign tell about the parameters; `armid.examine("folder")` is enough.
 
     Parameters
     ----------
-    campaign, model, space, **given
+    campaign, model, space, effects, plugins, window, bounds, fix, plant, units
         As of `identify`.
-    x, noise, by, accuracy
-        As of `armid.estimation.examine.examine`; x may be name -> value, SI.
+    x : mapping of name to value, SI; or the free parameters in order
+        Where sensitivities are taken; None: at the least-squares estimate.
+    noise : float
+        White noise to assume for every record, in its unit, in place of what was measured.
+    by : {"volume", "worst", "shrinkage"}
+        How the next manoeuvre is chosen: by all parameters together, by the worst, or by the largest change.
+    accuracy : {"standard", "fine"}
+        Of the engine; None: as the noise of each record asks for.
     where : str
         What names x in a refusal.
 
@@ -307,9 +334,9 @@ def examine(
     """
     from armid.estimation.examine import examine as run
 
-    there = opened(campaign, model=model, **expected(given, examine))
+    there = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
     box = space or there.space()
-    at = free_values(box, x, where) if isinstance(x, Mapping) else x
+    at = free_values(box, x, where) if isinstance(x, Mapping) else x if x is None else np.asarray(x, dtype=np.float64)
     with angles_in(there.campaign.angle):
         return run(there.campaign, there.model, box, at, noise, by, accuracy)
 
@@ -318,18 +345,21 @@ def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array
     """Return the values of the free parameters in order; a fixed one may be named, its value stays as it is fixed."""
     for name in given:
         if name not in space.names:
-            raise ArmidError(f"{where}: parameter '{name}' is not in the model: {nearest(name, space.names)}")
+            raise ModelError(f"{where}: parameter '{name}' is not in the model: {nearest(name, space.names)}")
     missing = [name for name in space.free_names if name not in given]
     if missing:
-        raise ArmidError(f"{where}: parameter '{missing[0]}' is free and has no value there: one is expected")
+        raise ModelError(f"{where}: parameter '{missing[0]}' is free and has no value there: one is expected")
     return np.array([given[name] for name in space.free_names])
 
 
 def close_loop(
-    model: Any, campaign: Campaign | None = None, candidates: Any = None, rng: np.random.Generator | None = None,
+    model: "Model | CampaignLike", campaign: "CampaignLike | None" = None,
+    candidates: Named | Mapping[str, Effect] | None = None, rng: np.random.Generator | None = None,
     bounds: Bounds | None = None, fixed: Mapping[str, float] | None = None, threads: int = 1,
-    told: Callable[[str], None] = lambda _: None, *, without: Named = (), curve: bool = True,
-    progress: Path | None = None, priors: Mapping[str, Any] | None = None, within: float | None = None, **given: Any,
+    told: Callable[[str], None] | None = None, *, without: Named = (), curve: bool = True,
+    progress: Path | bool | None = None, priors: Mapping[str, Any] | None = None, within: float | None = None,
+    effects: Named = (), plugins: Iterable[str] = (), window: Window | None = None,
+    fix: Mapping[str, float] | None = None, plant: str | Plant | None = None, units: str | None = None,
 ) -> "ClosedLoop":  # fmt: skip
     """Find what a declared model lacks on the train records; `armid.close_loop("folder")` is enough.
 
@@ -337,19 +367,32 @@ def close_loop(
     ----------
     model : path, Campaign, or pandas DataFrames
         The campaign, whose declared model is taken; or a Model, with the campaign as second argument.
-    campaign, rng, bounds, fixed, threads, told, curve, progress
-        As of `armid.loop.close_loop`.
+    campaign
+        The campaign of a Model.
     candidates : names, Effects, or a mapping of name to Effect
         Effects to look for; None: all that apply.
+    rng : Generator
+        Not drawn from: nothing is random.
+    bounds, fixed : mappings of parameter to (low, high) and to value, SI
+        Of the model or of a candidate.
+    threads : int
+        Among which simulations are shared; the result does not depend on it.
+    told : callable
+        Called with a sentence before each step that takes long.
     without : names
         Effects not to look for.
+    curve : bool
+        Whether the missing signal is recovered where no effect will do.
+    progress : True or Path
+        True shows a line that says what is done, in a terminal or a notebook. A path is the file in which estimates are
+        kept as they are made: a second start goes on from them.
     priors : mapping
         What is known before the records, as [priors] of campaign.toml: effect -> probability, parameter -> (mean,
         standard deviation), SI.
     within : float
         A parameter is trusted whose 95 % interval is within this share of its value on either side; None: 0.05.
-    **given
-        effects, plugins, window, fix, plant, units: see `opened`.
+    effects, plugins, window, fix, plant, units
+        As of `identify`; fix is another word for fixed.
 
     Returns
     -------
@@ -358,11 +401,13 @@ def close_loop(
     """
     from armid.loop import close_loop as run
 
-    declared = {"model": model} if campaign is not None else {}
-    there = opened(model if campaign is None else campaign, bounds=bounds, **declared, **expected(given, close_loop))
+    if isinstance(model, Model) != (campaign is not None):
+        raise ArmidError("a Model and its campaign, or a campaign alone, is expected")
+    declared = model if isinstance(model, Model) else None
+    there = opened(campaign if declared else model, effects, plugins, window, bounds, fix, plant, declared, units)
     known = there.registry.effects_for(there.campaign.plant)
-    wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "--candidates")
-    left_out = effects_of(without, known, "--without") if without else {}
+    wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "candidates")
+    left_out = effects_of(without, known, "without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
     own = there.registry.own["effects"] if candidates is None else kept
     for name in own.keys() & kept.keys():
@@ -371,12 +416,12 @@ def close_loop(
             warnings.warn(f"effect '{name}' is not looked for: {refusals[0]}", stacklevel=2)
     values = {**(fixed or {}), **there.fixed}
     chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
-    campaign = with_known(there.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
+    known_too = with_known(there.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
     share = {} if within is None else {"within": positive(within, "within")}
-    with angles_in(campaign.angle):
-        found: ClosedLoop = run(
-            there.model, campaign, kept, rng, there.bounds, values, threads, told, curve, progress, chances, **share
-        )
+    file = progress if isinstance(progress, Path) else None
+    with status_line(progress is True) as shown, angles_in(known_too.angle):
+        found: ClosedLoop = run(there.model, known_too, kept, rng, there.bounds, values, threads, told or shown, curve,
+                                file, chances, **share)  # fmt: skip
     return found
 
 
@@ -385,7 +430,7 @@ def with_known(campaign: Campaign, told: Mapping[str, Sequence[float]]) -> Campa
     names = [p.name for p in campaign.plant.parameters]
     for name, pair in told.items():
         if name not in names:
-            raise ArmidError(f"priors: parameter {quoted(name)} is not in the plant, {nearest(name, names)}")
+            raise ModelError(f"priors: parameter {quoted(name)} is not in the plant, {nearest(name, names)}")
         if len(pair) != 2 or not all(map(isfinite, pair)) or not pair[1] > 0.0:
             raise ArmidError(
                 f"priors: '{name}' is {quoted(list(pair))}, (mean, standard deviation above 0) is expected"
@@ -409,8 +454,10 @@ def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[s
 
 
 def simulate(
-    model: Any, manoeuvre: Manoeuvre | None = None, *more: Any, parameters: Mapping[str, float] | None = None,
-    accuracy: str | None = None, **given: Any,
+    model: "Model | CampaignLike", manoeuvre: Manoeuvre | None = None, population: "ArrayLike | None" = None,
+    schedule: "Schedule | None" = None, threads: int = 1, states: bool = False, *,
+    parameters: Mapping[str, float] | None = None, accuracy: str | None = None, effects: Named = (),
+    plugins: Iterable[str] = (), window: Window | None = None, plant: str | Plant | None = None, **values: float,
 ) -> Any:  # fmt: skip
     """Simulate every record of a campaign, `armid.simulate("folder", p0=3.1e6)`; or a model through one manoeuvre.
 
@@ -418,37 +465,41 @@ def simulate(
     ----------
     model : path, Campaign, or pandas DataFrames
         The campaign; or a Model.
-    manoeuvre, *more
-        With a Model alone: manoeuvre, population and all else as of `armid.engine.simulate`.
-    parameters
-        Name -> value, SI; names without a dot may be arguments of their own. One that is not given takes the value that
-        the campaign fixes, else its nominal one.
+    manoeuvre, population, schedule, threads, states
+        With a Model alone: what it is made to do, candidates (n_candidates, n_parameters) in SI, how finely time is
+        cut, threads among which candidates are shared, and whether the states are kept.
+    parameters : mapping of name to value, SI
+        One that is not given takes the value that the campaign fixes, else its nominal one.
     accuracy : {"standard", "fine"}
         Of the engine; None: as the noise of each record asks for.
-    **given
-        Parameters, and effects, plugins, window, plant: see `opened`.
+    effects, plugins, window, plant
+        As of `identify`.
+    **values : float, SI
+        Further parameters, those whose name has no dot.
 
     Returns
     -------
     SimulatedCampaign or Simulation
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
     """
+    from armid.engine import Schedule
     from armid.engine import simulate as run
     from armid.estimation.simulated import SimulatedCampaign, candidate_of, simulated_table
 
+    of_model = (manoeuvre, population, schedule)
     if isinstance(model, Model):
-        if accuracy is not None or parameters is not None:
+        if accuracy is not None or parameters is not None or values:
             raise ArmidError("accuracy or parameters are given with a Model: a schedule and a population are expected")
-        rest = ((manoeuvre,) if manoeuvre is not None else ()) + more
-        return run(model, *rest, **given)
-    if manoeuvre is not None:
+        if manoeuvre is None or population is None:
+            raise ArmidError("a Model is given alone: a manoeuvre and a population are expected with it")
+        return run(model, manoeuvre, population, schedule or Schedule(), threads, states)
+    if any(given is not None for given in of_model):
         raise ArmidError("a manoeuvre is given with a campaign: with a Model it is expected")
-    asked = {name: given.pop(name) for name in tuple(given) if name in ("effects", "plugins", "window", "plant")}
-    there = opened(model, **asked)
+    there = opened(model, effects, plugins, window, plant=plant)
     whole = replace(there.model, plant=there.campaign.declared)
-    values = {**given, **(parameters or {})}
-    candidate = candidate_of(whole, there.campaign, values)
+    asked = {**values, **(parameters or {})}
+    candidate = candidate_of(whole, there.campaign, asked)
     tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
-    for name, value in values.items():
-        warn_if_far(whole.parameters[name], [value], f"--set {name}={value:g}")
+    for name, value in asked.items():
+        warn_if_far(whole.parameters[name], [value], f"{name} = {value:g}")
     return SimulatedCampaign(there.campaign, whole, candidate, tables)

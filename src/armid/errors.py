@@ -1,7 +1,8 @@
-"""The one exception whose text is meant for the user, and how a wrong value is shown in its sentence."""
+"""The exceptions whose text is meant for the user, by cause, and how a wrong value is shown in their sentence."""
 
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 # Letters of a sentence at most, and those of its end, where it says what is expected.
@@ -20,6 +21,29 @@ class ArmidError(ValueError):
 
 class MachineError(ArmidError):
     """Say that the machine is at fault and not what it was given: disk, memory, a cache that cannot be kept."""
+
+
+class DataError(ArmidError):
+    """Say what is wrong with records: campaign.toml, a CSV file, a table, an imported set."""
+
+
+class ModelError(ArmidError):
+    """Say what is wrong with a model: a plant, an effect, a parameter, bounds or values of parameters."""
+
+
+class StudyError(ArmidError):
+    """Say what is wrong with a study: its file, its identifiers, the store of its runs."""
+
+
+@contextmanager
+def caused_by(kind: type[ArmidError]) -> Iterator[None]:
+    """Raise an ArmidError without a narrower cause as one of a kind; also a decorator."""
+    try:
+        yield
+    except ArmidError as error:
+        if type(error) is not ArmidError:
+            raise
+        raise kind(str(error)).with_traceback(error.__traceback__) from error.__cause__
 
 
 def printable(text: str) -> str:

@@ -1,7 +1,6 @@
 """`armid report` and `armid export ioh` on a small study that was really run."""
 
 import hashlib
-import json
 import shutil
 import sqlite3
 from contextlib import closing
@@ -77,17 +76,16 @@ def test_each_run_has_its_parameters_and_their_errors(store):
     assert len(results.parameters) == 4 * len(runs)
 
 
-def test_the_main_table_and_the_state_are_printed_and_a_users_analysis_is_a_section(store, run, tmp_path, monkeypatch):
+def test_pages_are_written_and_a_users_analysis_is_a_section(store, run, tmp_path, monkeypatch):
     (tmp_path / "study.sqlite").write_bytes((store / "study.sqlite").read_bytes())
     (tmp_path / "mine.py").write_text("def best(runs):\n    return runs.groupby('identifier')[['value']].min()\n")
     monkeypatch.setattr(write, "save", not_drawn)
     monkeypatch.chdir(tmp_path)
     printed = run("report", tmp_path, "--plugin", "mine.py:best").out
-    for wanted in ("the paper's pso", "random", "noise-free", "Complete: 4 of 4 runs.", "wrote report.md and "):
-        assert wanted in printed
+    assert printed.startswith("wrote report.md and ")
     best = pd.read_csv(tmp_path / "own_best.csv").set_index("identifier")["value"]
     assert best.to_dict() == load_study(store).runs.groupby("identifier")["value"].min().to_dict()
-    assert "mine.py:best" in (tmp_path / "report.md").read_text()
+    assert f"armid report {tmp_path} --plugin mine.py:best" in (tmp_path / "report.md").read_text()
 
 
 STEERING = "x\nComplete: 4 of 4 runs\x1b[2J\x1b]0;owned\x07\u202egnp.exe"
@@ -113,16 +111,10 @@ def test_what_a_store_holds_cannot_steer_the_terminal(store, run, tmp_path, monk
     assert all(c.isprintable() or c == "\n" for c in text)
 
 
-def test_a_plug_in_of_the_study_may_be_named_as_before(store, run, refused, tmp_path, monkeypatch):
-    """With the words of `armid study`, whose store holds the whole path."""
+def test_a_plug_in_of_any_kind_may_be_named_as_for_the_study(store, run, tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text("def best(measured, simulated):\n    return simulated[:, 0]\n")
     shutil.copy(store / "study.sqlite", tmp_path)
     monkeypatch.chdir(tmp_path)
-    assert "is no analysis" in refused("report", ".", "--plugin", "mine.py:best")
-    with closing(sqlite3.connect("study.sqlite")) as copy, copy:
-        (text,) = copy.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
-        changed = json.loads(text) | {"plugins": [f"{tmp_path / 'mine.py'}:best"]}
-        copy.execute("UPDATE study SET value = ? WHERE key = 'description'", (json.dumps(changed),))
     monkeypatch.setattr(write, "save", not_drawn)
     assert run("report", ".", "--plugin", "mine.py:best").code == 0
 

@@ -187,9 +187,3 @@ def test_large_campaigns_are_identified_in_memory_that_is_told() -> None:
     assert (long.what, many.what) == ("identify, 20,000 samples", "identify, 10 records")
     for row in (long, many):
         assert row.measured is None or row.measured > 50.0
-
-
-def test_the_command_says_where_the_benchmarks_are_when_they_are_not_there(tmp_path, monkeypatch, refused) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("armid.cli.check.__file__", str(tmp_path / "lib" / "armid" / "cli" / "check.py"))
-    assert refused("bench", "--quick").startswith("armid: there is no studies/bench here")

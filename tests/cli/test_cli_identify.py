@@ -182,7 +182,7 @@ def test_a_warning_is_one_line(run, small_folder, tmp_path, write_axis):
         outside = run("identify", small_folder, "--fix", "p0=3.05", *QUICK)
     assert (uneven.code, outside.code) == (0, 0)
     assert re.fullmatch(r"armid: warning: axis/move\.csv: irregular sampling: .*\n", uneven.err)
-    said = "--fix p0=3.05 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa; it is taken as it is"
+    said = "fix p0 = 3.05 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa; it is taken as it is"
     first, second = outside.err.splitlines()
     assert first == f"armid: warning: {said}"
     assert "bounds or fixed values that were given look wrong" in second

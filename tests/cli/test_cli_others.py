@@ -1,5 +1,6 @@
 """`armid list`, `check`, `bench`, `import`, `new`, help and exit codes."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -10,7 +11,9 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 
+from armid.cli.main import Commands, app
 from armid.cli.new import KINDS
 from armid.model import EFFECTS
 from armid.study.runner import TIME_LIMIT_S
@@ -19,21 +22,22 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_list_effects(run):
-    ran = run("list", "effects")
+    ran = run("list", "effects", "--long")
     assert (ran.code, ran.err) == (0, "")
     assert re.findall(r"^(\w+): ", ran.out, re.MULTILINE) == list(EFFECTS)
-    assert max(map(len, ran.out.splitlines())) <= 110
+    assert max(map(len, ran.out.splitlines())) <= 80
     assert ran.out.count("  source: ") >= len(EFFECTS)
     assert "port torque += -level * omega / sqrt(omega ** 2 + width ** 2)" in ran.out
     assert "level [effort] from 0 to 0.5, null 0" in ran.out
     assert "fixed at 0.005 unless bounds free it" in ran.out
     assert "source: doi:10.1016/0005-1098(94)90209-7" in ran.out
-    assert "on shell_transfer_arm, driven_axis, shell_transfer_arm_elastic, flexible_link, rotary_arm\n" in ran.out
+    on_all = "on shell_transfer_arm, driven_axis, shell_transfer_arm_elastic, flexible_link, rotary_arm"
+    assert on_all in " ".join(ran.out.split())
     assert re.search(r"^flux_sat.*\n  in the form rational\n(.*\n)*  in the form arctangent\n", ran.out, re.MULTILINE)
 
 
 def test_list_plants(run):
-    text = run("list", "plants").out
+    text = run("list", "plants", "--long").out.replace("\n      ", " ")
     headed = re.findall(r"^(\w+) \(recorded in (.*?)\)", text, re.MULTILINE)
     assert headed == [("shell_transfer_arm", "rad/s"), ("driven_axis", "m/s"), ("driven_axis", "rad/s"),
                       ("shell_transfer_arm_elastic", "rad/s"), ("flexible_link", "rad, rad, rad/s, rad/s"),
@@ -46,11 +50,12 @@ def test_list_plants(run):
 
 
 def test_list_fitness_and_identifiers(run):
-    names = re.findall(r"^(\w+): .* \(records join by (\w+)\)$", run("list", "fitness").out, re.MULTILINE)
+    fitness = run("list", "fitness", "--long").out.replace("\n      ", " ")
+    names = re.findall(r"^(\w+): .* \(records join by (\w+)\)$", fitness, re.MULTILINE)
     assert dict(names) == {"similarity": "duration", "numerical_similarity": "duration",
                            "shape_similarity": "duration", "rmse": "samples", "nrmse": "samples",
                            "likelihood": "sum"}  # fmt: skip
-    identifiers = run("list", "identifiers").out
+    identifiers = run("list", "identifiers", "--long").out.replace("\n      ", " ")
     assert re.search(r"^pso: the paper's particle swarm .*\(global, stochastic\)$", identifiers, re.MULTILINE)
     assert "(local, gradient, stochastic, rmse or likelihood)" in identifiers
 
@@ -61,7 +66,44 @@ def test_list_fitness_and_identifiers(run):
     ("identifiers", "evolution", "evolution: a function of the user"),
 ])  # fmt: skip
 def test_a_user_s_things_are_listed(run, mine, what, name, line):
-    assert line in run("list", what, "--plugin", f"{mine}:{name}").out
+    assert line in run("list", what, name, "--long", "--plugin", f"{mine}:{name}").out
+    assert name in run("list", what, "--plugin", f"{mine}:{name}").out
+
+
+def test_a_list_is_a_table_and_a_name_says_more(run, refused):
+    for what in ("effects", "plants", "fitness", "identifiers", "analyses"):
+        names = run("list", what, "--quiet").out.split()
+        table = run("list", what).out
+        assert table.startswith(f"{len(names)} {what}; `armid list {what} NAME` says more.\n")
+        assert all(re.search(rf"^│ {name} ", table, re.MULTILINE) for name in names)
+        assert " += " not in table
+        one = run("list", what, names[-1]).out
+        assert one.startswith(names[-1])
+        assert json.loads(run("list", what, names[-1], "--json").out)[what].keys() == {names[-1]}
+    assert "port torque\n" in run("list", "effects", "coulomb").out
+    assert "port torque += -level" in run("list", "effects", "coulomb", "viscous", "--long").out
+    assert "did you mean 'coulomb'" in refused("list", "effects", "colomb")
+
+
+@pytest.mark.parametrize(("words", "begun", "found"), [
+    (["list"], "eff", {"effects"}), (["list", "effects"], "coul", {"coulomb"}),
+    (["identify", "x", "--identifier"], "lsh", {"lshade"}), (["identify", "x", "--fitness"], "rm", {"rmse"}),
+    (["identify", "x", "--effects"], "viscous,coul", {"viscous,coulomb"}), (["new"], "st", {"study"}),
+    (["close-loop", "x", "--candidates"], "coul", {"coulomb"}), (["schema"], "", {"campaign", "study"}),
+    (["check", "x", "--on"], "flex", {"flexible_link"}), (["simulate", "x", "--accuracy"], "f", {"fine"}),
+    (["identifiability", "x", "--rank"], "w", {"worst"}),
+])  # fmt: skip
+def test_the_shell_completes_values(words, begun, found):
+    completed = ShellComplete(app, {}, "armid", "_ARMID_COMPLETE").get_completions(words, begun)
+    assert {item.value for item in completed} == found
+
+
+def test_an_installed_package_has_no_benchmarks(monkeypatch, tmp_path):
+    assert "bench" in Commands("armid").list_commands(None)
+    monkeypatch.setattr("armid.cli.main.BENCHMARKS", tmp_path / "bench")
+    installed = Commands("armid")
+    assert "bench" not in installed.list_commands(None)
+    assert installed.get_command(None, "bench") is None
 
 
 def test_bench_prints_one_table(run, monkeypatch):

@@ -199,7 +199,7 @@ def test_nothing_free_is_identified_through_the_command(dfki, tmp_path, capsys):
 @pytest.mark.parametrize(("change", "holdout", "fragments"), [
     ({"torque": None}, None, ["ddp_measured.csv, line 1", "'torque' is missing", "velocity"]),
     ({"torque": "absent"}, None, ["ddp_measured.csv does not exist", "results/"]),
-    ({}, "dpd", ["--holdout 'dpd'", "did you mean 'ddp'"]),
+    ({}, "dpd", ["holdout 'dpd'", "did you mean 'ddp'"]),
 ])  # fmt: skip
 def test_refused_pendulum(dfki, tmp_path, change, holdout, fragments):
     if change.get("torque", "") is None:

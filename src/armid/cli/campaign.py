@@ -2,9 +2,6 @@
 
 import json
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +13,7 @@ from armid.cli.options import (
     assignments,
     campaign_argument,
     command,
+    completes,
     effects_option,
     examples,
     give,
@@ -31,7 +29,8 @@ from armid.cli.options import (
     value_of,
 )
 from armid.cli.report import show_and_save
-from armid.errors import ArmidError, nearest, printable
+from armid.errors import ArmidError, nearest
+from armid.progress import search_bar, status_line
 from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_unwritable
 
 
@@ -83,7 +82,7 @@ DEFAULT = (
 ))  # fmt: skip
 @problem_options
 @click.option(
-    "--identifier", show_default=DEFAULT,
+    "--identifier", show_default=DEFAULT, shell_complete=completes("identifiers"),
     help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.",
 )  # fmt: skip
 @click.option(
@@ -91,7 +90,7 @@ DEFAULT = (
     help="Option of the identifier, such as velocity_limit=0.2 of pso; of a chain: share=0.5 (of the budget, "
     "0.5:0.3 for three phases), pso.velocity_limit=0.2; `armid list identifiers --long`. Repeatable.",
 )  # fmt: skip
-@click.option("--fitness", show_default="rmse",
+@click.option("--fitness", show_default="rmse", shell_complete=completes("fitness"),
               help="What is minimised: see `armid list fitness`; rmse:OUTPUT for one output.")  # fmt: skip
 @click.option(
     "--budget", type=int, show_default="3,000; 12,000 with --paper or --identifier",
@@ -131,38 +130,12 @@ def identify_command(
     goal = 1.0 - target if target is not None and minimised.partition(":")[0] in SIMILARITIES else target
     named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
     refuse_unwritable(out, IDENTIFICATION.file)
-    with progress_bar() as update:
+    with search_bar(speaks()) as update:
         found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), update,
                     options=named, paper=paper, interval=not no_interval, **given(**problem))  # fmt: skip
     show_and_save(found, out)
     if found.stopped == INTERRUPTED:
         sys.exit(130)
-
-
-@contextmanager
-def progress_bar() -> Iterator[Callable[[Any], None]]:
-    """Yield what shows the state of a search, with rate and time left, on a terminal; nothing is shown elsewhere."""
-    if not (sys.stderr.isatty() and speaks()):
-        yield lambda meter: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskID, TimeRemainingColumn
-
-    columns = ("{task.completed:.0f}/{task.total:.0f} {task.description}", BarColumn(), "{task.fields[rate]:.0f}/s",
-               TimeRemainingColumn(), "{task.fields[best]}")  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        tasks: dict[str, TaskID] = {}
-
-        def update(state: Any) -> None:
-            what = getattr(state, "what", "simulations")
-            best = f"best {state.best_f:.6g}" if what == "simulations" else ""
-            if what not in tasks:
-                tasks[what] = bar.add_task(what, total=state.budget, best=best, rate=0.0)
-            # rich does not know a speed until it has seen two steps
-            rate = bar.tasks[tasks[what]].speed or 0.0
-            bar.update(tasks[what], total=state.budget, completed=state.used, best=best, rate=rate)
-
-        yield update
 
 
 @command("identifiability", short_help="Say how well the records pin down the parameters.", epilog=examples(
@@ -183,6 +156,7 @@ def progress_bar() -> Iterator[Callable[[Any], None]]:
 )  # fmt: skip
 @click.option(
     "--rank", default="volume", show_default=True, metavar="volume|worst|shrinkage",
+    shell_complete=completes(words=("volume", "worst", "shrinkage")),
     help="What the next manoeuvre is chosen by: all parameters together, the worst, or the largest change.",
 )  # fmt: skip
 @out_option("Folder for identifiability.html, identifiability.json and the figures.")
@@ -223,8 +197,6 @@ def read_point(path: Path) -> dict[str, float]:
                          "expected") from error  # fmt: skip
 
 
-# Where the output is no terminal, so many seconds pass between two lines.
-SILENT_S = 60.0
 PROGRESS = "progress.jsonl"
 
 
@@ -235,8 +207,10 @@ PROGRESS = "progress.jsonl"
 ))  # fmt: skip
 @problem_options
 @out_option("Folder for report.html, report.md, report.json and the figures.", required=True)
-@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]")
-@click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.")
+@click.option("--candidates", default="", metavar="NAME,NAME", help="Effects to look for. [default: all that apply]",
+              shell_complete=completes("effects", commas=True))  # fmt: skip
+@click.option("--without", default="", metavar="NAME,NAME", help="Effects not to look for.",
+              shell_complete=completes("effects", commas=True))  # fmt: skip
 @click.option("--no-curve", is_flag=True, help="Do not recover the missing signal where no effect will do.")
 @click.option(
     "--within",
@@ -268,7 +242,7 @@ def close_loop_command(
     refuse_unwritable(out, LOOP.file)
     kept = out / PROGRESS
     try:
-        with status_line() as show_status:
+        with status_line(speaks()) as show_status:
             found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
                                without=without, curve=not no_curve, progress=kept, within=within,
                                **given(**problem))  # fmt: skip
@@ -278,26 +252,3 @@ def close_loop_command(
             tell(f"armid: what was fitted is kept in {kept}: the same command goes on from there")
         raise
     kept.unlink(missing_ok=True)
-
-
-@contextmanager
-def status_line() -> Iterator[Callable[[str], None]]:
-    """Yield what shows a sentence and the time on a terminal; elsewhere a line is printed once a minute."""
-    if not (sys.stderr.isatty() and speaks()):
-        began = last = time.monotonic()
-
-        def now_and_then(sentence: str) -> None:
-            nonlocal last
-            if speaks() and time.monotonic() - last >= SILENT_S:
-                last = time.monotonic()
-                tell(f"{last - began:.0f} s: {sentence}")
-
-        yield now_and_then
-        return
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False)
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("identifying the declared model (compiling at first)", total=None)
-        yield lambda sentence: bar.update(task, description=printable(sentence))

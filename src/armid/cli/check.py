@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from armid.cli.options import command, examples, give, plugin_option, say
+from armid.cli.options import command, completes, examples, give, plugin_option, say
 from armid.errors import ArmidError, nearest
 from armid.registry import Registry, load_plugin, load_registry
 
@@ -26,7 +26,12 @@ AGAIN_S = 1.0
     "armid check mine.py:my_drag --on driven_axis", "armid check studies/campaigns/paper_arm",
 ))  # fmt: skip
 @click.argument("thing", metavar="FILE.py:attribute|CAMPAIGN")
-@click.option("--on", metavar="PLANT", help="Try an effect on this plant alone. [default: all that take it]")
+@click.option(
+    "--on",
+    metavar="PLANT",
+    shell_complete=completes("plants"),
+    help="Try an effect on this plant alone. [default: all that take it]",
+)
 @click.option("--time-limit", default=60.0, show_default=True, metavar="S",
               help="Longest time of one point, s; kept where the system has alarms, as all but Windows.")  # fmt: skip
 @plugin_option
@@ -116,16 +121,12 @@ def points_of(thing: str, registry: Registry) -> tuple[str, str, "Iterator[Contr
 @click.option("--quick", is_flag=True, help="Fewer repetitions: rougher figures in a few seconds.")
 @plugin_option
 def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
-    """Measure speed, error and memory, with the programs in studies/bench of the project.
+    """Measure speed, error and memory, with the programs in studies/bench beside the source.
 
     The engine against scipy and a plain loop, in one run, every ratio in one table: times in microseconds a
     simulation, errors in rad/s, memory in MB beside what the results themselves take.
     """
-    roots = (Path.cwd(), Path(__file__).parents[3])
-    studies = next((root / "studies" for root in roots if (root / "studies" / "bench" / "run.py").is_file()), None)
-    if studies is None:
-        raise ArmidError("there is no studies/bench here: the root of armid's source, which holds it, is expected")
-    sys.path.insert(0, str(studies))
+    sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
     load_registry(plugins)
     rows = import_module("bench.run").run_bench(quick=quick)
     say(*import_module("bench.measure").bench_table(rows).splitlines())

@@ -1,17 +1,20 @@
 """`armid list`: what there is to choose from."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from shutil import get_terminal_size
 from typing import Any
 
 import click
 
-from armid.cli.options import command, examples, give, plugin_option, put, say, wants
+from armid.cli.options import command, completes, examples, give, plugin_option, present, put, say, wants
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Effect, Parameter, Plant, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.graph import returned_text
 from armid.registry import KINDS, Registry, load_registry
+from armid.report.document import Document, table
 
 # Columns of a terminal that equations are broken to.
 WIDTH = 110
@@ -21,34 +24,84 @@ multistart:LOCAL: a local one from ever new starts until the budget is used
 GLOBAL+LOCAL[+LOCAL]: a chain, each phase from the best so far; options share=0.5 (0.5:0.3), NAME.OPTION=VALUE"""
 
 
-@command("list", short_help="List what is registered.",
-         epilog=examples("armid list plants", "armid list identifiers --long",
-                         "armid list effects --plugin mine.py:my_drag"))  # fmt: skip
-@click.argument("what", metavar="effects|plants|fitness|identifiers|analyses")
-@click.option(
-    "--long", "is_long", is_flag=True, help="Identifiers with the name, default, unit and meaning of options."
-)
-@plugin_option
-def list_command(what: str, is_long: bool, plugins: tuple[str, ...]) -> None:
-    """List what is registered: names, equations, parameters, units.
+def complete_name(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete the name of a thing of the catalogue that stands before it."""
+    what = str(context.params.get("what"))
+    known = things_of(what, load_registry()) if what in KINDS else {}
+    return [name for name in known if name.startswith(incomplete)]
 
-    plants: parameters with bounds, states, quantities, ports, inputs, constants and keys of a record. effects: port,
-    equation, parameters, source, the plants that take it. fitness: how records join. identifiers: what they need.
-    analyses: sections of the report of a study.
+
+@command("list", short_help="List what is registered.",
+         epilog=examples("armid list plants", "armid list effects coulomb --long", "armid list identifiers --long",
+                         "armid list effects --plugin mine.py:my_drag"))  # fmt: skip
+@click.argument("what", metavar="effects|plants|fitness|identifiers|analyses", shell_complete=completes(words=KINDS))
+@click.argument("names", nargs=-1, metavar="[NAME]...", shell_complete=complete_name)
+@click.option("--long", "is_long", is_flag=True, help="Everything: equations, and the options of identifiers.")
+@plugin_option
+def list_command(what: str, names: tuple[str, ...], is_long: bool, plugins: tuple[str, ...]) -> None:
+    """List what is registered: names and what they are; of each NAME the parameters, units, ports and source.
+
+    --long adds equations, and of identifiers the name, default, unit and meaning of each option. analyses: sections of
+    the report of a study.
     """
     if what not in KINDS:
         raise ArmidError(f"list '{what}' is not known: {nearest(what, KINDS)}")
     registry = load_registry(plugins)
-    texts = {"effects": effect_texts, "plants": plant_texts, "fitness": fitness_texts, "identifiers": identifier_texts,
-             "analyses": analysis_texts}  # fmt: skip
+    there = things_of(what, registry)
+    for name in names:
+        if name not in there:
+            raise ArmidError(f"{what}: '{name}' is not known: {nearest(name, there)}")
+    things = {name: there[name] for name in names or there}
     if wants("quiet"):
-        put(*getattr(registry, what))
+        put(*things)
     elif wants("json"):
-        give(**{what: {name: entry(thing) for name, thing in getattr(registry, what).items()}})
-    elif is_long and what == "identifiers":
-        say(*"\n\n".join(map(long_text, registry.identifiers.values())).splitlines(), "", COMPOSED)
+        give(**{what: {name: entry(thing) for name, thing in things.items()}})
+    elif names or is_long:
+        text = partial(DETAILS[what], registry=registry, is_long=is_long)
+        say(*"\n\n".join(text(name, thing) for name, thing in things.items()).splitlines())
     else:
-        say(*"\n\n".join(texts[what](registry)).splitlines())
+        columns, row = SHORT[what]
+        hint = f"; `armid list {what} NAME` says more"
+        rows = [(name, *row(thing)) for name, thing in things.items()]
+        main = table(what, columns, rows)
+        present(Document(what, "List", "", (f"{len(rows)} {what}{hint}.",), (), main=(main,)))
+    if what == "identifiers" and not names:
+        say("", *COMPOSED.splitlines())
+
+
+def things_of(what: str, registry: Registry) -> dict[str, Any]:
+    """Return name -> thing of a catalogue, analyses of armid included."""
+    own: dict[str, Any] = dict(getattr(registry, what))
+    if what != "analyses":
+        return own
+    from armid.study.analyses.catalogue import ANALYSES
+
+    return {a.name: a for a in ANALYSES} | own
+
+
+def note_of(thing: Any) -> str:
+    note = getattr(thing, "note", "") or (getattr(thing, "__doc__", "") or "").strip()
+    return str(note).splitlines()[0] if note else "no note"
+
+
+def kinds_of(identifier: Any) -> str:
+    kinds = {"gradient": identifier.uses_gradient, "stochastic": identifier.is_stochastic,
+             "rmse or likelihood": identifier.needs_residuals}  # fmt: skip
+    return ", ".join(["global" if identifier.is_global else "local", *(word for word, on in kinds.items() if on)])
+
+
+def forms_of(effect: Effect) -> str:
+    words = ", ".join(e.form for e in effect.every_form if e.form)
+    return f"{note_of(effect)} (forms: {words})" if words else note_of(effect)
+
+
+def recorded_by(plant: Plant) -> str:
+    return ", ".join(dict.fromkeys(o.unit for p in (plant, *plant.variants) for o in p.outputs))
+
+
+def plain_text(name: str, thing: Any, registry: Registry, is_long: bool) -> str:
+    joined = f" (records join by {thing.join})" if hasattr(thing, "join") else ""
+    return folded(f"{name}: {note_of(thing)}{joined}")
 
 
 def entry(thing: Any) -> dict[str, Any]:
@@ -66,41 +119,38 @@ def entry(thing: Any) -> dict[str, Any]:
     return found | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
 
 
-def long_text(identifier: Any) -> str:
+def identifier_text(name: str, identifier: Any, registry: Registry, is_long: bool) -> str:
     from armid.identifiers import options_of
 
-    lines = [f"{identifier.name}: {identifier.note or 'no note'}"]
-    for name, told in options_of(identifier).items():
+    lines = [folded(f"{name}: {note_of(identifier)} ({kinds_of(identifier)})")]
+    for option, told in options_of(identifier).items():
         default = told["default"]
         value = "its own" if default is None or callable(default) else quoted(default).strip("'")
         unit = f" [{told['unit']}]" if told["unit"] else ""
-        lines.append(folded(f"  --option {name}={value}{unit} {told['meaning']}"))
+        lines.append(folded(f"  --option {option}={value}{unit} {told['meaning']}"))
     return "\n".join(lines)
 
 
-def effect_texts(registry: Registry) -> list[str]:
+def effect_text(name: str, effect: Effect, registry: Registry, is_long: bool) -> str:
     plants = [p for plant in registry.plants.values() for p in (plant, *plant.variants)]
-    return [effect_text(e, plants) for e in registry.effects.values()]
-
-
-def effect_text(effect: Effect, plants: Sequence[Plant] = ()) -> str:
     several = len(effect.every_form) > 1
-    lines = [f"{effect.name}: {effect.note or 'no note'}"]
+    lines = [f"{name}: {note_of(effect)}"]
     for form in effect.every_form:
         lines += [f"  in the form {form.form}"] if several else []
-        lines += form_lines(form, several or form.source != effect.source)
+        lines += form_lines(form, is_long)
+        lines += [f"  source: {form.source}"] if form.source and (several or form.source != effect.source) else []
     lines += [f"  source: {effect.source}"] if effect.source and not several else []
     return "\n".join(folded(line) for line in [*lines, f"  on {places(effect, plants)}"])
 
 
-def form_lines(effect: Effect, with_source: bool) -> list[str]:
-    lines = [f"  port {port} += {returned_text(f)}" for port, f in effect.adds.items()]
-    lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {returned_text(s.rate)}" for s in effect.states]
-    lines += [f"  {d.name}: {returned_text(d.of)} at t - {d.by}" for d in effect.delays]
+def form_lines(effect: Effect, is_long: bool) -> list[str]:
+    lines = [f"  port {port}{f' += {returned_text(f)}' if is_long else ''}" for port, f in effect.adds.items()]
+    if is_long:
+        lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {returned_text(s.rate)}" for s in effect.states]
+        lines += [f"  {d.name}: {returned_text(d.of)} at t - {d.by}" for d in effect.delays]
+        lines += [f"  switch {g.name} where {returned_text(g.function)} comes to 0" for g in effect.guards]
     lines += [f"  approximates the form {effect.exact.form}"] if effect.exact is not None else []
-    lines += [f"  switch {g.name} where {returned_text(g.function)} comes to 0" for g in effect.guards]
-    lines += [f"  {parameter_text(p)}" for p in effect.parameters]
-    return lines + ([f"  source: {effect.source}"] if with_source and effect.source else [])
+    return [*lines, *(f"  {parameter_text(p)}" for p in effect.parameters)]
 
 
 def places(effect: Effect, plants: Sequence[Plant]) -> str:
@@ -116,7 +166,8 @@ def places(effect: Effect, plants: Sequence[Plant]) -> str:
 
 
 def folded(line: str) -> str:
-    return textwrap.fill(line, WIDTH, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
+    width = min(get_terminal_size().columns, WIDTH)
+    return textwrap.fill(line, width, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
 
 
 def parameter_text(parameter: Parameter) -> str:
@@ -128,18 +179,18 @@ def parameter_text(parameter: Parameter) -> str:
     return f"{text}: {parameter.note}" if parameter.note else text
 
 
-def plant_texts(registry: Registry) -> list[str]:
-    return [plant_text(p) for plant in registry.plants.values() for p in (plant, *plant.variants)]
+def plant_text(name: str, plant: Plant, registry: Registry, is_long: bool) -> str:
+    return "\n\n".join(sibling_text(p, is_long) for p in (plant, *plant.variants))
 
 
-def plant_text(plant: Plant) -> str:
+def sibling_text(plant: Plant, is_long: bool) -> str:
     lines = [f"{plant.name} (recorded in {', '.join(o.unit for o in plant.outputs)}): {plant.note}"]
     if not plant.records_one_speed:
         lines += [f"  output {o.name} [{o.unit}] = {o.signal} from {' or '.join(o.factors)}" for o in plant.outputs]
         lines += [f"  effect of a sensor {name}: {e.note}" for name, e in sensor_effects(plant).items()]
     lines += [f"  parameter {parameter_text(p)}" for p in plant.parameters]
     lines += [f"  state {s.name} [{s.unit}]" for s in plant.states]
-    lines += [f"  quantity {name} = {returned_text(f)}" for name, f in plant.quantities.items()]
+    lines += [f"  quantity {name}{f' = {returned_text(f)}' if is_long else ''}" for name, f in plant.quantities.items()]
     lines += [f"  port {name} [{unit}]" for name, unit in plant.ports.items()]
     lines += [
         f"  input {i.name} [{i.unit}] from {' or '.join(i.columns) or 'a column that you name'}" for i in plant.inputs
@@ -147,24 +198,18 @@ def plant_text(plant: Plant) -> str:
     lines += [f"  constant {c.name} = {c.value:g} {c.unit}{f' ({c.note})' if c.note else ''}" for c in plant.constants]
     lines += [f"  key {k.key} sets {k.constant}" for k in plant.keys]
     lines += [f"  {alias} is another name for {name}" for alias, name in plant.aliases.items()]
-    return "\n".join(lines)
+    return "\n".join(map(folded, lines))
 
 
-def fitness_texts(registry: Registry) -> list[str]:
-    return [f"{name}: {f.note or 'no note'} (records join by {f.join})" for name, f in registry.fitness.items()]
-
-
-def identifier_texts(registry: Registry) -> list[str]:
-    lines = []
-    for name, i in registry.identifiers.items():
-        kinds = {"gradient": i.uses_gradient, "stochastic": i.is_stochastic, "rmse or likelihood": i.needs_residuals}
-        words = ["global" if i.is_global else "local", *(word for word, on in kinds.items() if on)]
-        lines.append(f"{name}: {i.note or 'no note'} ({', '.join(words)})")
-    return [*lines, COMPOSED]
-
-
-def analysis_texts(registry: Registry) -> list[str]:
-    from armid.study.analyses.catalogue import ANALYSES
-
-    own = [f"{name}: {(f.__doc__ or 'no note').strip().splitlines()[0]}" for name, f in registry.analyses.items()]
-    return [*(f"{a.name}: {a.note}" for a in ANALYSES), *own]
+# What a table of each catalogue shows beside the names, and what is said of a name.
+SHORT: dict[str, tuple[tuple[str, ...], Callable[[Any], Sequence[str]]]] = {
+    "plants": (("plant", "recorded in", "what it is"), lambda p: (recorded_by(p), note_of(p))),
+    "effects": (("effect", "at", "what it is"), lambda e: (", ".join(e.adds), forms_of(e))),
+    "fitness": (("fitness", "records join by", "what it is"), lambda f: (f.join, note_of(f))),
+    "analyses": (("analysis", "what it is"), lambda a: (note_of(a),)),
+    "identifiers": (("identifier", "what it is", "kind"), lambda i: (note_of(i), kinds_of(i))),
+}
+DETAILS: dict[str, Callable[..., str]] = {
+    "plants": plant_text, "effects": effect_text, "fitness": plain_text, "analyses": plain_text,
+    "identifiers": identifier_text,
+}  # fmt: skip

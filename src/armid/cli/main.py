@@ -8,6 +8,7 @@ import sys
 import warnings
 from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import click
@@ -37,21 +38,25 @@ COMMANDS = {
     "list": "listing:list_command", "check": "check:check_command", "doctor": "doctor:doctor_command",
     "bench": "check:bench_command", "study": "study:study_command", "tune": "study:tune_command",
     "report": "report:report_command", "import": "transfer:import_group", "export": "transfer:export_group",
-    "new": "new:new_command",
+    "new": "new:new_command", "schema": "new:schema_command",
 }  # fmt: skip
+
+
+# The benchmarks stand beside the source; an installed package has none, and no command for them.
+BENCHMARKS = Path(__file__).parents[3] / "studies" / "bench"
 
 
 class Commands(Heard, click.Group):
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         # click looks for the nearest name there
-        self.commands: dict[str, Any] = dict.fromkeys(COMMANDS)
+        self.commands: dict[str, Any] = {name: None for name in COMMANDS if name != "bench" or BENCHMARKS.is_dir()}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return list(self.commands)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self.commands:
             return None
         module, name = COMMANDS[cmd_name].split(":")
         found: click.Command = getattr(import_module(f"armid.cli.{module}"), name)

@@ -1,6 +1,7 @@
-"""`armid new`: a commented starting file."""
+"""`armid new`: a commented starting file; `armid schema`: what such a file of TOML may hold, for editors."""
 
 import ast
+import json
 import os.path
 import re
 import sys
@@ -15,7 +16,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.cli.options import command, examples, give, say
+from armid.cli.options import command, completes, examples, give, plugin_option, say
 from armid.errors import ArmidError, nearest, quoted
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
@@ -26,8 +27,10 @@ CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifi
               "analysis": "analyses"}  # fmt: skip
 # Kind and --style -> the template that stands for the kind's own.
 STYLES = {("identifier", "function"): "identifier_function"}
-CAMPAIGN = "campaign"
-KINDS = (*CATALOGUES, CAMPAIGN)
+CAMPAIGN, STUDY = "campaign", "study"
+KINDS = (*CATALOGUES, CAMPAIGN, STUDY)
+# What the kinds that are no Python file become, and the command that tries them.
+FILES = {CAMPAIGN: ("{}", "armid check {}"), STUDY: ("{}.toml", "armid study {}")}
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 Array = NDArray[np.float64]
 # The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
@@ -42,7 +45,7 @@ DIGITS = 6
 @command("new", short_help="Write a starting file of your own.", epilog=examples(
     "armid new effect my_drag", "armid check my_drag.py:my_drag", "armid new campaign my_axis --out studies/campaigns",
 ))  # fmt: skip
-@click.argument("kind", metavar="effect|fitness|identifier|plant|analysis|campaign")
+@click.argument("kind", metavar="|".join(KINDS), shell_complete=completes(words=KINDS))
 @click.argument("name", metavar="NAME")
 @click.option(
     "--style", default="", metavar="function",
@@ -58,12 +61,12 @@ DIGITS = 6
 )  # fmt: skip
 @click.argument("more", nargs=-1, type=click.Path(path_type=Path), metavar="[FILE]...")
 def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: Path, more: tuple[Path, ...]) -> None:
-    """Write a commented starting file of your own that passes `armid check`.
+    """Write a commented starting file of your own that works as it stands.
 
     An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
-    NAME. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
-    say so; with --from FILE... it has copies of your records, and a comment at each guess. Nothing that exists is
-    overwritten.
+    NAME and passes `armid check`. A study becomes FOLDER/NAME.toml, which `armid study` runs. A campaign becomes the
+    folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and say so; with --from FILE... it
+    has copies of your records, and a comment at each guess. Nothing that exists is overwritten.
     """
     from armid.record import write_campaign
 
@@ -83,7 +86,8 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
 
         taken |= {a.name for a in ANALYSES}
     check_new_name(kind, name, taken, template)
-    target = out / (f"{name}.py" if kind in CATALOGUES else name)
+    file, trying = FILES.get(kind, ("{}.py", f"armid check {{}}:{name}"))
+    target = out / file.format(name)
     if os.path.lexists(target):
         raise ArmidError(f"{target} exists already: another name, or another folder by --out, is expected")
     if kind == CAMPAIGN:
@@ -94,10 +98,36 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
         write_campaign(target, text, tables)
     else:
         with NewFiles(out) as new_files:
-            new_files.path(target.name).write_text(python_file(template, name), encoding="utf-8")
-    check = f"armid check {target}{f':{name}' if kind in CATALOGUES else ''}"
+            text = filled("study.toml.txt", name=name) if kind == STUDY else python_file(template, name)
+            new_files.path(target.name).write_text(text, encoding="utf-8")
+    check = trying.format(target)
     say(f"wrote {target}; try: {check}")
     give(wrote=target, check=check)
+
+
+@command("schema", short_help="Print the JSON Schema of a campaign or a study.", epilog=examples(
+    "armid schema study > study.schema.json", "armid schema campaign --plugin mine.py:my_plant",
+))  # fmt: skip
+@click.argument("what", metavar="campaign|study", shell_complete=completes(words=(CAMPAIGN, STUDY)))
+@plugin_option
+def schema_command(what: str, plugins: tuple[str, ...]) -> None:
+    """Print the JSON Schema of campaign.toml or of a study's file.
+
+    An editor that knows it completes keys and names, and marks what is wrong. It is made of the definitions that armid
+    reads these files with, and offers what is registered. With taplo or Even Better TOML the first line of the file is
+    `#:schema ./study.schema.json`.
+    """
+    from armid.record.schema import CampaignSheet, json_schema, key_schema, sheet_schema
+    from armid.study.spec import study_schema
+
+    if what not in (CAMPAIGN, STUDY):
+        raise ArmidError(f"schema '{what}' is not known: {nearest(what, (CAMPAIGN, STUDY))}")
+    registry = load_registry(plugins)
+    registered = {kind: getattr(registry, kind) for kind in ("plants", "effects", "identifiers")}
+    keys = {key.key: key_schema(key) for plant in registry.plants.values() for key in plant.keys}
+    schema = json_schema(sheet_schema(CampaignSheet) if what == CAMPAIGN else study_schema(), registered, keys)
+    say(*json.dumps(schema, indent=2).splitlines())
+    give(**schema)
 
 
 def filled(file: str, **values: object) -> str:
@@ -112,9 +142,9 @@ def python_file(template: str, name: str) -> str:
 
 def check_new_name(kind: str, name: str, taken: Collection[str], template: str) -> None:
     """Refuse a name that a starting file could not have; taken: names of the same kind that are registered."""
-    if kind == CAMPAIGN:
+    if kind in FILES:
         if not FOLDER_NAME.fullmatch(name) or name.endswith("."):
-            raise ArmidError(f"campaign '{name}' is no usable name: letters, digits, '_', '-' and '.' are expected")
+            raise ArmidError(f"{kind} '{name}' is no usable name: letters, digits, '_', '-' and '.' are expected")
         return
     check_name(name, kind)
     if name in taken or (kind == "effect" and name in RESERVED):

@@ -129,6 +129,21 @@ def tell(text: str) -> None:
         print(printable(text), file=sys.stderr, flush=True)
 
 
+def completes(*catalogues: str, words: Iterable[str] = (), commas: bool = False) -> Callable[..., list[str]]:
+    """Return what completes the value of an option: names of catalogues, and words; commas: the last of several."""
+
+    def complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+        from armid.registry import load_registry
+
+        before, comma, begun = incomplete.rpartition(",") if commas else ("", "", incomplete)
+        registry = load_registry() if catalogues else None
+        known = [*words, *(name for kind in catalogues for name in getattr(registry, kind))]
+        return [f"{before}{comma}{name}" for name in known if name.startswith(begun)]
+
+    return complete
+
+
+ACCURACIES = ("standard", "fine", "auto")
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
 plugin_option = click.option(
     "--plugin", "plugins", multiple=True, metavar="FILE.py:attribute",
@@ -136,10 +151,15 @@ plugin_option = click.option(
     "name only files that you trust; campaigns and studies never run code. Repeatable.",
 )  # fmt: skip
 effects_option = click.option(
-    "--effects", default="", metavar="NAME,NAME[:FORM]", help="Effects to add to those that the campaign declares."
+    "--effects",
+    default="",
+    metavar="NAME,NAME[:FORM]",
+    shell_complete=completes("effects", commas=True),
+    help="Effects to add to those that the campaign declares.",
 )
 accuracy_option = click.option(
-    "--accuracy", default="auto", show_default=True, metavar="standard|fine|auto",
+    "--accuracy", default="auto", show_default=True, metavar="|".join(ACCURACIES),
+    shell_complete=completes(words=ACCURACIES),
     help="Error of the engine: standard 1e-5 rad/s, fine 2e-7 rad/s (shares of the plant's speed scale); auto: fine "
     "where the noise would not hide the standard error.",
 )  # fmt: skip
@@ -237,6 +257,6 @@ def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float
 
 
 def accuracy_of(text: str) -> str | None:
-    if text not in ("standard", "fine", "auto"):
-        raise ArmidError(f"--accuracy '{text}': {nearest(text, ('standard', 'fine', 'auto'))}")
+    if text not in ACCURACIES:
+        raise ArmidError(f"--accuracy '{text}': {nearest(text, ACCURACIES)}")
     return None if text == "auto" else text

@@ -9,7 +9,7 @@ import click
 
 from armid.cli.options import command, examples, give, plugin_option, present, say
 from armid.errors import ArmidError
-from armid.registry import load_plugin, load_registry, place_in_plugin
+from armid.registry import load_registry, place_in_plugin
 from armid.report.result import (
     IDENTIFIABILITY,
     IDENTIFICATION,
@@ -57,10 +57,11 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     """Write report.html, one self-contained page, beside stored results.
 
     DIR is a folder that `armid study`, `armid close-loop`, `armid identify` or `armid identifiability` (whose page is
-    identifiability.html) has written. The same results give the same bytes, and nothing is simulated. For a study,
-    report.md, every table as CSV and LaTeX and every figure as PNG and SVG are written too, and the main table is
-    printed; one that is not complete is reported as far as it is, and the report says so. An analysis of your own,
-    --plugin FILE.py:name, becomes a section of it.
+    identifiability.html) has written. The same results give the same bytes, and nothing is simulated. The answer stands
+    at the head of the page; the command that made the results has printed it. For a study, report.md, every table as
+    CSV and LaTeX and every figure as PNG and SVG are written too. A study that is not complete is reported as far as it
+    is, and says so. An analysis of your own, --plugin FILE.py:name, becomes a section; plug-ins of another kind may be
+    named as for the study, and change nothing.
     """
     kind = kind_in(folder)
     if kind is None:
@@ -71,7 +72,6 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
         raise ArmidError(f"{folder} holds no study, and a key is the truth of a study's campaigns: none is expected")
     document = document_of(folder, kind, str(folder))
     with NewFiles(folder) as files, refuse_damaged(folder, kind):
-        present(document)
         write_pages(document, kind, files)
     say(f"wrote {kind.page} ({(folder / kind.page).stat().st_size / 1e6:.1f} MB) and {kind.markdown} to {folder}")
     give(answer=document.said, folder=folder, files=files.names)
@@ -80,19 +80,14 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
 def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
     from armid.study.document import report_of, write_report
     from armid.study.results import load_study
-    from armid.study.runner import absolute
 
     results = load_study(folder)
-    named = [word for plugin in plugins for word in ("--plugin", plugin)]
-    again = shlex.join(["armid", "report", f"out/{results.study['name']}", *named])
     analyses, place = load_registry(plugins).analyses, results.path.parent
-    for plugin in absolute(plugins):
-        if plugin not in results.study["plugins"] and load_plugin(plugin)[0] != "analyses":
-            raise ArmidError(f"plug-in '{plugin}' is no analysis: a function with the argument `runs` is expected")
     refuse_unwritable(place, PAGE)
     try:
-        document = report_of(results, key, analyses, again)
-        present(document)
+        document = report_of(results, key, analyses, made_by()["command"])
+        if document.warning:
+            say(document.warning)
         with NewFiles(place) as files:
             write_report(document, files)
     except UNSHOWABLE as error:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from armid.cli.options import command, examples, give, out_option, plugin_option, present, say, speaks, tell
+from armid.cli.report import made_by
 
 if TYPE_CHECKING:
     from armid.study.runner import Ending
@@ -59,7 +60,7 @@ def study_command(
         if isinstance(known, Study) and speaks():
             tell(f"{known.name}: {known.cost()}; what is finished already is kept")
         limit = TIME_LIMIT_S if time_limit is None else time_limit
-        ending = run(known, study, jobs, dask, out, limit, only, retry, show_progress)
+        ending = run(known, study, jobs, dask, out, limit, only, retry, show_progress, made_by()["command"])
     answer: list[str] = []
     if ending.counts.done:
         from armid.study.document import summary_of

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armid.engine import accuracy_against, calibrate, simulate
-from armid.errors import ArmidError, nearest, quoted
+from armid.errors import DataError, ModelError, nearest, quoted
 from armid.model import Array, Model, Output
 from armid.record import Campaign, Override, Piece, Record, write_table
 from armid.report.document import Document, Figure, Section, listed, record_axes, table
 from armid.report.result import NewFiles, Shown
+from armid.report.style import detached
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -75,15 +76,15 @@ class SimulatedCampaign(Shown):
             axis.plot(columns["time_s"], columns[header] * factor, label="simulated")
             axis.set(title=record.file, xlabel="time [s]", ylabel=f"{output.name} [{record.unit}]")
         figure.legend(*cells[0][0].get_legend_handles_labels(), loc="lower center", ncols=2, frameon=False)
-        return figure
+        return detached(figure)
 
     def save(self, folder: str | Path) -> list[str]:
         """Write a CSV file a record, all or none, and return their names.
 
-        Raises ArmidError for the folder of the campaign, whose records would be lost.
+        Raises DataError for the folder of the campaign, whose records would be lost.
         """
         if Path(folder).resolve() == self.campaign.folder.resolve():
-            raise ArmidError(f"{quoted(str(folder))} is the folder of the campaign, whose records would be lost: "
+            raise DataError(f"{quoted(str(folder))} is the folder of the campaign, whose records would be lost: "
                              "another one is expected")  # fmt: skip
         with NewFiles(Path(folder)) as files:
             for file, each in self.tables.items():
@@ -95,15 +96,15 @@ def candidate_of(model: Model, campaign: Campaign, given: Mapping[str, float]) -
     """Return the whole candidate: given values, then what the campaign fixes, then nominal and null values."""
     for name, value in given.items():
         if name not in model.parameters:
-            raise ArmidError(f"--set: parameter '{name}' is not in the model: {nearest(name, model.parameters)}")
+            raise ModelError(f"parameter '{name}' is not in the model: {nearest(name, model.parameters)}")
         if not isinstance(value, int | float | np.number) or not np.isfinite(value):
-            raise ArmidError(f"--set {name}: {value} was found, a finite number is expected")
+            raise ModelError(f"parameter '{name}': {value} was found, a finite number is expected")
     values = []
     for name, p in model.parameters.items():
         choices = (given.get(name), campaign.parameters.get(name, Override()).fixed, p.nominal, p.null, p.fixed)
         known = [v for v in choices if v is not None]
         if not known:
-            raise ArmidError(f"parameter '{name}' has no nominal value: --set {name}=VALUE is expected ({p.unit})")
+            raise ModelError(f"parameter '{name}' has no nominal value: a value is expected ({p.unit})")
         values.append(float(known[0]))
     return np.array(values)
 
@@ -122,7 +123,7 @@ def simulated_piece(
     calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted, spans=False)
     found = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
     if found.failed[0]:
-        raise ArmidError(f"record '{record.file}': the simulation diverges with these parameters")
+        raise ModelError(f"record '{record.file}': the simulation diverges with these parameters")
     if not calibration.reached:
         off = f"the engine is off by up to {calibration.error:.2g} {model.plant.output_unit} even at its finest steps"
         warnings.warn(

@@ -12,6 +12,7 @@ from armid.identifiers.identifier import Identifier, options_in
 from armid.identifiers.least_squares import LEAST_SQUARES
 from armid.identifiers.nlopt import NLOPT
 from armid.identifiers.pso import PSO
+from armid.model import Catalogue
 
 
 def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
@@ -54,7 +55,7 @@ _IDENTIFIERS = (
     *FOREIGN,
 )
 
-IDENTIFIERS: dict[str, Identifier] = {identifier.name: identifier for identifier in _IDENTIFIERS}
+IDENTIFIERS = Catalogue[Identifier]({identifier.name: identifier for identifier in _IDENTIFIERS})
 """Name -> identifier, in the order in which `armid list` shows them."""
 
 

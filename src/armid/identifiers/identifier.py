@@ -138,6 +138,9 @@ class Identifier:
     package: str = ""
     algorithm: Any = None
 
+    def __repr__(self) -> str:
+        return f"<Identifier {self.name}: {self.note or 'no note'}>"
+
     def with_options(self, options: Mapping[str, Any]) -> "Identifier":
         """Return the identifier with options of its own, such as `velocity_limit` of the swarm.
 

@@ -245,8 +245,8 @@ def verdicts_of(
 
 def limits_of(judged: Judgement) -> list[str]:
     """Return which limits hold a parameter: nobody else is accused of what they cause."""
-    return [f"{e.name} sits at its limit {e.value:.4g}{'' if e.unit == '1' else ' ' + e.unit}: widen it "
-            f"(--bounds {e.name}=LOW,HIGH), or fix it." for e in judged.estimates if HELD in e.doubts]  # fmt: skip
+    return [f"{e.name} sits at its limit {e.value:.4g}{'' if e.unit == '1' else ' ' + e.unit}: "
+            "widen its bounds, or fix it." for e in judged.estimates if HELD in e.doubts]  # fmt: skip
 
 
 def missing_of(fit: Fit, library: Library, told: Callable[[str], None]) -> Missing | None:

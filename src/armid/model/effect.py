@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ModelError, nearest
 from armid.model.parameter import Parameter, check_name
 
 Equation = Callable[..., Any]
@@ -87,7 +87,7 @@ class Effect:
     of their signals is the error of the approximation, see `Model.exact`. A search tries a form that approximates only
     where it was chosen by its word.
 
-    Raises ArmidError when it adds nothing, names something twice, or has a form of another name or without a word.
+    Raises ModelError when it adds nothing, names something twice, or has a form of another name or without a word.
     """
 
     name: str
@@ -104,33 +104,39 @@ class Effect:
     delays: tuple[Delay, ...] = ()
     exact: "Effect | None" = None
 
+    def __repr__(self) -> str:
+        names = ", ".join(p.name for p in self.parameters)
+        return (
+            f"<Effect {self.name}: {self.note or 'no note'}; at {', '.join(self.adds)}, parameters {names or 'none'}>"
+        )
+
     def __post_init__(self) -> None:
         check_name(self.name, "effect")
         if self.name in RESERVED:
-            raise ArmidError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED)} are taken")
+            raise ModelError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED)} are taken")
         if not self.adds:
-            raise ArmidError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
+            raise ModelError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
         own = (self.parameters, self.states, self.guards, self.delays)
         names = [one.name for several in own for one in several]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
-            raise ArmidError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")
+            raise ModelError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")
         ports = [n for n in names if n in self.adds]
         if ports:
-            raise ArmidError(f"effect '{self.name}' calls something else '{ports[0]}', as a port to which it adds: "
+            raise ModelError(f"effect '{self.name}' calls something else '{ports[0]}', as a port to which it adds: "
                              "another name is expected")  # fmt: skip
         for delay in self.delays:
             known = [p.name for p in self.parameters]
             if delay.by not in known:
-                raise ArmidError(f"effect '{self.name}' delays '{delay.name}' by '{delay.by}', which is no parameter "
+                raise ModelError(f"effect '{self.name}' delays '{delay.name}' by '{delay.by}', which is no parameter "
                                  f"of it: {nearest(delay.by, known)}")  # fmt: skip
         if self.exact is not None and self.exact.parameters != self.parameters:
-            raise ArmidError(f"effect '{self.name}' approximates one with other parameters: the same are expected")
+            raise ModelError(f"effect '{self.name}' approximates one with other parameters: the same are expected")
         words = [e.form for e in self.every_form]
         if any(e.name != self.name for e in self.forms):
-            raise ArmidError(f"effect '{self.name}' has a form of another name: forms are found under one name")
+            raise ModelError(f"effect '{self.name}' has a form of another name: forms are found under one name")
         if self.forms and (not all(words) or len(set(words)) < len(words)):
-            raise ArmidError(f"effect '{self.name}' has the forms {words}: a word of its own is expected for each")
+            raise ModelError(f"effect '{self.name}' has the forms {words}: a word of its own is expected for each")
 
     @property
     def searched_forms(self) -> tuple["Effect", ...]:
@@ -145,11 +151,11 @@ class Effect:
     def in_form(self, word: str) -> "Effect":
         """Return the form of that word.
 
-        Raises ArmidError for a word that no form has.
+        Raises ModelError for a word that no form has.
         """
         known = {e.form: e for e in self.every_form}
         if word not in known:
-            raise ArmidError(f"effect '{self.name}' has no form '{word}': {nearest(word, filter(None, known))}")
+            raise ModelError(f"effect '{self.name}' has no form '{word}': {nearest(word, filter(None, known))}")
         return known[word]
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ModelError, nearest
 from armid.model.effect import Effect, Equation
 from armid.model.plant import Plant
 
@@ -56,7 +56,7 @@ class Graph:
 
     def add(self, node: Node) -> None:
         if node.key in self.nodes:
-            raise ArmidError(f"'{node.key.replace('__', '.')}' is there twice: each effect at most once is expected")
+            raise ModelError(f"'{node.key.replace('__', '.')}' is there twice: each effect at most once is expected")
         self.nodes[node.key] = node
 
     def of_kind(self, *kinds: str) -> list[Node]:
@@ -71,7 +71,7 @@ class Graph:
                 return
             if key in path:
                 circle = " -> ".join((*path[path.index(key) :], key)).replace("__", ".")
-                raise ArmidError(f"the equations run in a circle: {circle}; use a state or an earlier quantity instead")
+                raise ModelError(f"the equations run in a circle: {circle}; use a state or an earlier quantity instead")
             for needed in self.nodes[key].needs:
                 visit(needed, (*path, key))
             done[key] = self.nodes[key]
@@ -140,7 +140,7 @@ def late(graph: Graph, key: str, by: tuple[str, ...]) -> str:
     if name in graph.nodes:
         return name
     if node.kind == "latch":
-        raise ArmidError(f"effect '{by[0].partition('__')[0]}' delays what depends on the switch '{spelled(key)}': a "
+        raise ModelError(f"effect '{by[0].partition('__')[0]}' delays what depends on the switch '{spelled(key)}': a "
                          "signal without a switch is expected, and a guard for the late switch")  # fmt: skip
     if node.kind == "delayed":
         return late(graph, node.arguments[0][1], tuple(sorted((*by, *node.by))))
@@ -217,10 +217,10 @@ def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
             equation(name, "quantity", function, f"quantity '{name}'")
     else:
         if effect.unless in plant.ports:
-            raise ArmidError(f"{who} is for plants without the port '{effect.unless}'")
+            raise ModelError(f"{who} is for plants without the port '{effect.unless}'")
         for port, function in effect.adds.items():
             if port not in plant.ports:
-                raise ArmidError(f"{who} adds to the port '{port}', which plant '{plant.name}' does not offer: "
+                raise ModelError(f"{who} adds to the port '{port}', which plant '{plant.name}' does not offer: "
                                  f"{nearest(port, plant.ports)}")  # fmt: skip
             equation(f"{prefix}{port}", "term", function, f"port '{port}'")
     for delay in () if effect is None else effect.delays:
@@ -241,11 +241,11 @@ def bind(function: Equation, label: str, names: Mapping[str, str]) -> tuple[tupl
     bound = []
     for a in inspect.signature(function).parameters.values():
         if a.kind not in (a.POSITIONAL_OR_KEYWORD, a.POSITIONAL_ONLY):
-            raise ArmidError(f"{label} has the argument '{a}': plain named arguments are expected")
+            raise ModelError(f"{label} has the argument '{a}': plain named arguments are expected")
         if a.name in names:
             bound.append((a.name, names[a.name]))
         elif a.default is a.empty:
-            raise ArmidError(f"{label} asks for '{a.name}', which nobody offers here: {nearest(a.name, names)}")
+            raise ModelError(f"{label} asks for '{a.name}', which nobody offers here: {nearest(a.name, names)}")
     return tuple(bound)
 
 
@@ -261,7 +261,7 @@ def names_for(plant: Plant, effect: Effect | None, initial: bool) -> dict[str, s
         return names
     for argument, name in effect.binds.items():
         if name not in names and not initial:
-            raise ArmidError(f"effect '{effect.name}' binds '{argument}' to '{name}', which nobody offers here: "
+            raise ModelError(f"effect '{effect.name}' binds '{argument}' to '{name}', which nobody offers here: "
                              f"{nearest(name, names)}")  # fmt: skip
         names |= {argument: names[name]} if name in names else {}
         if plant.aliases.get(name, name) in (i.name for i in plant.inputs):
@@ -343,7 +343,7 @@ def returned_expression(function: Equation, names: Mapping[str, str]) -> ast.exp
     """Return the expression of a function with its earlier assignments put in; None when it branches or loops."""
     try:
         body = definition_of(function).body
-    except ArmidError:
+    except ModelError:
         return None
     known: dict[str, ast.expr] = {a: ast.Name(name) for a, name in names.items()}
     for statement in body:
@@ -359,20 +359,20 @@ def definition_of(function: Equation) -> ast.FunctionDef:
     """Return the definition, bare of docstring, decorators and annotations; a lambda becomes one `return`."""
     label = getattr(function, "__qualname__", repr(function))
     if not isinstance(function, FunctionType):
-        raise ArmidError(f"the equation {label} is no plain Python function: write it as a def")
+        raise ModelError(f"the equation {label} is no plain Python function: write it as a def")
     try:
         # a comment may stand further out than what it stands in
         source = textwrap.dedent(re.sub(r"(?m)^\s*#.*\n", "", inspect.getsource(function)))
     except (OSError, TypeError) as error:
-        raise ArmidError(f"the source of the equation {label} cannot be read: define it in a file") from error
+        raise ModelError(f"the source of the equation {label} cannot be read: define it in a file") from error
     if function.__name__ == "<lambda>":
         return lambda_definition(function)
     tree = ast.parse(source).body[0]
     if not isinstance(tree, ast.FunctionDef):
-        raise ArmidError(f"the equation {label} is no plain Python function: write it as a def")
+        raise ModelError(f"the equation {label} is no plain Python function: write it as a def")
     body = [s for s in tree.body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
     if not any(isinstance(node, ast.Return) for statement in body for node in ast.walk(statement)):
-        raise ArmidError(f"the equation {label} returns nothing: a number is expected")
+        raise ModelError(f"the equation {label} returns nothing: a number is expected")
     return make_definition(tree.name, tree.args, body)
 
 
@@ -384,7 +384,7 @@ def lambda_definition(function: LambdaType) -> ast.FunctionDef:
     found = [n for n in nodes if isinstance(n, ast.Lambda) and is_code_of(n, function)]
     if not found:
         arguments = ", ".join(inspect.signature(function).parameters)
-        raise ArmidError(f"the source of a lambda with the arguments {arguments} cannot be found: write it as a def")
+        raise ModelError(f"the source of a lambda with the arguments {arguments} cannot be found: write it as a def")
     # The innermost: a lambda may stand inside another.
     innermost = max(found, key=lambda n: (n.lineno, n.col_offset))
     return make_definition("<lambda>", innermost.args, [ast.Return(innermost.body)])

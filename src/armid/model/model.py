@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, ModelError, caused_by, nearest
 from armid.model.effect import Effect, State
 from armid.model.graph import Graph, build_graph, equations_text
 from armid.model.parameter import Parameter, resolve
@@ -18,12 +18,13 @@ K = TypeVar("K")
 class Model:
     """Compose a plant with effects: `model + effect`, `model - "effect"`; `print(model)` shows the equations.
 
-    Raises ArmidError when an effect asks for an unknown name or port, or is added twice.
+    Raises ModelError when an effect asks for an unknown name or port, or is added twice.
     """
 
     plant: Plant
     effects: tuple[Effect, ...] = ()
 
+    @caused_by(ModelError)
     def __post_init__(self) -> None:
         names = [e.name for e in self.effects]
         for name in names:
@@ -34,6 +35,7 @@ class Model:
     def __add__(self, effect: Effect) -> "Model":
         return replace(self, effects=(*self.effects, effect))
 
+    @caused_by(ModelError)
     def __sub__(self, effect: Effect | str) -> "Model":
         name = effect if isinstance(effect, str) else effect.name
         names = [e.name for e in self.effects]
@@ -97,10 +99,11 @@ class Model:
         """Constants in which candidates that are simulated together may differ: the starts that a fit may estimate."""
         return list(dict.fromkeys(self.plant.start_constants.values()))
 
+    @caused_by(ModelError)
     def constant_values(self, given: Mapping[str, float]) -> list[float]:
         """Return all constants in order, the given ones replacing defaults.
 
-        Raises ArmidError for a constant that the plant does not have.
+        Raises ModelError for a constant that the plant does not have.
         """
         for name in given:
             if name not in self.constants:

@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ModelError, nearest
 
 
 def check_name(name: str, what: str) -> None:
     """Refuse a name that equations could not use."""
     if name == "time":
-        raise ArmidError(f"{what} 'time' cannot have this name: in the equations, time is the time [s]")
+        raise ModelError(f"{what} 'time' cannot have this name: in the equations, time is the time [s]")
     if not name.isidentifier() or keyword.iskeyword(name) or "__" in name or name != name.strip("_"):
-        raise ArmidError(f"{what} '{name}' is no usable name: letters, digits and single underscores are expected")
+        raise ModelError(f"{what} '{name}' is no usable name: letters, digits and single underscores are expected")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Parameter:
     def __post_init__(self) -> None:
         check_name(self.name, "parameter")
         if not self.low < self.high:
-            raise ArmidError(f"parameter '{self.name}' has low {self.low} and high {self.high}: low < high is expected")
+            raise ModelError(f"parameter '{self.name}' has low {self.low} and high {self.high}: low < high is expected")
 
 
 # By such a factor a value misses its declared range that was told in another unit: degrees, percent, MPa.
@@ -93,12 +93,12 @@ def powers_of(unit: str) -> dict[str, int] | None:
     if not re.search(r"effort|speed|inertia", unit):
         return None
     if not re.fullmatch(r"\w+(\^\d)?([*/]\w+(\^\d)?)*", unit):
-        raise ArmidError(f"unit '{unit}' is no product of scales: words joined by * and /, such as effort/speed^2, are "
+        raise ModelError(f"unit '{unit}' is no product of scales: words joined by * and /, such as effort/speed^2, are "
                          "expected")  # fmt: skip
     powers: dict[str, int] = {}
     for sign, word, power in re.findall(r"(^|[*/])(\w+)(?:\^(\d))?", unit):
         if word not in WORDS:
-            raise ArmidError(f"unit '{unit}' holds '{word}': {nearest(word, WORDS)}")
+            raise ModelError(f"unit '{unit}' holds '{word}': {nearest(word, WORDS)}")
         powers[word] = powers.get(word, 0) + (-1 if sign == "/" else 1) * int(power or 1)
     return powers
 

@@ -8,7 +8,7 @@ from inspect import signature
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ModelError, nearest
 from armid.model.effect import Equation, Guard, State
 from armid.model.parameter import Parameter, Scales, check_name
 from armid.units import COUNTS, SUFFIXES
@@ -104,7 +104,7 @@ class Input:
         as the campaign says.
     typical: smallest and largest usual value, between which `armid check` moves it; None: half the effort scale.
 
-    Raises ArmidError for another hold, and for a typical range that is none.
+    Raises ModelError for another hold, and for a typical range that is none.
     """
 
     name: str
@@ -118,9 +118,9 @@ class Input:
     def __post_init__(self) -> None:
         check_name(self.name, "input")
         if self.hold not in ("", "linear", "zero"):
-            raise ArmidError(f"input '{self.name}' has the hold '{self.hold}': 'linear', 'zero' or '' is expected")
+            raise ModelError(f"input '{self.name}' has the hold '{self.hold}': 'linear', 'zero' or '' is expected")
         if self.typical is not None and not self.typical[0] < self.typical[1]:
-            raise ArmidError(f"input '{self.name}' is typically {self.typical}: a smaller and a larger value are "
+            raise ModelError(f"input '{self.name}' is typically {self.typical}: a smaller and a larger value are "
                              "expected")  # fmt: skip
 
 
@@ -152,7 +152,7 @@ class Output:
     port: where effects of its sensor (bias, scale, lag) are added, a port that stands in the equation of the signal
         (recorded = angle + port); "" for none.
 
-    Raises ArmidError for another unit, and for a column without the end of the unit.
+    Raises ModelError for another unit, and for a column without the end of the unit.
     """
 
     name: str
@@ -164,11 +164,11 @@ class Output:
     def __post_init__(self) -> None:
         check_name(self.name, "output")
         if self.unit not in SUFFIXES:
-            raise ArmidError(f"output '{self.name}' has the unit '{self.unit}': {nearest(self.unit, SUFFIXES)}")
+            raise ModelError(f"output '{self.name}' has the unit '{self.unit}': {nearest(self.unit, SUFFIXES)}")
         for column in self.columns:
             if not any(column.endswith(f"_{end}") for end in unit_ends(self.unit)):
                 ends = " or ".join(f"_{end}" for end in unit_ends(self.unit))
-                raise ArmidError(f"output '{self.name}' has the column '{column}': a name that ends in {ends} is "
+                raise ModelError(f"output '{self.name}' has the column '{column}': a name that ends in {ends} is "
                                  "expected")  # fmt: skip
 
     @property
@@ -231,7 +231,7 @@ class Plant:
     variants: of a plant with one speed for its output, sibling plants for another unit of it.
     rough: parameters and constants that are known roughly: the equations take NAME (1 + NAME_error), that one a port.
 
-    Raises ArmidError for a name that is declared twice or that nobody declares.
+    Raises ModelError for a name that is declared twice or that nobody declares.
     """
 
     name: str
@@ -271,16 +271,16 @@ class Plant:
             check_name(name, "quantity, port or alias")
         twice = sorted({n for n in self.declared if self.declared.count(n) > 1})
         if twice:
-            raise ArmidError(f"plant '{self.name}' declares '{twice[0]}' twice: each name once is expected")
+            raise ModelError(f"plant '{self.name}' declares '{twice[0]}' twice: each name once is expected")
         for signal in (o.signal for o in self.outputs if o.signal in self.aliases):
             name = self.aliases[signal]
-            raise ArmidError(f"plant '{self.name}' records '{signal}', another name for '{name}': '{name}' is expected")
+            raise ModelError(f"plant '{self.name}' records '{signal}', another name for '{name}': '{name}' is expected")
         uses = [("records", o.signal, self.declared) for o in self.outputs]
         uses += [(f"records '{o.name}' through the port", o.port, [*self.ports]) for o in self.outputs if o.port]
         uses += [(f"has the alias '{a}' for", n, self.declared) for a, n in self.aliases.items()]
         for use, name, known in uses:
             if name not in known:
-                raise ArmidError(f"plant '{self.name}' {use} '{name}': {nearest(name, known)}")
+                raise ModelError(f"plant '{self.name}' {use} '{name}': {nearest(name, known)}")
 
     def _fill_outputs(self) -> None:
         """Bring `outputs`, `output` and `output_unit` together, whichever of them was given."""
@@ -291,11 +291,11 @@ class Plant:
             object.__setattr__(self, "outputs", (first,))
         names = [o.name for o in self.outputs]
         if first is None or len(set(names)) < len(names):
-            raise ArmidError(f"plant '{self.name}' records {', '.join(names) or 'nothing'}: at least one output, each "
+            raise ModelError(f"plant '{self.name}' records {', '.join(names) or 'nothing'}: at least one output, each "
                              "name once, is expected")  # fmt: skip
         given = (self.output or first.signal, self.output_unit or first.unit)
         if given != (first.signal, first.unit):
-            raise ArmidError(f"plant '{self.name}' declares outputs and the output '{given[0]}' in {given[1]}: one of "
+            raise ModelError(f"plant '{self.name}' declares outputs and the output '{given[0]}' in {given[1]}: one of "
                              f"them, or the first output '{first.signal}' in {first.unit}, is expected")  # fmt: skip
         object.__setattr__(self, "output", first.signal)
         object.__setattr__(self, "output_unit", first.unit)
@@ -342,9 +342,9 @@ class Plant:
     def for_unit(self, unit: str) -> "Plant":
         """Return the sibling whose recorded signal has the unit.
 
-        Raises ArmidError when no sibling has it.
+        Raises ModelError when no sibling has it.
         """
         siblings = {p.output_unit: p for p in (self, *self.variants)}
         if unit not in siblings:
-            raise ArmidError(f"plant '{self.name}' records {' or '.join(siblings)}, not {unit}")
+            raise ModelError(f"plant '{self.name}' records {' or '.join(siblings)}, not {unit}")
         return siblings[unit]

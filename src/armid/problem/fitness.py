@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armid.errors import ArmidError, nearest
-from armid.model import Array
+from armid.model import Array, Catalogue
 
 SERIES = ("measured", "simulated")
 OF_RECORD = ("interval", "noise")
@@ -267,4 +267,4 @@ _FITNESSES = (
             "rmse after dynamic time warping by at most 0.02 s (extra: armid[dtw])"),
 )  # fmt: skip
 
-FITNESS: dict[str, Fitness] = {fitness.name: fitness for fitness in _FITNESSES}
+FITNESS = Catalogue[Fitness]({fitness.name: fitness for fitness in _FITNESSES})

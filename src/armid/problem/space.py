@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ModelError, nearest
 from armid.model import Array, Model
 from armid.record import Override
 
@@ -50,22 +50,22 @@ class Space:
     def with_bounds(self, name: str, low: float, high: float) -> "Space":
         """Return the space with a parameter free between new bounds.
 
-        Raises ArmidError for an unknown name and for bounds that are no interval.
+        Raises ModelError for an unknown name and for bounds that are no interval.
         """
         at = np.arange(len(self.names)) == self.index(name)
         if not (np.isfinite([low, high]).all() and low < high):
-            raise ArmidError(f"bounds of '{name}' are {low:g} and {high:g}: finite numbers, low < high, are expected")
+            raise ModelError(f"bounds of '{name}' are {low:g} and {high:g}: finite numbers, low < high, are expected")
         fixed = np.where(at, np.nan, self.fixed)
         return replace(self, low=np.where(at, low, self.low), high=np.where(at, high, self.high), fixed=fixed)
 
     def with_fixed(self, name: str, value: float) -> "Space":
         """Return the space with a parameter fixed.
 
-        Raises ArmidError for an unknown name and for a value that is not finite.
+        Raises ModelError for an unknown name and for a value that is not finite.
         """
         at = np.arange(len(self.names)) == self.index(name)
         if not np.isfinite(value):
-            raise ArmidError(f"'{name}' is fixed at {value}: a finite number is expected")
+            raise ModelError(f"'{name}' is fixed at {value}: a finite number is expected")
         return replace(self, fixed=np.where(at, value, self.fixed))
 
     def only(self, names: Collection[str]) -> "Space":
@@ -76,9 +76,9 @@ class Space:
         return Space(named, units, self.low[kept], self.high[kept], self.fixed[kept])
 
     def index(self, name: str) -> int:
-        """Return the place of a parameter; refuse an unknown name with ArmidError."""
+        """Return the place of a parameter; refuse an unknown name with ModelError."""
         if name not in self.names:
-            raise ArmidError(f"parameter '{name}' is not in the model: {nearest(name, self.names)}")
+            raise ModelError(f"parameter '{name}' is not in the model: {nearest(name, self.names)}")
         return self.names.index(name)
 
 
@@ -105,7 +105,7 @@ def space_of(
 
     Raises
     ------
-    ArmidError
+    ModelError
         For a name that the model does not have, and for a parameter both bounded and fixed.
     """
     declared = [(p.low, p.high, np.nan if p.fixed is None else p.fixed) for p in model.parameters.values()]
@@ -123,7 +123,7 @@ def space_of(
             space = space.with_fixed(name, override.fixed)
     for name, (low, high) in (bounds or {}).items():
         if name in (fixed or {}):
-            raise ArmidError(f"parameter '{name}' is given both bounds and a fixed value: one of them is expected")
+            raise ModelError(f"parameter '{name}' is given both bounds and a fixed value: one of them is expected")
         space = space.with_bounds(name, low, high)
     for name, value in (fixed or {}).items():
         space = space.with_fixed(name, value)

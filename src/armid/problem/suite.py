@@ -176,6 +176,10 @@ class Suite(Sequence["SuiteProblem"]):
     units: str = "box"
     measured: Mapping[str, Campaign] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        problems = ", ".join(dict.fromkeys(name for name, _ in self.keys))
+        return f"<Suite of {len(self)} problems, NAME/INSTANCE: {problems}>"
+
     def __len__(self) -> int:
         return len(self.keys)
 

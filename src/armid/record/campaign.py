@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armid.errors import ArmidError, nearest, quoted
+from armid.errors import ArmidError, DataError, caused_by, nearest, quoted
 from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, fitting_form
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
@@ -104,25 +104,28 @@ class Campaign(Shown):
         """Unit of the first output that was measured, of a speed "rad/s" or "m/s"."""
         return self.plant.output_unit
 
-    def model(self, effects: Mapping[str, Effect] = EFFECTS) -> Model:
-        """Return the declared model, the plant with the effects of the campaign; effects: name -> those known.
+    def model(self, effects: Mapping[str, Effect] | None = None) -> Model:
+        """Return the declared model, the plant with the effects of the campaign; effects: name -> those known,
+        None: armid.EFFECTS.
 
-        Raises ArmidError where they do not compose.
+        Raises ModelError where they do not compose.
         """
-        known = {**sensor_effects(self.declared), **effects}
+        known = {**sensor_effects(self.declared), **(EFFECTS if effects is None else effects)}
         return Model(self.plant, tuple(fitting_form(known[name], self.plant) for name in self.effects))
 
+    @caused_by(DataError)
     def with_window(self, begin: float, end: float) -> "Campaign":
         """Return the campaign with one window [s] for every record, whatever its file says; both ends count.
 
-        Raises ArmidError for a window that is empty, runs backward, or holds fewer than 20 samples of a record.
+        Raises DataError for a window that is empty, runs backward, or holds fewer than 20 samples of a record.
         """
         records = (with_window(r, (begin, end), f"window {begin:g}:{end:g}") for r in self.records)
         return replace(self, records=tuple(records))
 
 
+@caused_by(DataError)
 def read_campaign(
-    path: str | Path, plants: Mapping[str, Plant] = PLANTS, effects: Mapping[str, Effect] = EFFECTS
+    path: str | Path, plants: Mapping[str, Plant] | None = None, effects: Mapping[str, Effect] | None = None
 ) -> Campaign:
     """Read a campaign: a folder with campaign.toml and one CSV file a record, or that campaign.toml.
 
@@ -130,8 +133,8 @@ def read_campaign(
     ----------
     path : str or Path
         The folder or the file.
-    plants, effects : Mapping
-        Name -> those that the file may name.
+    plants, effects : Mapping, optional
+        Name -> those that the file may name; None: armid.PLANTS and armid.EFFECTS.
 
     Returns
     -------
@@ -145,9 +148,10 @@ def read_campaign(
 
     Raises
     ------
-    ArmidError
+    DataError
         One sentence (file, line or key, found, expected) for whatever cannot be used.
     """
+    plants = PLANTS if plants is None else plants
     toml = campaign_path(path)
     above = toml.parent.name or toml.parent.resolve().name
     # what messages put before the files of the campaign: c00/
@@ -156,7 +160,7 @@ def read_campaign(
     sheet = validated(CampaignSheet, load_toml(toml, where), where)
     if sheet.plant not in plants:
         raise unknown_name("plant", sheet.plant, plants, where)
-    effects = {**sensor_effects(plants[sheet.plant]), **effects}
+    effects = {**sensor_effects(plants[sheet.plant]), **(EFFECTS if effects is None else effects)}
     for i, name in enumerate(sheet.effects):
         if name not in effects:
             raise unknown_name("effect", name, effects, where)
@@ -210,6 +214,7 @@ def read_campaign(
     )  # fmt: skip
 
 
+@caused_by(DataError)
 def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Mapping[str, Array]]) -> Path:
     """Write campaign.toml and its CSV files, whole or not at all.
 
@@ -229,7 +234,7 @@ def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Map
 
     Raises
     ------
-    ArmidError
+    DataError
         The folder holds something already, or cannot be written.
     """
     folder = Path(out)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from armid.errors import ArmidError, nearest, quoted
+from armid.errors import DataError, nearest, quoted
 from armid.model import Array
 from armid.record.campaign import write_campaign
 from armid.record.table import read_table
@@ -89,7 +89,7 @@ def import_emps(folder: str | Path | None, out: str | Path) -> Path:
     (gain, _), (other, _) = measured.values()
     train, holdout = EMPS_FILES
     if other != gain:
-        raise ArmidError(f"{holdout}.mat: gtau is {other:g}, {gain:g} is expected as in {train}.mat")
+        raise DataError(f"{holdout}.mat: gtau is {other:g}, {gain:g} is expected as in {train}.mat")
     text = EMPS_CAMPAIGN.format(order=FILTER_ORDER, cutoff=CUTOFF_HZ, gain=gain, train=train, holdout=holdout)
     return write_campaign(out, text, {f"{name}.csv": columns for name, (_, columns) in measured.items()})
 
@@ -101,29 +101,29 @@ def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
     from scipy.io.matlab import MatReadError
 
     if not path.is_file():
-        raise ArmidError(f"{quoted(str(path))} does not exist, the file {path.name} of the EMPS set is expected")
+        raise DataError(f"{quoted(str(path))} does not exist, the file {path.name} of the EMPS set is expected")
     damaged = (ValueError, TypeError, KeyError, IndexError, EOFError, OverflowError, NotImplementedError, OSError,
                MatReadError, zlib.error, struct.error)  # fmt: skip
     try:
         variables: dict[str, Any] = loadmat(path)
     except damaged as error:
-        raise ArmidError(f"{path.name} is no readable MATLAB file: {quoted(str(error))}") from error
+        raise DataError(f"{path.name} is no readable MATLAB file: {quoted(str(error))}") from error
     for name in EMPS_VARIABLES:
         if name not in variables:
-            raise ArmidError(f"{path.name}: variable '{name}' is missing, {', '.join(EMPS_VARIABLES)} are expected")
+            raise DataError(f"{path.name}: variable '{name}' is missing, {', '.join(EMPS_VARIABLES)} are expected")
     series = []
     for name in EMPS_VARIABLES:
         values = np.asarray(variables[name])
         if values.dtype.kind not in "iuf" or not np.all(np.isfinite(values)):
-            raise ArmidError(f"{path.name}: variable '{name}' holds no plain finite numbers, which are expected")
+            raise DataError(f"{path.name}: variable '{name}' holds no plain finite numbers, which are expected")
         series.append(values.astype(np.float64).ravel())
     times, position, drive, gain = series
     if gain.size != 1 or not times.size == position.size == drive.size >= 100:
-        raise ArmidError(f"{path.name}: t, qm, vir, gtau hold {times.size}, {position.size}, {drive.size}, {gain.size} "
+        raise DataError(f"{path.name}: t, qm, vir, gtau hold {times.size}, {position.size}, {drive.size}, {gain.size} "
                          "numbers, three series of one length from 100 on and one number are expected")  # fmt: skip
     intervals = np.diff(times)
     if not 0 < np.max(intervals) < min(1.01 * float(np.min(intervals)), 0.4 / CUTOFF_HZ):
-        raise ArmidError(f"{path.name}: the intervals of t run from {np.min(intervals):.6g} to {np.max(intervals):.6g} "
+        raise DataError(f"{path.name}: the intervals of t run from {np.min(intervals):.6g} to {np.max(intervals):.6g} "
                          f"s, even ones below {0.4 / CUTOFF_HZ:g} s are expected")  # fmt: skip
     velocity = velocity_of(position, float(times[-1] - times[0]) / (times.size - 1))
     return float(gain[0]), {"time_s": times, "velocity_m_s": velocity, "drive_V": drive, "position_m": position}
@@ -148,12 +148,12 @@ def downloaded_folder() -> Path:
     try:
         package = import_module("nonlinear_benchmarks")
     except ImportError as error:
-        raise ArmidError("the package nonlinear_benchmarks is missing: install armid[measured], or name the folder "
+        raise DataError("the package nonlinear_benchmarks is missing: install armid[measured], or name the folder "
                          f"with {train}.mat") from error  # fmt: skip
     try:
         files = package.EMPS(data_file_locations=True)
     except (OSError, ValueError, RuntimeError, zlib.error, zipfile.BadZipFile) as error:
-        raise ArmidError(f"the EMPS set could not be downloaded: {quoted(str(error))}; name the folder with "
+        raise DataError(f"the EMPS set could not be downloaded: {quoted(str(error))}; name the folder with "
                          f"{train}.mat instead") from error  # fmt: skip
     return Path(files[0]).parent
 
@@ -167,7 +167,7 @@ def import_dfki(folder: str | Path, out: str | Path, holdout: str | None = None)
     gear^2 J_rotor. folder: where ddp_measured.csv and direct_collocation_measured.csv are. holdout: None: both train.
     """
     if holdout is not None and holdout not in DFKI_RECORDS:
-        raise ArmidError(f"--holdout '{holdout}' is no record of the set, {nearest(holdout, DFKI_RECORDS)}")
+        raise DataError(f"holdout '{holdout}' is no record of the set, {nearest(holdout, DFKI_RECORDS)}")
     tables = {f"{name}.csv": read_dfki(Path(folder), f"{name}_measured.csv") for name in DFKI_RECORDS}
     mass_moment, reflected = (POINT_MASS + ROD_MASS / 2) * LENGTH, ROTOR_INERTIA * GEAR**2
     text = DFKI_CAMPAIGN.format(
@@ -184,7 +184,7 @@ def import_dfki(folder: str | Path, out: str | Path, holdout: str | None = None)
 def read_dfki(folder: Path, file: str) -> dict[str, Array]:
     path = folder / file
     if not path.is_file():
-        raise ArmidError(f"{folder}: {file} does not exist there, the folder results/ of the set, or its files in one "
+        raise DataError(f"{folder}: {file} does not exist there, the folder results/ of the set, or its files in one "
                          "folder, is expected")  # fmt: skip
     columns = read_columns(path, file, DFKI_COLUMNS)
     return {header: columns[name] for name, header in DFKI_COLUMNS.items()}
@@ -195,5 +195,5 @@ def read_columns(path: Path, file: str, names: Collection[str]) -> dict[str, Arr
     columns = read_table(path, file).columns
     for name in names:
         if name not in columns:
-            raise ArmidError(f"{file}, line 1: column '{name}' is missing, {', '.join(names)} are expected")
+            raise DataError(f"{file}, line 1: column '{name}' is missing, {', '.join(names)} are expected")
     return {name: columns[name] for name in names}

@@ -247,7 +247,7 @@ def key_value(key: ManoeuvreKey, value: object, where: str) -> float:
             return float(value)
         raise ArmidError(f"{where}: key '{key.key}' is {quoted(value)}, true or false is expected")
     try:
-        return key.factor * number(value)
+        return float(key.factor * number(value))
     except KindError as error:
         raise ArmidError(f"{where}: key '{key.key}' is {quoted(value)}, a finite number is expected") from error
 

@@ -1,24 +1,26 @@
 """The kinds of values in a TOML file, and the shape of campaign.toml: which keys there are and of what kind.
 
-A kind is a function that returns a value as it is wanted, or raises KindError. These few stand here in place of a
-library, whose import alone would take a tenth of the time in which the program starts.
+A kind reads a value and knows its JSON Schema, so that readers and editors hold a file to the same definitions. These
+few stand here in place of a library, whose import alone would take a tenth of the time in which the program starts.
 """
 
 import tomllib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field, fields
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from armid.errors import ArmidError, nearest, quoted
+from armid.model import ManoeuvreKey
 from armid.record.table import LARGEST
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-
-Kind = Callable[[object], Any]
+# What editors understand (taplo, Even Better TOML).
+DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 class KindError(Exception):
@@ -29,6 +31,26 @@ class KindError(Exception):
         self.found, self.path = found, path
 
 
+@dataclass(frozen=True)
+class Kind:
+    """Declare a kind of values.
+
+    read: returns a value as it is wanted, or raises KindError. schema: the same kind as JSON Schema has it.
+    """
+
+    read: Callable[[object], Any]
+    schema: Mapping[str, Any]
+
+    def __call__(self, value: object) -> Any:
+        """Return a value as it is wanted, or raise KindError."""
+        return self.read(value)
+
+
+def kind(**schema: Any) -> Callable[[Callable[[object], Any]], Kind]:
+    """Make a function that reads a value a Kind; schema: the keywords of JSON Schema."""
+    return lambda read: Kind(read, schema)
+
+
 def part(kind: Kind, value: object, path: str) -> Any:
     try:
         return kind(value)
@@ -36,6 +58,7 @@ def part(kind: Kind, value: object, path: str) -> Any:
         raise KindError(error.found, path + error.path) from None
 
 
+@kind(type="number")
 def number(value: object) -> float:
     # in Python a bool is an int too
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST:
@@ -43,33 +66,43 @@ def number(value: object) -> float:
     raise KindError(value)
 
 
+@kind(type="string")
 def any_text(value: object) -> str:
     if isinstance(value, str):
         return value
     raise KindError(value)
 
 
-def tested(kind: Kind, test: Callable[[Any], bool]) -> Kind:
+def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
+    """Return a kind of fewer values; schema: how JSON Schema says the test, nothing where it cannot."""
+
     def both(value: object) -> Any:
         if test(kind(value)):
             return kind(value)
         raise KindError(value)
 
-    return both
+    return Kind(both, {**kind.schema, **schema})
 
 
-above_zero = tested(number, lambda value: value > 0.0)
-share = tested(number, lambda value: 0.0 <= value < 1.0)
-probability = tested(number, lambda value: 0.0 < value < 1.0)
-text = tested(any_text, bool)
+above_zero = tested(number, lambda value: value > 0.0, exclusiveMinimum=0)
+share = tested(number, lambda value: 0.0 <= value < 1.0, minimum=0, exclusiveMaximum=1)
+probability = tested(number, lambda value: 0.0 < value < 1.0, exclusiveMinimum=0, exclusiveMaximum=1)
+text = tested(any_text, bool, minLength=1)
 
 
+def name_in(catalogue: str) -> Kind:
+    """Return the kind of names of a catalogue; JSON Schema offers those that are registered and takes others."""
+    return Kind(text.read, {**text.schema, REGISTERED: catalogue})
+
+
+@kind(type="boolean")
 def boolean(value: object) -> bool:
     if isinstance(value, bool):
         return value
     raise KindError(value)
 
 
+@kind(type="object")
 def any_table(value: object) -> dict[str, Any]:
     if isinstance(value, dict):
         return value
@@ -77,37 +110,100 @@ def any_table(value: object) -> dict[str, Any]:
 
 
 def one_of(*words: str) -> Kind:
-    return tested(text, lambda word: word in words)
+    return tested(text, lambda word: word in words, enum=list(words))
 
 
 def table_of(inner: Kind) -> Kind:
-    return lambda value: {name: part(inner, v, f".{name}") for name, v in any_table(value).items()}
+    def read(value: object) -> dict[str, Any]:
+        return {name: part(inner, v, f".{name}") for name, v in any_table(value).items()}
+
+    return Kind(read, {"type": "object", "additionalProperties": inner.schema})
 
 
 def one_kind(*kinds: Kind) -> Kind:
     """Return the kind of what is of the first of several kinds that fits."""
 
-    def kind(value: object) -> Any:
+    def read(value: object) -> Any:
         for each in kinds[:-1]:
             with suppress(KindError):
                 return each(value)
         return kinds[-1](value)
 
-    return kind
+    return Kind(read, {"anyOf": [each.schema for each in kinds]})
 
 
-def list_of(inner: Kind, shortest: int = 0, longest: float = float("inf")) -> Kind:
-    def kind(value: object) -> tuple[Any, ...]:
+def list_of(inner: Kind, shortest: int = 0, longest: float = inf) -> Kind:
+    def read(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list) or not shortest <= len(value) <= longest:
             raise KindError(value)
         return tuple(part(inner, v, f".{i}") for i, v in enumerate(value))
 
-    return kind
+    most = {"maxItems": longest} if longest < inf else {}
+    return Kind(read, {"type": "array", "items": inner.schema, "minItems": shortest, **most})
 
 
-def key(kind: Kind, expected: str) -> dict[str, Any]:
-    """Return what a field of a sheet carries: its kind, and that kind in words."""
-    return {"kind": kind, "expected": expected}
+def key(kind: Kind, expected: str, meaning: str) -> dict[str, Any]:
+    """Return what a field of a sheet carries: its kind, that kind in words, and what the value means."""
+    return {"kind": kind, "expected": expected, "meaning": meaning}
+
+
+# Keywords of a schema that `json_schema` replaces: names of a catalogue, and keys that the plants declare.
+REGISTERED, OF_PLANTS = "x-registered", "x-of-plants"
+
+
+def table_for(sheet: "type[DataclassInstance]") -> Kind:
+    """Return the kind of tables that a sheet declares; `validated` looks into each of them later."""
+    return Kind(any_table.read, sheet_schema(sheet))
+
+
+def sheet_schema(sheet: "type[DataclassInstance]") -> dict[str, Any]:
+    """Return the JSON Schema of the tables that a sheet declares, made of the kinds of its fields."""
+    declared = {f.name: f for f in fields(sheet) if f.metadata}
+    properties = {}
+    for name, f in declared.items():
+        text = f"{f.metadata['meaning']} Expected: {f.metadata['expected']}."
+        properties[name] = {**f.metadata["kind"].schema, "description": text}
+        if isinstance(f.default, str | bool | int | float) and f.default != "":
+            properties[name]["default"] = f.default
+    required = [name for name, f in declared.items() if is_required(f)]
+    open_to = {} if len(declared) == len(fields(sheet)) else {OF_PLANTS: True}
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False, **open_to}
+
+
+def is_required(f: "Field[Any]") -> bool:
+    return f.default is MISSING and f.default_factory is MISSING
+
+
+def key_schema(key: ManoeuvreKey) -> dict[str, Any]:
+    """Return the JSON Schema of a key that a plant declares."""
+    if key.boolean:
+        limits: dict[str, Any] = {"type": "boolean"}
+    else:
+        ends = (("minimum", key.low), ("maximum", key.high))
+        limits = {"type": "number"} | {name: end for name, end in ends if end is not None}
+    return {**limits, "description": f"Sets the constant {key.constant} of the plant."}
+
+
+def json_schema(
+    schema: Any, registered: Mapping[str, Iterable[str]], keys: Mapping[str, Any], draft: str = DRAFT
+) -> Any:
+    """Return a schema that editors take: registered names are offered, and tables of a plant have its keys.
+
+    registered: catalogue -> its names. keys: key of a plant -> its schema.
+    """
+    if isinstance(schema, list):
+        return [json_schema(each, registered, keys, "") for each in schema]
+    if not isinstance(schema, Mapping):
+        return schema
+    whole: dict[str, Any] = {"$schema": draft} if draft else {}
+    for name, inner in schema.items():
+        if name == REGISTERED:
+            whole["anyOf"] = [{"enum": sorted(registered[inner])}, {}]
+        elif name != OF_PLANTS:
+            whole[name] = json_schema(inner, registered, keys, "")
+    if OF_PLANTS in schema:
+        whole["properties"] |= keys
+    return whole
 
 
 # Bytes of a file: tables that are nested 8 deep take 350 times as much memory.
@@ -117,72 +213,100 @@ LARGEST_TOML = 2_000_000
 MOST_SQUARED_DOTS = 10_000_000
 # Records are held in memory, one by one.
 MOST_RECORDS = 10_000
-HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'")
-CONSTANTS = key(table_of(number), "a finite number in SI")
-TOLERANCES = key(table_of(share), "a share from 0 to below 1")
-PRIORS = key(
-    table_of(one_kind(probability, any_table)),
-    "the probability of an effect, between 0 and 1, or { mean, sd } of a parameter or constant, SI",
-)
-LOST = key(share, "a share from 0 to below 1")
-INPUTS = key(table_of(text), "the name of a column")
-BOUND = key(number, "a finite number in SI")
-WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds")
-RECORDS = key(list_of(any_table, 1, MOST_RECORDS), f"1 to {MOST_RECORDS:,} tables headed [[records]]")
-PARAMETERS = key(table_of(any_table), "a table of low, high, fixed")
+HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'", "How an input runs between its samples.")
+CONSTANTS = key(table_of(number), "a finite number in SI", "Constants of the plant, by name.")
+TOLERANCES = key(
+    table_of(share), "a share from 0 to below 1",
+    "How well a constant is known, as a share of its value; `default` holds for those that are not named.",
+)  # fmt: skip
+LOST = key(share, "a share from 0 to below 1", "Share of a record that may be invalid: clipped, frozen or wild.")
+INPUTS = key(table_of(text), "the name of a column", "Which column of the CSV file brings an input of the plant.")
+WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds", "Part of the record that fitness and errors see.")
+EFFECTS = key(list_of(name_in("effects")), "a list of names of effects", "Effects that the model has beside the plant.")
+PLANT = key(name_in("plants"), "the name of a plant", "The declared machine; `armid list plants` shows them.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordSheet:
     """Declare a [[records]] entry; `keys` holds those of the plant, still as they were found."""
 
-    file: str = field(metadata=key(text, "the name of a CSV file in the campaign's folder"))
-    role: str = field(metadata=key(one_of("train", "holdout"), "'train' or 'holdout'"))
+    file: str = field(metadata=key(text, "the name of a CSV file in the campaign's folder", "The measured signals."))
+    role: str = field(metadata=key(
+        one_of("train", "holdout"), "'train' or 'holdout'",
+        "Whether parameters are searched on this record, or it judges the result.",
+    ))  # fmt: skip
     constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
     window_s: tuple[float, float] | None = field(default=None, metadata=WINDOW)
-    restart_s: float | None = field(default=None, metadata=key(above_zero, "a length in seconds above 0"))
-    repeat_of: str | None = field(default=None, metadata=key(text, "the file of another record"))
+    restart_s: float | None = field(default=None, metadata=key(
+        above_zero, "a length in seconds above 0",
+        "Simulate pieces of this length, each from the measured state, where a longer motion cannot be followed.",
+    ))  # fmt: skip
+    repeat_of: str | None = field(
+        default=None, metadata=key(text, "the file of another record", "The record whose manoeuvre this one repeats.")
+    )
     hold: str | None = field(default=None, metadata=HOLD)
     most_lost: float | None = field(default=None, metadata=LOST)
     keys: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
-class CampaignSheet:
-    """Declare campaign.toml; records and parameters are looked into one by one."""
-
-    name: str = field(metadata=key(text, "a text"))
-    plant: str = field(metadata=key(text, "the name of a plant"))
-    records: tuple[dict[str, Any], ...] = field(metadata=RECORDS)
-    effects: tuple[str, ...] = field(default=(), metadata=key(list_of(text), "a list of names of effects"))
-    gyro_range_deg_s: float | None = field(default=None, metadata=key(above_zero, "a range in deg/s above 0"))
-    parameters: Mapping[str, dict[str, Any]] = field(default_factory=dict, metadata=PARAMETERS)
-    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
-    tolerances: Mapping[str, float] = field(default_factory=dict, metadata=TOLERANCES)
-    priors: Mapping[str, Any] = field(default_factory=dict, metadata=PRIORS)
-    inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
-    hold: str = field(default="linear", metadata=HOLD)
-    most_lost: float = field(default=0.05, metadata=LOST)
-    unwrap: bool = field(default=False, metadata=key(boolean, "true or false"))
-    counts_per_turn: float | None = field(default=None, metadata=key(above_zero, "counts of the encoder above 0"))
-
-
-@dataclass(frozen=True, kw_only=True)
 class Override:
     """Declare a [parameters.NAME] table: what replaces the parameter's declaration, SI; None leaves it as it is."""
 
-    low: float | None = field(default=None, metadata=BOUND)
-    high: float | None = field(default=None, metadata=BOUND)
-    fixed: float | None = field(default=None, metadata=BOUND)
+    low: float | None = field(default=None, metadata=key(number, "a finite number in SI", "Lower bound of the search."))
+    high: float | None = field(
+        default=None, metadata=key(number, "a finite number in SI", "Upper bound of the search.")
+    )
+    fixed: float | None = field(
+        default=None, metadata=key(number, "a finite number in SI", "Value of a parameter that is not searched.")
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Known:
     """Declare what is known of a value before the records: a normal distribution, SI."""
 
-    mean: float = field(metadata=BOUND)
-    sd: float = field(metadata=key(above_zero, "a standard deviation above 0, SI"))
+    mean: float = field(metadata=key(number, "a finite number in SI", "Mean of the normal distribution."))
+    sd: float = field(metadata=key(above_zero, "a standard deviation above 0, SI", "Its standard deviation."))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignSheet:
+    """Declare campaign.toml; records, parameters and priors are looked into one by one."""
+
+    name: str = field(metadata=key(text, "a text", "The name of the campaign on its pages."))
+    plant: str = field(metadata=PLANT)
+    records: tuple[dict[str, Any], ...] = field(metadata=key(
+        list_of(table_for(RecordSheet), 1, MOST_RECORDS), f"1 to {MOST_RECORDS:,} tables headed [[records]]",
+        "One table for each CSV file.",
+    ))  # fmt: skip
+    effects: tuple[str, ...] = field(default=(), metadata=EFFECTS)
+    gyro_range_deg_s: float | None = field(
+        default=None,
+        metadata=key(above_zero, "a range in deg/s above 0", "Range of the gyro; speeds beyond it are cut off."),
+    )
+    parameters: Mapping[str, dict[str, Any]] = field(default_factory=dict, metadata=key(
+        Kind(table_of(any_table).read, table_of(one_kind(table_for(Override), table_of(table_for(Override)))).schema),
+        "a table of low, high, fixed", "What replaces the declaration of a parameter, SI.",
+    ))  # fmt: skip
+    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
+    tolerances: Mapping[str, float] = field(default_factory=dict, metadata=TOLERANCES)
+    priors: Mapping[str, Any] = field(default_factory=dict, metadata=key(
+        table_of(one_kind(probability, table_for(Known))),
+        "the probability of an effect, between 0 and 1, or { mean, sd } of a parameter or constant, SI",
+        "What is known before the records.",
+    ))  # fmt: skip
+    inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
+    hold: str = field(default="linear", metadata=HOLD)
+    most_lost: float = field(default=0.05, metadata=LOST)
+    unwrap: bool = field(
+        default=False, metadata=key(boolean, "true or false", "Take jumps by a whole turn out of angles that wrap.")
+    )
+    counts_per_turn: float | None = field(default=None, metadata=key(
+        above_zero, "counts of the encoder above 0",
+        "Counts of a turn, where a header ends in _counts or _counts_s.",
+    ))  # fmt: skip
 
 
 SheetT = TypeVar("SheetT", bound="DataclassInstance")
@@ -206,7 +330,7 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
             except KindError as error:
                 raise ArmidError(f"{where}: key {quoted(error.path)} is {quoted(error.found)}, {expected} is "
                                  "expected") from error  # fmt: skip
-        elif f.default is MISSING and f.default_factory is MISSING:
+        elif is_required(f):
             raise ArmidError(f"{where}: key '{f.name}' is missing, {expected} is expected")
     if further:
         values["keys"] = {name: table[name] for name in further if name in table}
@@ -245,3 +369,20 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
     except ValueError as error:
         # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
         raise ArmidError(f"{where} is no valid TOML: {str(error)[:200]}") from error
+
+
+def toml(value: Any) -> str:
+    """Return a value as TOML has it on one line."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    plain = getattr(value, "item", lambda: value)()  # numpy's numbers have it
+    text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
+    if isinstance(value, str):
+        text = '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    try:
+        tomllib.loads(f"x = {text}")
+    except tomllib.TOMLDecodeError as error:
+        raise ArmidError(f"{text} cannot stand in a campaign: a text, a number, true or false is expected") from error
+    return text

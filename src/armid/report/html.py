@@ -42,10 +42,10 @@ def html(document: Document, stored: Mapping[str, str] | None = None) -> str:
 
 
 def fragment(document: Document) -> str:
-    """Return the answer and the first table of a document as HTML, for a notebook."""
+    """Return the answer and the first table of a document as HTML, for a notebook, where no script sorts."""
     parts: Any = templates().get_template("parts.html").module
     said = Markup("").join(Markup("<p>{}</p>").format(sentence) for sentence in document.said)
-    return str(said + Markup("").join(parts.of(table, "", True) for table in document.main_tables[:1]))
+    return str(said + Markup("").join(parts.of(table, "", True, True) for table in document.main_tables[:1]))
 
 
 def templates() -> Any:

@@ -125,11 +125,13 @@ class Result(Shown):
 
     def plot(self, name: str = "") -> Any:
         """Draw one figure and return it, matplotlib's. name: which, "" for the first."""
+        from armid.report.style import detached
+
         figures = self.parts.figures
         if name and name not in figures:
             raise ArmidError(f"there is no figure '{name}': {', '.join(figures)} are known")
         with angles_in(self.campaign.angle):
-            return figures[name or next(iter(figures))]()
+            return detached(figures[name or next(iter(figures))]())
 
     def save(self, folder: str | Path, made_by: Mapping[str, Any] | None = None) -> list[str]:
         """Write JSON, figures, page and Markdown to a folder, all or none, and return their names.
@@ -233,7 +235,7 @@ class NewFiles:
 
     def __enter__(self) -> "NewFiles":
         if self.folder.exists() and not self.folder.is_dir():
-            raise ArmidError(f"--out {self.folder} is a file: a folder is expected")
+            raise ArmidError(f"{self.folder} is a file: a folder is expected")
         self._is_new = not self.folder.exists()
         self.folder.mkdir(parents=True, exist_ok=True)
         sweep(self.folder)
@@ -246,7 +248,7 @@ class NewFiles:
 
     def path(self, name: str) -> Path:
         if (self.folder / name).is_dir():
-            raise ArmidError(f"--out {self.folder} holds a folder {name}: a place for a file of that name is expected")
+            raise ArmidError(f"{self.folder} holds a folder {name}: a place for a file of that name is expected")
         self.names.append(name)
         path = self.place / name
         path.parent.mkdir(parents=True, exist_ok=True)

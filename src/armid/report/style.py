@@ -58,6 +58,12 @@ def pyplot() -> Any:
     return plt
 
 
+def detached(figure: Any) -> Any:
+    """Return a figure that pyplot has forgotten: a notebook shows what a cell returns, and not once more."""
+    pyplot().close(figure)
+    return figure
+
+
 def look(i: int) -> dict[str, Any]:
     return {"color": COLOURS[i % len(COLOURS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)]}
 

@@ -86,7 +86,7 @@ def cases_of(spec: StudySpec, model: Model, registry: StudyRegistry, folder: Pat
         if count > 1:
             raise ArmidError(f"{where}: case '{name}' is there twice, each name once is expected")
         if "/" in name:
-            raise ArmidError(f"{where}: the name of case '{name}' holds '/', which --only needs between case and "
+            raise ArmidError(f"{where}: the name of case '{name}' holds '/', which stands between case and "
                              "identifier, another sign is expected")  # fmt: skip
     return tuple(cases)
 

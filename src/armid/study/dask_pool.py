@@ -60,7 +60,7 @@ def _connected(address: str) -> Any:
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
-        raise ArmidError("--dask needs the package distributed: pip install 'armid[cluster]'") from error
+        raise ArmidError("a Dask cluster needs the package distributed: pip install 'armid[cluster]'") from error
     # a lost connection ends in one sentence; each task of the library would log a traceback first
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:

@@ -154,7 +154,7 @@ def made_section(results: StudyResults, again: str) -> Section:
     study = results.study
     plugins = [word for name in study.get("plugins", ()) for word in ("--plugin", str(name))]
     run = shlex.join(["armid", "study", str(study.get("file", f"{study['name']}.toml")), *plugins])
-    commands = (Line(run), Line(again or f"armid report out/{study['name']}"))
+    commands = (Line(str(study.get("command") or run)), Line(again or f"armid report out/{study['name']}"))
     parts: list[Part] = [Listing("Commands; the study's file is below", commands),
                          listing(f"{study['name']}.toml", str(study["text"]), folded=True)]  # fmt: skip
     hashes = [h for h in dict.fromkeys(results.runs["model"]) if isinstance(h, str)]

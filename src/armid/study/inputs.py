@@ -15,19 +15,21 @@ from armid.errors import ArmidError, nearest
 from armid.model import Array, Plant
 from armid.record.schema import above_zero, key, number, text, unknown_name, validated
 from armid.record.table import read_table, time_column
-from armid.study.spec import count, whole_number
+from armid.study.spec import any_whole, count
 
-ABOVE = key(above_zero, "a number above 0")
-ANY = key(number, "a number")
+ABOVE = "a number above 0"
+SEED = key(any_whole, "a whole number of at least 0", "Seed of what is drawn.")
+FROM_HZ = key(above_zero, ABOVE, "First frequency [Hz].")
+TO_HZ = key(above_zero, ABOVE, "Last frequency [Hz].")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signal:
     """What all signals that are made have in common; a subclass makes `unit_values`, of a size of 1."""
 
-    kind: str = field(metadata=key(text, "the name of a signal"))
-    amplitude: float = field(metadata=ABOVE)
-    offset: float = field(default=0.0, metadata=ANY)
+    kind: str = field(metadata=key(text, "the name of a signal", "chirp, multisine, steps or prbs."))
+    amplitude: float = field(metadata=key(above_zero, ABOVE, "Largest distance from the offset."))
+    offset: float = field(default=0.0, metadata=key(number, "a number", "Middle of the signal."))
 
     def unit_values(self, times: Array) -> Array:
         raise NotImplementedError
@@ -41,8 +43,8 @@ class Signal:
 class Chirp(Signal):
     """A sine whose frequency rises or falls evenly over the whole length."""
 
-    from_hz: float = field(metadata=ABOVE)
-    to_hz: float = field(metadata=ABOVE)
+    from_hz: float = field(metadata=FROM_HZ)
+    to_hz: float = field(metadata=TO_HZ)
 
     def unit_values(self, times: Array) -> Array:
         from scipy.signal import chirp
@@ -54,10 +56,10 @@ class Chirp(Signal):
 class Multisine(Signal):
     """A sum of sines of evenly spaced frequencies and drawn phases, its largest value 1."""
 
-    from_hz: float = field(metadata=ABOVE)
-    to_hz: float = field(metadata=ABOVE)
-    n: int = field(default=10, metadata=key(count, "a whole number above 0"))
-    seed: int = field(default=1, metadata=key(whole_number, "a whole number of at least 0"))
+    from_hz: float = field(metadata=FROM_HZ)
+    to_hz: float = field(metadata=TO_HZ)
+    n: int = field(default=10, metadata=key(count, "a whole number above 0", "Number of sines."))
+    seed: int = field(default=1, metadata=SEED)
 
     def unit_values(self, times: Array) -> Array:
         phases = 2.0 * np.pi * np.random.default_rng(self.seed).random(self.n)
@@ -70,8 +72,8 @@ class Multisine(Signal):
 class Steps(Signal):
     """Levels drawn evenly from -1 to 1, each held for a time."""
 
-    hold_s: float = field(metadata=ABOVE)
-    seed: int = field(default=1, metadata=key(whole_number, "a whole number of at least 0"))
+    hold_s: float = field(metadata=key(above_zero, ABOVE, "Time for which a level is held [s]."))
+    seed: int = field(default=1, metadata=SEED)
 
     def unit_values(self, times: Array) -> Array:
         # rounding must not move a multiple of the hold to the level before
@@ -94,8 +96,8 @@ class Prbs(Steps):
 class Column:
     """A column of a CSV file in the folder of the study, its times from the first sample on."""
 
-    csv: str = field(metadata=key(text, "a file beside the study's file"))
-    column: str = field(metadata=key(text, "the header of a column"))
+    csv: str = field(metadata=key(text, "a file beside the study's file", "The CSV file."))
+    column: str = field(metadata=key(text, "the header of a column", "Its column."))
 
 
 SIGNALS: dict[str, type[Signal]] = {"chirp": Chirp, "multisine": Multisine, "steps": Steps, "prbs": Prbs}

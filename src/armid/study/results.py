@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, StudyError, caused_by, nearest
 from armid.report.result import NewFiles, Shown
 from armid.study.outcome import DONE, RunTrace, unpacked
 from armid.study.store import (
@@ -84,10 +84,12 @@ class StudyResults(Shown):
 
     def plot(self, name: str = "") -> Any:
         """Draw one figure of the report and return it, matplotlib's. name: which, "" for the first."""
+        from armid.report.style import detached
+
         figures = {f.name: f.draw for f in documents().report_of(self).figures if f.draw is not None}
         if not figures or (name and name not in figures):
             raise ArmidError(f"the report has no figure '{name}': {nearest(name, figures)}")
-        return figures[name or next(iter(figures))]()
+        return detached(figures[name or next(iter(figures))]())
 
     def save(self, folder: str | Path) -> list[str]:
         """Write page, Markdown, tables and figures of the report to a folder, all or none, and return their names."""
@@ -158,6 +160,7 @@ def documents() -> Any:
     return import_module("armid.study.document")
 
 
+@caused_by(StudyError)
 def load_study(path: str | Path) -> StudyResults:
     """Read the stored results of a study; nothing is changed.
 
@@ -172,7 +175,7 @@ def load_study(path: str | Path) -> StudyResults:
 
     Raises
     ------
-    ArmidError
+    StudyError
         For what is no store of a study.
     """
     file = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)

@@ -1,7 +1,6 @@
 """Run what is missing of a study."""
 
 import json
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -13,9 +12,9 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, StudyError, caused_by, nearest
 from armid.estimation.identify import ctrl_c_waits
-from armid.progress import announced
+from armid.progress import announced, console
 from armid.report.result import refuse_unwritable
 from armid.study.outcome import Outcome
 from armid.study.pool import LocalPool, WorkerSetup, performed_apart
@@ -51,6 +50,7 @@ class Ending:
     first_error: str
 
 
+@caused_by(StudyError)
 def run_study(
     path: str | Path,
     jobs: int | None = None,
@@ -60,6 +60,7 @@ def run_study(
     time_limit: float = TIME_LIMIT_S,
     only: str = "*",
     retry: bool = False,
+    progress: bool = False,
 ) -> "StudyResults":
     """Run what is missing of a study and return all that its store holds.
 
@@ -81,6 +82,8 @@ def run_study(
         CASE/IDENTIFIER, patterns with * and ?.
     retry
         Whether failed runs are performed anew.
+    progress
+        Show a bar, in a terminal or a notebook.
 
     Returns
     -------
@@ -89,15 +92,16 @@ def run_study(
 
     Raises
     ------
-    ArmidError
+    StudyError
         For a study that cannot be run.
     KeyboardInterrupt
         After Ctrl-C; finished runs are kept.
     """
     from armid.study.results import load_study
 
-    study = read_study(path, absolute(plugins))
-    ending = run(study, path, jobs, dask, out, time_limit, only, retry)
+    with progress_bar(progress) as shown:
+        study = read_study(path, absolute(plugins))
+        ending = run(study, path, jobs, dask, out, time_limit, only, retry, shown)
     if ending.interrupted:
         raise KeyboardInterrupt
     return load_study(ending.folder)
@@ -113,11 +117,12 @@ def run(
     only: str = "*",
     retry: bool = False,
     progress: Progress = lambda counts, outcome: None,
+    command: str = "",
 ) -> Ending:
     """Run what is missing of a study that was read; arguments and errors as `run_study`.
 
     file: the study's, as the command named it. progress: called with the counts at the start once, then with each
-    finished run. Ctrl-C ends it without an error.
+    finished run. command: the line that runs it, for its report. Ctrl-C ends it without an error.
     """
     began = time.monotonic()
     chosen = _patterns(only, study)
@@ -132,7 +137,7 @@ def run(
     folder, named = OUT / study.name if out is None else Path(out), Path(file)
     # a whole path says something on this machine alone
     told = named.name if named.is_absolute() else named.as_posix()
-    description = study.description(folder) | {"file": told}
+    description = study.description(folder) | {"file": told, "command": command}
     json.dumps(description, ensure_ascii=False).encode()  # what no store can hold is refused before there is one
     is_new = not (folder / FILE_NAME).exists()
     if is_new:
@@ -212,16 +217,16 @@ def absolute(plugins: Iterable[str]) -> tuple[str, ...]:
 
 @contextmanager
 def progress_bar(is_shown: bool) -> Iterator[Progress]:
-    """Yield what shows how far a study is, with rate and time left, on a terminal; nothing is shown elsewhere."""
-    if not (is_shown and sys.stderr.isatty()):
+    """Yield what shows how far a study is, with rate and time left; nothing where no bar can be drawn."""
+    drawn_on = console() if is_shown else None
+    if drawn_on is None:
         yield lambda counts, outcome: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn
     from rich.progress import Progress as Bar
 
     columns = "{task.completed:.0f}/{task.total:.0f} runs", BarColumn(), "{task.fields[rate]}", "{task.fields[left]}"
-    with Bar(*columns, console=Console(stderr=True), refresh_per_second=4) as bar:
+    with Bar(*columns, console=drawn_on, refresh_per_second=4) as bar:
         task = bar.add_task("", total=1, visible=False, rate="", left="")
         began, finished, simulations = time.monotonic(), 0, 0
 

@@ -5,7 +5,6 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +12,23 @@ from armid.engine.calibrate import ALLOWED
 from armid.errors import ArmidError, MachineError
 from armid.model import Model
 from armid.record.schema import (
+    CONSTANTS,
+    EFFECTS,
+    PLANT,
     Kind,
     KindError,
     above_zero,
     any_table,
     any_text,
     key,
+    kind,
     list_of,
+    name_in,
     number,
     one_of,
     part,
+    sheet_schema,
+    table_for,
     table_of,
     tested,
     text,
@@ -46,51 +52,65 @@ MOST_SEEDS, MOST_CASES = 10**6, 10**5
 # Kinds of values, see `armid.record.schema`: each returns a value as it is wanted, or raises KindError.
 
 
-def whole_number(value: object, least: int = 0, most: int = LARGEST_COUNT) -> int:
-    if isinstance(value, int) and not isinstance(value, bool) and least <= value <= most:
-        return value
-    raise KindError(value)
+def whole_number(least: int = 0, most: int = LARGEST_COUNT) -> Kind:
+    @kind(type="integer", minimum=least, maximum=most)
+    def read(value: object) -> int:
+        if isinstance(value, int) and not isinstance(value, bool) and least <= value <= most:
+            return value
+        raise KindError(value)
+
+    return read
 
 
 # A name that is safe as the name of a folder.
-plain_name = tested(text, lambda name: bool(PLAIN_NAME.fullmatch(name)) and not name.endswith("."))
+plain_name = tested(
+    text, lambda name: bool(PLAIN_NAME.fullmatch(name)) and not name.endswith("."),
+    pattern=f"^{PLAIN_NAME.pattern}(?<![.])$",
+)  # fmt: skip
 line_of_text = tested(text, lambda line: line.isprintable() and line == line.strip())
-count = partial(whole_number, least=1)
+any_whole, count = whole_number(), whole_number(1)
 
 
+@kind(anyOf=[list_of(any_whole, 1).schema, whole_number(1, MOST_SEEDS).schema])
 def seeds(value: object) -> tuple[int, ...]:
     """Return seeds: n stands for 1 to n."""
     if isinstance(value, list):
-        return tuple(list_of(whole_number, 1)(value))
-    return tuple(range(1, whole_number(value, 1, MOST_SEEDS) + 1))
+        return tuple(list_of(any_whole, 1)(value))
+    return tuple(range(1, whole_number(1, MOST_SEEDS)(value) + 1))
 
 
 def one_or_more(kind: Kind) -> Kind:
     """Return a kind of lists; one value stands for a list of it."""
-    return lambda value: list_of(kind, 1)(value) if isinstance(value, list) else (kind(value),)
+    several = list_of(kind, 1)
+    return Kind(lambda value: several(value) if isinstance(value, list) else (kind(value),),
+                {"anyOf": [kind.schema, several.schema]})  # fmt: skip
 
 
 rising_counts = tested(one_or_more(count), lambda found: list(found) == sorted(set(found)))
 
 
+@kind(type="number", minimum=0)
 def at_least_zero(value: object) -> float:
     if number(value) < 0.0:
         raise KindError(value)
     # -0.0 is 0 and is to be written like it
-    return number(value) + 0.0
+    return float(number(value)) + 0.0
 
 
+@kind(anyOf=[{"const": WHOLE}, list_of(number, 2, 2).schema])
 def window(value: object) -> tuple[float, ...] | str:
     """Return a window, [begin, end] or the word for all of a record."""
     return WHOLE if value == WHOLE else tuple(list_of(number, 2, 2)(value))
 
 
+@kind(type=["boolean", "number", "string"])
+def option(value: object) -> float | int | str | bool:
+    return value if isinstance(value, bool | int | str) else float(number(value))
+
+
+@kind(type="object", additionalProperties={"anyOf": [option.schema, table_of(option).schema]})
 def options(value: object) -> dict[str, float | int | str | bool]:
     """Return an identifier's options by name; those of a part of a chain, which TOML nests, as `pso.velocity_limit`."""
-
-    def option(each: object) -> float | int | str | bool:
-        return each if isinstance(each, bool | int | str) else number(each)
-
     found: dict[str, float | int | str | bool] = {}
     for name, inner in any_table(value).items():
         if isinstance(inner, dict):
@@ -100,32 +120,68 @@ def options(value: object) -> dict[str, float | int | str | bool]:
     return found
 
 
-NUMBERS = key(table_of(number), "a finite number in SI")
-BOUNDS = key(table_of(list_of(number, 2, 2)), "[low, high] in SI")
-NAMES = key(one_or_more(text), "a name or a list of names")
-EFFECT_NAMES = key(list_of(text, 1), "a list of names of effects")
-LEVELS = key(one_or_more(at_least_zero), "a number of at least 0 in deg/s, or a list of such")
-TABLES = key(list_of(any_table, 1), "a list of at least one table")
-WINDOWS = key(one_or_more(window), f"'{WHOLE}', or a list of [begin, end] in seconds and '{WHOLE}'")
-STUDY_NAME = key(plain_name, "a plain name of letters, digits, '_', '-' and '.'")
-LINE = key(line_of_text, "a text on one line")
-QUESTION = key(any_text, "a text")
-KIND = key(text, "the kind of a study")
-SEEDS = key(seeds, "at most 1,000,000 seeds or a list")
-PER_PARAMETER = key(rising_counts, "a whole number above 0, or a rising list of such")
-BUDGETS = key(rising_counts, "a whole number of simulations above 0, or a rising list of such")
-SEED = key(whole_number, "a whole number of at least 0")
+EFFECT_NAMES = list_of(name_in("effects"), 1)
+ROLE = one_of("train", "holdout")
+BOUNDS = key(table_of(list_of(number, 2, 2)), "[low, high] in SI", "Bounds of the search, by parameter.")
+FIXED = key(table_of(number), "a finite number in SI", "Values of parameters that are not searched.")
+FITNESSES = key(one_or_more(text), "a name or a list of names", "What is minimised; `armid list fitness` shows them.")
+LEVELS = key(
+    one_or_more(at_least_zero), "a number of at least 0 in deg/s, or a list of such",
+    "Standard deviation of the white noise that is added to simulated records.",
+)  # fmt: skip
+STUDY_NAME = key(
+    plain_name,
+    "a plain name of letters, digits, '_', '-' and '.'",
+    "The name of the study and of its folder of results.",
+)
+LINE = key(line_of_text, "a text on one line", "The name of the case on pages.")
+QUESTION = key(any_text, "a text", "The question that the study answers, shown at the head of its report.")
+SEEDS = key(
+    seeds, "at most 1,000,000 seeds or a list", "Seeds of the searches, each of which is a run; n stands for 1 to n."
+)
+PER_PARAMETER = key(
+    rising_counts, "a whole number above 0, or a rising list of such",
+    "Budget of a problem of the suite: simulations for each of its free parameters.",
+)  # fmt: skip
+BUDGETS = key(
+    rising_counts, "a whole number of simulations above 0, or a rising list of such",
+    "Simulations of a run, of each where there are several; one candidate through all train records counts as one.",
+)  # fmt: skip
+SEED = key(any_whole, "a whole number of at least 0", "Seed of what is drawn at random.")
+
+
+def kind_key(name: str) -> dict[str, Any]:
+    return key(
+        Kind(text.read, {"const": name}), "the kind of a study", "'close_loop' for campaigns whose loop is closed."
+    )
+
+
+def report_key(names: tuple[str, ...]) -> dict[str, Any]:
+    return key(Kind(any_text.read, {"enum": list(names)}), f"one of {', '.join(map(repr, names))}",
+               "Which report is made; without one the sections that fit.")  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class ManoeuvreSpec:
     """Declare a manoeuvre that is simulated; `keys` holds those of the plant, still as they were found."""
 
-    duration_s: float = field(metadata=key(above_zero, "a length in seconds above 0"))
-    role: str = field(default="train", metadata=key(one_of("train", "holdout"), "'train' or 'holdout'"))
-    constants: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
-    inputs: Mapping[str, Any] = field(default_factory=dict, metadata=key(any_table, "a table of inputs"))
+    duration_s: float = field(
+        metadata=key(above_zero, "a length in seconds above 0", "How long the machine is simulated.")
+    )
+    role: str = field(default="train", metadata=key(
+        ROLE, "'train' or 'holdout'", "Whether parameters are searched on this record, or it judges the result.",
+    ))  # fmt: skip
+    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
+    inputs: Mapping[str, Any] = field(default_factory=dict, metadata=key(
+        any_table, "a table of inputs",
+        "Input -> { csv, column }, or { kind } with its parameters: chirp, multisine, steps or prbs.",
+    ))  # fmt: skip
     keys: Mapping[str, object] = field(default_factory=dict)
+
+
+MANOEUVRES = key(
+    list_of(table_for(ManoeuvreSpec), 1), "a list of at least one table", "Manoeuvres that are simulated at the truth."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,46 +189,72 @@ class CaseSpec:
     """Declare a [[cases]] entry: a truth with manoeuvres, or a campaign."""
 
     name: str = field(metadata=LINE)
-    truth: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
-    published: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
-    fixed: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
-    manoeuvres: tuple[dict[str, Any], ...] = field(default=(), metadata=TABLES)
-    campaign: str | None = field(default=None, metadata=key(text, "a folder beside the study's file"))
-    records: tuple[str, ...] | None = field(
-        default=None, metadata=key(list_of(text, 1), "a list of files of the campaign")
+    truth: Mapping[str, float] = field(
+        default_factory=dict, metadata=key(table_of(number), "a finite number in SI", "True value of each parameter.")
     )
+    published: Mapping[str, float] = field(default_factory=dict, metadata=key(
+        table_of(number), "a finite number in SI", "Values that others found, shown next to ours.",
+    ))  # fmt: skip
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
+    fixed: Mapping[str, float] = field(default_factory=dict, metadata=FIXED)
+    manoeuvres: tuple[dict[str, Any], ...] = field(default=(), metadata=MANOEUVRES)
+    campaign: str | None = field(default=None, metadata=key(
+        text, "a folder beside the study's file", "A campaign whose records take the place of manoeuvres.",
+    ))  # fmt: skip
+    records: tuple[str, ...] | None = field(default=None, metadata=key(
+        list_of(text, 1), "a list of files of the campaign", "The records of the campaign that are used.",
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class RandomCasesSpec:
     """Declare [random_cases]: truths spread over the bounds."""
 
-    n: int = field(metadata=key(partial(count, most=MOST_CASES), "a whole number above 0, up to 100,000"))
+    n: int = field(
+        metadata=key(whole_number(1, MOST_CASES), "a whole number above 0, up to 100,000", "Number of truths.")
+    )
     seed: int = field(metadata=SEED)
-    manoeuvres: tuple[dict[str, Any], ...] = field(metadata=TABLES)
-    margin: float = field(default=0.0, metadata=key(at_least_zero, "a share of the range from 0 to below 0.5"))
+    manoeuvres: tuple[dict[str, Any], ...] = field(metadata=MANOEUVRES)
+    margin: float = field(default=0.0, metadata=key(
+        at_least_zero, "a share of the range from 0 to below 0.5",
+        "Share of each range that holds no truth at either end.",
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class SuiteSpec:
     """Declare [suite]: instances of problems of `armid.suite()`. train: instances that `armid tune` learns from."""
 
-    problems: tuple[str, ...] = field(default=("*",), metadata=key(list_of(text, 1), "a list of names of problems"))
-    instances: tuple[int, ...] = field(default=(1, 2, 3, 4, 5), metadata=key(list_of(count, 1), "a list of instances"))
-    train: tuple[int, ...] = field(default=(), metadata=key(list_of(count), "a list of instances"))
+    problems: tuple[str, ...] = field(default=("*",), metadata=key(
+        list_of(text, 1), "a list of names of problems", "Problems of the suite; * stands for any letters.",
+    ))  # fmt: skip
+    instances: tuple[int, ...] = field(default=(1, 2, 3, 4, 5), metadata=key(
+        list_of(count, 1), "a list of instances", "Instances of each problem, from 1 to 15.",
+    ))  # fmt: skip
+    train: tuple[int, ...] = field(default=(), metadata=key(
+        list_of(count), "a list of instances", "Instances that `armid tune` learns from.",
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class EntrySpec:
-    name: str = field(metadata=key(text, "the name of an identifier"))
-    label: str | None = field(default=None, metadata=LINE)
+    """Declare an [[identifiers]] entry; what is not given is as the study has it."""
+
+    name: str = field(metadata=key(
+        name_in("identifiers"), "the name of an identifier",
+        "The optimiser, or a chain such as pso+bobyqa; `armid list identifiers` shows them.",
+    ))  # fmt: skip
+    label: str | None = field(
+        default=None, metadata=key(line_of_text, "a text on one line", "Its name on pages, where that is another.")
+    )
     budget: tuple[int, ...] | None = field(default=None, metadata=BUDGETS)
     budget_per_parameter: tuple[int, ...] | None = field(default=None, metadata=PER_PARAMETER)
-    fitness: tuple[str, ...] | None = field(default=None, metadata=NAMES)
+    fitness: tuple[str, ...] | None = field(default=None, metadata=FITNESSES)
     noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=LEVELS)
     seeds: tuple[int, ...] | None = field(default=None, metadata=SEEDS)
-    options: Mapping[str, Any] = field(default_factory=dict, metadata=key(options, "a number, a text, true or false"))
+    options: Mapping[str, Any] = field(default_factory=dict, metadata=key(
+        options, "a number, a text, true or false", "Its options; `armid list identifiers --long` shows them.",
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,63 +262,91 @@ class StudySpec:
     """Declare a study that identifies; cases and identifiers are looked into one by one."""
 
     name: str = field(metadata=STUDY_NAME)
-    plant: str = field(metadata=key(text, "the name of a plant"))
-    identifiers: tuple[dict[str, Any], ...] = field(
-        metadata=key(list_of(any_table, 1), "at least one table headed [[identifiers]]")
-    )
+    plant: str = field(metadata=PLANT)
+    identifiers: tuple[dict[str, Any], ...] = field(metadata=key(
+        list_of(table_for(EntrySpec), 1), "at least one table headed [[identifiers]]",
+        "The optimisers that are compared.",
+    ))  # fmt: skip
     budget: tuple[int, ...] = field(metadata=BUDGETS)
     seeds: tuple[int, ...] = field(metadata=SEEDS)
     question: str = field(default="", metadata=QUESTION)
-    kind: str = field(default=IDENTIFIES, metadata=KIND)
-    report: str = field(default="", metadata=key(any_text, f"one of {', '.join(map(repr, REPORTS))}"))
-    fitness: tuple[str, ...] = field(default=("similarity",), metadata=NAMES)
+    kind: str = field(default=IDENTIFIES, metadata=kind_key(IDENTIFIES))
+    report: str = field(default="", metadata=report_key(REPORTS))
+    fitness: tuple[str, ...] = field(default=("similarity",), metadata=FITNESSES)
     noise_deg_s: tuple[float, ...] = field(default=(0.0,), metadata=LEVELS)
     noise_seed: int = field(default=1, metadata=SEED)
-    windows_s: tuple[tuple[float, float] | str, ...] = field(default=(WHOLE,), metadata=WINDOWS)
-    interval_s: float = field(default=1e-3, metadata=key(above_zero, "a sample interval in seconds above 0"))
-    accuracy: str = field(
-        default="auto", metadata=key(one_of("auto", *ALLOWED), f"one of 'auto', {', '.join(map(repr, ALLOWED))}")
-    )
-    effects: tuple[str, ...] = field(default=(), metadata=key(list_of(text), "a list of names of effects"))
-    constants: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
+    windows_s: tuple[tuple[float, float] | str, ...] = field(default=(WHOLE,), metadata=key(
+        one_or_more(window), f"'{WHOLE}', or a list of [begin, end] in seconds and '{WHOLE}'",
+        "Parts of each record that fitness and errors see.",
+    ))  # fmt: skip
+    interval_s: float = field(default=1e-3, metadata=key(
+        above_zero, "a sample interval in seconds above 0", "Time between two samples of a simulated record.",
+    ))  # fmt: skip
+    accuracy: str = field(default="auto", metadata=key(
+        one_of("auto", *ALLOWED), f"one of 'auto', {', '.join(map(repr, ALLOWED))}",
+        "Error of the engine; auto: fine where the noise would not hide the standard error.",
+    ))  # fmt: skip
+    effects: tuple[str, ...] = field(default=(), metadata=EFFECTS)
+    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
-    fixed: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
-    cases: tuple[dict[str, Any], ...] = field(default=(), metadata=TABLES)
-    random_cases: dict[str, Any] | None = field(default=None, metadata=key(any_table, "a table"))
-    suite: dict[str, Any] | None = field(default=None, metadata=key(any_table, "a table"))
+    fixed: Mapping[str, float] = field(default_factory=dict, metadata=FIXED)
+    cases: tuple[dict[str, Any], ...] = field(default=(), metadata=key(
+        list_of(table_for(CaseSpec), 1), "a list of at least one table", "What the optimisers are tried on.",
+    ))  # fmt: skip
+    random_cases: dict[str, Any] | None = field(
+        default=None, metadata=key(table_for(RandomCasesSpec), "a table", "Further cases, truths drawn at random.")
+    )
+    suite: dict[str, Any] | None = field(
+        default=None, metadata=key(table_for(SuiteSpec), "a table", "Further cases, problems of `armid.suite()`.")
+    )
     budget_per_parameter: tuple[int, ...] = field(default=(), metadata=PER_PARAMETER)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoopSpec:
-    """Declare a study that closes the loop on every campaign of a folder.
-
-    campaigns: folder of campaigns, relative to the study's file. made_by: the command that makes it, for people. key:
-    file that holds the truth, for who scores; neither study nor report opens it. report: given where they are
-    SYNTHETIC, which the page then says. only: patterns of names of campaigns. candidates: effects to look for, empty:
-    all; without: those that are left out. rivals: patterns of names of campaigns -> the effects that are looked for
-    there, in place of the candidates. suite: what the campaigns are made of, for who makes them; the study does not
-    read it.
-    """
+    """Declare a study that closes the loop on every campaign of a folder."""
 
     name: str = field(metadata=STUDY_NAME)
-    campaigns: str = field(metadata=key(line_of_text, "a folder of campaigns, relative to this file"))
-    kind: str = field(default=CLOSES_LOOP, metadata=KIND)
+    campaigns: str = field(metadata=key(
+        line_of_text, "a folder of campaigns, relative to this file",
+        "Folder of the campaigns, each of which is a run.",
+    ))  # fmt: skip
+    kind: str = field(metadata=kind_key(CLOSES_LOOP), default=CLOSES_LOOP)
     question: str = field(default="", metadata=QUESTION)
-    report: str = field(default="", metadata=key(any_text, f"one of {', '.join(map(repr, LOOP_REPORTS))}"))
-    made_by: str = field(default="", metadata=key(line_of_text, "the command that makes the campaigns"))
-    only: tuple[str, ...] = field(default=("*",), metadata=key(list_of(text, 1), "a list of names of campaigns"))
-    candidates: tuple[str, ...] = field(default=(), metadata=EFFECT_NAMES)
-    without: tuple[str, ...] = field(default=(), metadata=EFFECT_NAMES)
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
-    fixed: Mapping[str, float] = field(default_factory=dict, metadata=NUMBERS)
-    seed: int = field(default=1, metadata=SEED)
-    rivals: Mapping[str, tuple[str, ...]] = field(
-        default_factory=dict, metadata=key(table_of(list_of(text, 1)), "lists of effects by names of campaigns")
+    report: str = field(default="", metadata=report_key(LOOP_REPORTS))
+    made_by: str = field(default="", metadata=key(
+        line_of_text, "the command that makes the campaigns", "Shown to readers; nothing runs it.",
+    ))  # fmt: skip
+    only: tuple[str, ...] = field(default=("*",), metadata=key(
+        list_of(text, 1), "a list of names of campaigns", "Campaigns that are used; * stands for any letters.",
+    ))  # fmt: skip
+    candidates: tuple[str, ...] = field(default=(), metadata=key(
+        EFFECT_NAMES, "a list of names of effects", "Effects to look for; all where none is named.",
+    ))  # fmt: skip
+    without: tuple[str, ...] = field(
+        default=(), metadata=key(EFFECT_NAMES, "a list of names of effects", "Effects that are left out.")
     )
-    suite: Mapping[str, Any] = field(default_factory=dict, metadata=key(any_table, "a table"))
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
+    fixed: Mapping[str, float] = field(default_factory=dict, metadata=FIXED)
+    seed: int = field(default=1, metadata=SEED)
+    rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict, metadata=key(
+        table_of(list_of(text, 1)), "lists of effects by names of campaigns",
+        "Effects to look for in campaigns of a name, in place of the candidates.",
+    ))  # fmt: skip
+    suite: Mapping[str, Any] = field(default_factory=dict, metadata=key(
+        any_table, "a table", "What the campaigns are made of, for their maker; the study does not read it.",
+    ))  # fmt: skip
     # last: from here on the name stands for this field
-    key: str = field(default="", metadata=key(line_of_text, "the file that holds the truth, relative to this file"))
+    key: str = field(default="", metadata=key(
+        line_of_text, "the file that holds the truth, relative to this file",
+        "Truth of the campaigns, for who scores them; neither study nor report opens it.",
+    ))  # fmt: skip
+
+
+def study_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a study's file; its key `kind` says which of the two sheets holds."""
+    closes = {"properties": {"kind": {"const": CLOSES_LOOP}}, "required": ["kind"]}
+    return {"if": closes, "then": sheet_schema(LoopSpec), "else": sheet_schema(StudySpec)}
 
 
 @dataclass(eq=False)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from armid.errors import ArmidError, MachineError, quoted
+from armid.errors import ArmidError, MachineError, StudyError, caused_by, quoted
 from armid.estimation.identify import INTERRUPTED, Identification, identified, versions_of
 from armid.model import Model
 from armid.problem.fitness import fitness_of_name
@@ -60,6 +60,7 @@ PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
 
+@caused_by(StudyError)
 def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
     """Read a study's TOML file; nothing is simulated.
 
@@ -76,7 +77,7 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
 
     Raises
     ------
-    ArmidError
+    StudyError
         With one sentence (file, key, found, expected) for whatever cannot be run: an unknown key or name, impossible
         bounds, a truth outside them, an option that an identifier refuses, a fitness that it cannot use.
     """
