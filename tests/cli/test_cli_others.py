@@ -54,7 +54,8 @@ def test_list_fitness_and_identifiers(run):
     names = re.findall(r"^(\w+): .* \(records join by (\w+)\)$", fitness, re.MULTILINE)
     assert dict(names) == {"similarity": "duration", "numerical_similarity": "duration",
                            "shape_similarity": "duration", "rmse": "samples", "nrmse": "samples",
-                           "likelihood": "sum"}  # fmt: skip
+                           "likelihood": "sum", "mae": "samples", "huber": "samples", "spectrum": "samples",
+                           "dtw": "samples"}  # fmt: skip
     identifiers = run("list", "identifiers", "--long").out.replace("\n      ", " ")
     assert re.search(r"^pso: the paper's particle swarm .*\(global, stochastic\)$", identifiers, re.MULTILINE)
     assert "(local, gradient, stochastic, rmse or likelihood)" in identifiers
