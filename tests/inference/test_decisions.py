@@ -15,7 +15,7 @@ MOST = 20
 NUMERICS = {
     "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST"),
     "convergence of fits and of the engine": ("SETTLED", "NEAR", "FEWEST_SPARED", "FURTHER_ERROR", "WIDE"),
-    "budgets of computing": ("BUNDLE", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
+    "budgets of computing": ("BUNDLE", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "LAGS", "LINE", "MOST_BRIDGED", "STILL", "EVEN"),
     "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),
     "layout of pages": ("MOST_DRAWN", "MOST_TOLD", "SHIFTED", "LEAST_SHARE", "WEAK", "VERSION"),

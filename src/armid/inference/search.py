@@ -39,8 +39,11 @@ N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 8, 3, 3, 3, 2
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 16, 8
-# Of records with more samples than this fewer models are expanded, but for so many.
-SAMPLES, FEWEST_EXPANDED = 4_000, 8
+# Of records with more samples than this, and with so many constants within tolerances half, fewer models are expanded,
+# but for so many.
+SAMPLES, CONSTANTS, FEWEST_EXPANDED = 4_000, 10, 8
+# Far from the noise: models that are expanded in turn without a better one, after which what is missing has no name.
+MOST_IN_VAIN = 4
 # A model is brought to its estimate at most so often in turn.
 MOST_COMPLETED = 4
 # Mean square of the best model, in units of the noise, up to which rivals are begun afresh.
@@ -116,15 +119,17 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
 
     declared: its fit. most: models that are expanded, None: as many as the samples allow.
     """
-    most = most or int(np.clip(MOST_EXPANDED * SAMPLES / len(declared.residual), FEWEST_EXPANDED, MOST_EXPANDED))
     found = Exploration(library, effects.hypotheses(library))
     found.constants = constants_of(declared.records, declared.z, library.tolerances)
+    cost = len(declared.residual) / SAMPLES * (1.0 + len(found.constants) / CONSTANTS)
+    most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
     found.fits[frozenset()] = declared
     found.fits[frozenset()] = with_constants(declared, found.constants, found.scale().weight)
     found.faults = records.hypotheses(declared.records)
     found.drifts = drifts.hypotheses(declared, library)
-    while len(found.forecasts) < most:
-        model = next_model(found)
+    in_vain = 0
+    while len(found.forecasts) < most and in_vain < MOST_IN_VAIN:
+        model, best = next_model(found), found.ranked()[0][0]
         if model is None and not add_unknown(found):
             break
         if model is None:
@@ -137,6 +142,7 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
         if next_model(found) == model:
             expand(found, model)
             finish(found)
+        in_vain = 0 if found.ranked()[0][0] != best or is_near(found, best) else in_vain + 1
     add_unknown(found)
     finish_all(found)
     return found
