@@ -69,7 +69,9 @@ def set_log_level(level: str) -> None:
 
 def console() -> "Console | None":
     """Return what bars are drawn on, a terminal or a notebook; None where neither is there."""
-    is_notebook = "ipykernel" in sys.modules
+    # a kernel is at work where the shell has one: that somebody imported its package says nothing
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    is_notebook = hasattr(shell, "kernel")
     if not (is_notebook or sys.stderr.isatty()):
         return None
     from rich.console import Console
