@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armid.report.document import Document, Table
+from armid.report.latex import latex
 from armid.report.style import save
 
 if TYPE_CHECKING:
@@ -69,18 +70,3 @@ def frame_of(table: Table) -> "DataFrame":
             numbers = [np.nan if row[i].number is None else row[i].number for row in table.cells()]
             frame.isetitem(i, column.factor * np.array(numbers, dtype=float))
     return frame
-
-
-def latex(table: Table) -> str:
-    from pandas import DataFrame
-
-    frame = DataFrame([[c.text for c in row] for row in table.cells()], columns=[c.header for c in table.columns])
-    align = "".join("r" if c.digits else "l" for c in table.columns)
-    return frame.to_latex(index=False, escape=True, column_format=align, caption=latex_text(table.title),
-                          label=f"tab:{table.name}", position="htbp")  # fmt: skip
-
-
-def latex_text(text: str) -> str:
-    special = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": "\\textasciitilde{}", "^": "\\textasciicircum{}"}
-    special["\\"] = "\\textbackslash{}"
-    return "".join(special.get(letter, letter) for letter in text)
