@@ -1,4 +1,4 @@
-"""Write the tables and figures of a document to files: CSV with every digit, LaTeX, PNG and SVG."""
+"""Write the tables and figures of a document to files: CSV with every digit, LaTeX, PNG and SVG, or PDF."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 
 from armid.report.document import Document, Table
 from armid.report.latex import latex
-from armid.report.style import save
+from armid.report.style import save, save_for_print
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -26,6 +26,13 @@ def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
     for figure in document.figures:
         if figure.draw is not None:
             save(figure.draw(), path_of(f"{figure.name}.png"), path_of(f"{figure.name}.svg"))
+
+
+def write_prints(document: Document, width: str, path_of: Callable[[str], Path]) -> None:
+    """Write each figure as PDF of the width of a page's "single" or "double" column."""
+    for figure in document.figures:
+        if figure.draw is not None:
+            save_for_print(figure.draw, path_of(f"{figure.name}.pdf"), width)
 
 
 def csv(table: Table) -> str:
