@@ -53,7 +53,7 @@ STUDY, PAGE = "study.sqlite", "report.html"
 @click.option("--key", type=click.Path(path_type=Path), metavar="FILE",
               help="Truth of blind campaigns, which studies/blind/score.py scores.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["page", "pdf"]), default="page", show_default=True,
-              help="page, or the figures of a study as PDF for a paper.")  # fmt: skip
+              help="page with its files, or only the figures of a study as PDF for a paper.")  # fmt: skip
 @click.option("--width", type=click.Choice(["single", "double"]), default="double", show_default=True,
               help="Columns of the paper that a PDF figure spans.")  # fmt: skip
 @plugin_option

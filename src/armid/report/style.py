@@ -50,8 +50,10 @@ THEME: Any = {
 # Figures of a paper: widths of one and of both columns [inch], and the size of all their letters [pt].
 WIDTHS = {"single": 3.5, "double": 7.2}
 LETTERS = 8.0
-# Columns of a paper that a figure is being drawn for, "" for a page. In a single one all panels stand in a column.
+# Columns of a paper that a figure is being drawn for, "" for a page. In a single one all panels stand in a column,
+# in a double one in two: more would leave no room between their names.
 PRINTED: ContextVar[str] = ContextVar("PRINTED", default="")
+MOST_COLUMNS = {"single": 1, "double": 2}
 # Least share of its height that a figure keeps when it becomes narrower.
 LEAST_HEIGHT_SHARE = 0.62
 # A figure of at most this height keeps it: axis labels and a legend take most of it [inch].
@@ -85,7 +87,7 @@ def look(i: int) -> dict[str, Any]:
 
 def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list[Any]]:
     plt = pyplot()
-    columns = 1 if PRINTED.get() == "single" else max(1, min(columns, n))
+    columns = max(1, min(columns, n, MOST_COLUMNS.get(PRINTED.get(), columns)))
     rows = -(-n // columns)
     size = (width * columns, height * rows)
     figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")

@@ -197,8 +197,6 @@ def data_profile_figure(evidence: Evidence) -> Any:
         lines = {v: data_profile(kept.value_hits[rows, place], n_free[rows], grid) for v, rows in variants.items()}
         curves.append((f"{setting}, {share:g} left", grid, lines))
     figure, axes = share_panels(curves, evidence.colours, columns, 6.6)
-    for axis in axes[-columns:]:
-        axis.set_xlabel("simulations / (free parameters + 1)")
-    for axis in axes[::columns]:
-        axis.set_ylabel("share of problems solved")
+    for axis in axes:
+        axis.set(xlabel="simulations / (free parameters + 1)", ylabel="share of problems solved")
     return figure
