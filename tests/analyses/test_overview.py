@@ -10,13 +10,15 @@ from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.errors import (
     MOST_POINTS,
     brief,
+    colour_range,
     end_points,
     error_map,
     error_map_figure,
+    signed_powers,
     thinned,
     valley_figure,
 )
-from armid.study.analyses.fitness_quality import fitness_quality
+from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
 from armid.study.analyses.loops import loop_runs
 from armid.study.analyses.overview import main_table, reasons, runs_table
 from armid.study.analyses.success import parts as success_parts
@@ -113,22 +115,47 @@ def test_the_error_map_has_medians_in_the_orders_given(evidence):
 
 def test_deviations_in_percent_of_the_valley_and_of_other_machines_first_three_parameters(evidence):
     ends = end_points(evidence.estimates)
-    assert list(ends.columns) == ["variant", "setting", "p0", "eta3", "n"]
+    assert list(ends.columns) == ["variant", "setting", "p0", "eta3", "n", "k"]
     rows = evidence.parameters
     first = rows[(rows["run"] == ends.index[0]) & (rows["parameter"] == "n")].iloc[0]
     assert ends.iloc[0]["n"] == pytest.approx(100.0 * (first["value"] / first["truth"] - 1.0))
     renamed = evidence.estimates.replace({"parameter": {"p0": "mass", "eta3": "coulomb.level"}})
-    assert list(end_points(renamed).columns[2:]) == ["mass", "k", "coulomb.level"]
+    assert list(end_points(renamed).columns[2:]) == ["mass", "k", "coulomb.level", "n"]
 
 
 def test_figure_draws_every_run_once_a_pair_and_of_very_many_every_nth(evidence):
     ends = end_points(evidence.estimates)
-    figure = valley_figure(ends, ["pso", "cmaes"])
+    figure = valley_figure(ends, evidence.colours)
     pair = next(axis for axis in figure.axes if axis.get_ylabel().startswith("eta3"))
     assert sum(len(line.get_xdata()) for line in pair.lines) == len(ends)
     plt.close(figure)
     many = ends.loc[np.repeat(ends.index, 100)].reset_index()
     assert thinned(many).groupby("variant").size().max() <= MOST_POINTS
+
+
+def test_the_colours_of_the_map_span_the_errors_shown():
+    assert colour_range(np.array([0.02, 3.0, np.inf])) == (0.01, 10.0)
+    assert colour_range(np.array([1e-9, 5e3])) == (1e-6, 100.0)
+    assert colour_range(np.array([np.inf])) == (1e-6, 100.0)
+
+
+def test_powers_of_the_valley_have_both_signs_around_0():
+    assert signed_powers(1e-6, 20.0) == [-10.0, -0.001, 0.0, 0.001, 10.0]
+    assert signed_powers(1.0, 0.5) == [-1.0, 0.0, 1.0]
+
+
+def test_a_plug_in_has_the_first_colour_and_every_fitness_a_strip(made):
+    found = made(seeds=2, fitness=("similarity", "likelihood"))
+    found.study["plugins"] = ["mine.py:cmaes"]
+    evidence = Evidence(found)
+    assert all(name.startswith("cmaes") for name in list(evidence.colours)[:2])
+    figure = fitness_quality_figure(evidence.runs, evidence.colours)
+    axis = figure.axes[0]
+    assert sorted(t.get_text() for t in axis.get_yticklabels()) == ["likelihood", "similarity"]
+    done = evidence.runs[(evidence.runs["setting"] == axis.get_title()) & (evidence.runs["status"] == "done")]
+    rows = np.concatenate([line.get_ydata() for line in axis.lines if line.get_linestyle() == "None"])
+    assert [np.sum(np.abs(rows - k) < 0.4) for k in (0, 1)] == [len(done) // 2] * 2
+    plt.close(figure)
 
 
 def frame():

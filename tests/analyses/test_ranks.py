@@ -103,7 +103,8 @@ def test_tables_and_diagram():
     table = pairs(tests, "noise-free", "pairs")
     assert len(table.frame) == 6
     assert (table.frame.iloc[:3][["first", "second"]] == "C4.5+m+cf").any(axis=1).all()
-    figure = critical_difference_figure(tests, "noise-free")
+    figure = critical_difference_figure(tests, {name: i for i, name in enumerate(NAMES)})
+    assert figure.axes[0].get_title() == ""
     assert {t.get_text().split(" (")[0] for t in figure.axes[0].texts if " (" in t.get_text()} >= {"C4.5+m"}
     plt.close(figure)
 

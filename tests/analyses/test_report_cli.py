@@ -10,6 +10,8 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from armid.cli.options import put
 from armid.cli.study import words
@@ -42,6 +44,28 @@ def reported(store):
     before = digest(store / "study.sqlite")
     assert ended("report", store) == 0
     return store, before
+
+
+@pytest.mark.parametrize(("width", "inches"), [("single", 3.5), ("double", 7.2)])
+def test_figures_for_a_paper_are_pdf_of_its_width_without_a_title(store, width, inches, monkeypatch, tmp_path):
+    seen = []
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *a, **k: (seen.append(figure), save(figure, *a, **k)))
+    folder = copytree(store, tmp_path / "out", ignore=lambda _, names: [n for n in names if "sqlite" not in n])
+    assert ended("report", folder, "--format", "pdf", "--width", width) == 0
+    files = sorted(folder.glob("*.pdf"))
+    assert {"ecdf", "table1"} <= {file.stem for file in files}
+    assert {p.suffix for p in folder.iterdir()} == {".pdf", ".sqlite"}
+    assert len(seen) == len(files)
+    for figure in seen:
+        assert figure.get_size_inches()[0] == inches
+        assert {text.get_fontsize() for text in figure.findobj(Text) if text.get_text()} == {8.0}
+        assert sum(bool(axis.get_title()) for axis in figure.axes) != 1
+    text = files[0].read_bytes()
+    assert f"/MediaBox [ 0 0 {72 * inches:g} ".encode() in text
+    assert b"CreationDate" not in text
+    assert ended("report", folder, "--format", "pdf", "--width", width) == 0
+    assert files[0].read_bytes() == text
 
 
 def test_a_report_of_a_real_store(reported):

@@ -1,4 +1,4 @@
-"""Expected running times, ECDFs over runs and targets, data profiles, convergence bands, lines with names."""
+"""Expected running times, ECDFs over runs and targets, data profiles, medians of convergence, lines with names."""
 
 from types import SimpleNamespace
 
@@ -6,13 +6,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.optimize import minimize
 
-from armid.report.style import spread
+from armid.report.style import MOST_NAMED, PALE, named_lines, panels
 from armid.study.analyses.analysis import TARGETS
-from armid.study.analyses.convergence import band, convergence_figure
+from armid.study.analyses.convergence import convergence_figure, median
 from armid.study.analyses.running_time import (
     data_profile,
     ecdf_figure,
@@ -53,7 +50,7 @@ def test_table_takes_the_tolerances_and_counts_hits():
     assert frame.loc[0, "0.1 %"] == "inf (0 %)"
 
 
-def test_lines_end_where_no_run_hits_and_are_named_in_the_order_of_their_ends():
+def test_lines_end_where_no_run_hits_and_are_named_in_the_order_of_their_colours():
     hits = np.full((4, 51), np.inf)
     hits[:, :10], hits[:2, :30] = 5.0, 7.0
     evidence = SimpleNamespace(
@@ -61,12 +58,23 @@ def test_lines_end_where_no_run_hits_and_are_named_in_the_order_of_their_ends():
         used=np.full(4, 9.0), histories=SimpleNamespace(grid=np.array([1, 10, 100]), error_hits=hits),
     )  # fmt: skip
     figure = running_time_figure(evidence, hits, TARGETS, "error")
-    assert [t.get_text() for t in figure.axes[0].texts] == ["far", "near"]
-    assert np.isfinite(figure.axes[0].lines[0].get_ydata()).sum() == 10
+    assert [t.get_text() for t in figure.axes[0].texts] == ["near", "far"]
+    assert [np.isfinite(line.get_ydata()).sum() for line in figure.axes[0].lines[:2]] == [30, 10]
     plt.close(figure)
     figure = ecdf_figure(evidence)
-    names = sorted(figure.axes[0].texts, key=lambda t: t.get_position()[1])
-    assert [t.get_text() for t in names] == ["near", "far"]
+    assert [t.get_text() for t in figure.axes[0].texts] == ["near", "far"]
+    assert figure.axes[0].get_ylim() == (0.0, 1.0)
+    plt.close(figure)
+
+
+def test_the_first_six_lines_have_a_colour_each_and_all_others_are_grey():
+    figure, (axis,) = panels(1, 1, 5.0, 4.6)
+    lines = {f"v{i}": [0.0, float(i)] for i in range(9)}
+    named_lines(axis, [1.0, 2.0], lines, {name: 8 - i for i, name in enumerate(lines)})
+    assert [t.get_text() for t in axis.texts] == ["v8", "v7", "v6", "v5", "v4", "v3", "others (3)"]
+    colours = {line.get_ydata()[1]: line.get_color() for line in axis.lines[:9]}
+    assert [colours[i] for i in (0.0, 1.0, 2.0)] == [PALE] * 3
+    assert len({colours[float(i)] for i in range(3, 9)}) == MOST_NAMED
     plt.close(figure)
 
 
@@ -75,43 +83,22 @@ def test_data_profile_by_hand():
     assert data_profile(hits, n, np.array([1.0, 2.0, 9.9, 10.0, 1e9])) == pytest.approx([0, 1 / 3, 1 / 3, 2 / 3, 2 / 3])
 
 
-def test_quartiles_of_a_band_are_values_that_runs_had():
+def test_a_median_is_a_value_that_a_run_had():
     runs = np.array([[np.inf, 4.0], [np.inf, 3.0], [8.0, 2.0], [9.0, 1.0]], np.float32)
-    assert band(runs).tolist() == [[8.0, 1.0], [9.0, 2.0], [np.inf, 3.0]]
+    assert median(runs).tolist() == [9.0, 2.0]
 
 
-def test_one_panel_a_variant_with_a_band_a_setting_and_runs_of_another_fitness_left_out():
+def test_one_panel_a_setting_with_a_line_a_variant_and_runs_of_another_fitness_left_out():
     of = {v: np.array([2 * i, 2 * i + 1]) for i, v in enumerate(("pso", "de", "ga", "other"))}
-    evidence = SimpleNamespace(groups={"noise-free": of, "0.3 deg/s": of},
+    evidence = SimpleNamespace(groups={"noise-free": of, "0.3 deg/s": of}, colours={v: i for i, v in enumerate(of)},
                                runs=pd.DataFrame({"budget": [100] * 2 + [10] * 6}),
                                histories=SimpleNamespace(grid=np.array([1, 10, 100])))  # fmt: skip
     values = np.array([[np.inf, 1.0, 1e-12], [2.0, 0.5, 1e-3]] * 4)
     figure = convergence_figure(evidence, np.arange(8) < 6, values, "error", floor=1e-6)
-    assert [axis.get_title() for axis in figure.axes] == ["pso", "de", "ga"]
-    assert [len(axis.collections) for axis in figure.axes] == [2, 2, 2]
-    assert np.nanmin(figure.axes[0].lines[1].get_ydata()) == 1e-6
-    # a curve ends where the budget does
-    assert [np.isnan(axis.lines[1].get_ydata()).tolist() for axis in figure.axes[:2]] == [
-        [False] * 3,
-        [False, False, True],
-    ]
+    assert [axis.get_title() for axis in figure.axes] == ["noise-free", "0.3 deg/s"]
+    assert [t.get_text() for t in figure.axes[0].texts] == ["pso", "de", "ga"]
+    _, de, pso = (line.get_ydata() for line in figure.axes[0].lines[:3])
+    assert np.nanmin(pso) == 1e-6
+    # a line ends where the budget does
+    assert [np.isnan(line).tolist() for line in (pso, de)] == [[False] * 3, [False, False, True]]
     plt.close(figure)
-
-
-HEIGHTS = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=18).map(sorted)
-
-
-@given(HEIGHTS)
-def test_names_do_not_overlap_and_stay_beside_the_axes(heights):
-    apart = 0.05
-    places = spread(heights, apart)
-    assert (np.diff(places) >= apart - 1e-9).all()
-    assert min(places) >= -1e-9
-    assert max(places) <= 1.0 + 1e-9
-
-
-def test_names_move_as_little_as_it_takes():
-    heights, apart = [0.30, 0.31, 0.33, 0.7], 0.1
-    limits = [{"type": "ineq", "fun": lambda x, i=i: x[i + 1] - x[i] - apart} for i in range(3)]
-    best = minimize(lambda x: np.sum((x - heights) ** 2), heights, constraints=limits).x
-    assert np.allclose(spread(heights, apart), best, atol=1e-4)

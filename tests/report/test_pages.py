@@ -18,8 +18,9 @@ from armid.cli.report import LOOP, document_of, kind_in, refuse_damaged
 from armid.errors import ArmidError
 from armid.loop.document import chances_sentence, loop_document
 from armid.report.document import Document, Line, Listing, Section, Sentences, rmse_text, table, varying
-from armid.report.files import csv, latex
+from armid.report.files import csv
 from armid.report.html import html, inline
+from armid.report.latex import latex
 from armid.report.markdown import markdown
 from armid.report.result import DETAILS, MANIFEST, digest_of
 from armid.report.style import legend_below, panels, row_names, svg_text, thinned
@@ -180,7 +181,7 @@ def test_a_name_is_shown_as_it_is_by_every_renderer(name, capsys, monkeypatch):
 def test_names_in_figures_that_another_library_lays_out(name):
     errors = DataFrame([[0.1, 0.2], [0.3, np.inf]], index=[name, "b"], columns=[name, "d"])
     ends = DataFrame({"variant": [name, "b"] * 4, "setting": "s", "p": np.arange(8.0), "q": np.arange(8.0) ** 2})
-    for figure in (error_map_figure({name: errors}), valley_figure(ends, [name, "b"])):
+    for figure in (error_map_figure({name: errors}), valley_figure(ends, {name: 0, "b": 1})):
         assert name in "".join(Elements(svg_text(figure)).texts)
 
 

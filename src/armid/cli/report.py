@@ -52,8 +52,12 @@ STUDY, PAGE = "study.sqlite", "report.html"
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--key", type=click.Path(path_type=Path), metavar="FILE",
               help="Truth of blind campaigns, which studies/blind/score.py scores.")  # fmt: skip
+@click.option("--format", "form", type=click.Choice(["page", "pdf"]), default="page", show_default=True,
+              help="page with its files, or only the figures of a study as PDF for a paper.")  # fmt: skip
+@click.option("--width", type=click.Choice(["single", "double"]), default="double", show_default=True,
+              help="Columns of the paper that a PDF figure spans.")  # fmt: skip
 @plugin_option
-def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
+def report_command(folder: Path, key: Path | None, form: str, width: str, plugins: tuple[str, ...]) -> None:
     """Write report.html, one self-contained page, beside stored results.
 
     DIR is a folder that `armid study`, `armid close-loop`, `armid identify` or `armid identifiability` (whose page is
@@ -65,8 +69,10 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     """
     kind = kind_in(folder)
     if kind is None:
-        report_study(folder, key, plugins)
+        report_study(folder, key, width if form == "pdf" else "", plugins)
         return
+    if form == "pdf":
+        raise ArmidError(f"{folder} holds no study: --format pdf draws the figures of a study, leave it out here")
     refuse_unwritable(folder, kind.page)
     if key is not None:
         raise ArmidError(f"{folder} holds no study, and a key is the truth of a study's campaigns: none is expected")
@@ -77,7 +83,9 @@ def report_command(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> 
     give(answer=document.said, folder=folder, files=files.names)
 
 
-def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> None:
+def report_study(folder: Path, key: Path | None, width: str, plugins: tuple[str, ...]) -> None:
+    """Write page and files of a study, or with the width of a column its figures for a paper."""
+    from armid.report.files import write_prints
     from armid.study.document import report_of, write_report
     from armid.study.results import load_study
 
@@ -89,14 +97,20 @@ def report_study(folder: Path, key: Path | None, plugins: tuple[str, ...]) -> No
         if document.warning:
             say(document.warning)
         with NewFiles(place) as files:
-            write_report(document, files)
+            if width:
+                write_prints(document, width, files.path)
+            else:
+                write_report(document, files)
     except UNSHOWABLE as error:
         # what a plug-in does wrong stays its own
         if isinstance(error, ArmidError) or place_in_plugin(error) is not None:
             raise
         expected = "its runs cannot be shown, what armid wrote is expected"
         raise ArmidError(f"{results.path} is damaged: {expected}") from error
-    say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
+    if width:
+        say(f"wrote {len(files.names)} figures as PDF to {place}")
+    else:
+        say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
     give(answer=document.said, folder=place, files=files.names)
 
 

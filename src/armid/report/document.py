@@ -34,12 +34,14 @@ class Column:
 
     key: name in the frame, and in the header of the CSV file. header: heading with the unit; "" where it needs none.
     digits: format of its numbers, such as ".3g"; "" for text. factor: from the number in the frame (SI) to that shown.
+    group: beginning of the heading that LaTeX writes once over neighbours that share it.
     """
 
     key: str
     header: str
     digits: str = ""
     factor: float = 1.0
+    group: str = ""
 
 
 class Struck(str):
@@ -70,7 +72,7 @@ class Table:
     name: of its files, without ending; "" for a table that is not written to files. caption: how each number was
     computed. frame: SI values, as a pandas frame or as rows in the order of the columns; None and NaN are left empty.
     most: rows that are shown, 0 for a table that is only written to its CSV file. grouped: whether rows that share the
-    first column stand under it as a heading (terminal only).
+    first column stand under it as a heading (terminal and LaTeX).
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Write the tables and figures of a document to files: CSV with every digit, LaTeX, PNG and SVG."""
+"""Write the tables and figures of a document to files: CSV with every digit, LaTeX, PNG and SVG, or PDF."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armid.report.document import Document, Table
-from armid.report.style import save
+from armid.report.latex import latex
+from armid.report.style import save, save_for_print
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -25,6 +26,13 @@ def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
     for figure in document.figures:
         if figure.draw is not None:
             save(figure.draw(), path_of(f"{figure.name}.png"), path_of(f"{figure.name}.svg"))
+
+
+def write_prints(document: Document, width: str, path_of: Callable[[str], Path]) -> None:
+    """Write each figure as PDF of the width of a page's "single" or "double" column."""
+    for figure in document.figures:
+        if figure.draw is not None:
+            save_for_print(figure.draw, path_of(f"{figure.name}.pdf"), width)
 
 
 def csv(table: Table) -> str:
@@ -69,18 +77,3 @@ def frame_of(table: Table) -> "DataFrame":
             numbers = [np.nan if row[i].number is None else row[i].number for row in table.cells()]
             frame.isetitem(i, column.factor * np.array(numbers, dtype=float))
     return frame
-
-
-def latex(table: Table) -> str:
-    from pandas import DataFrame
-
-    frame = DataFrame([[c.text for c in row] for row in table.cells()], columns=[c.header for c in table.columns])
-    align = "".join("r" if c.digits else "l" for c in table.columns)
-    return frame.to_latex(index=False, escape=True, column_format=align, caption=latex_text(table.title),
-                          label=f"tab:{table.name}", position="htbp")  # fmt: skip
-
-
-def latex_text(text: str) -> str:
-    special = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": "\\textasciitilde{}", "^": "\\textasciicircum{}"}
-    special["\\"] = "\\textbackslash{}"
-    return "".join(special.get(letter, letter) for letter in text)

@@ -1,7 +1,8 @@
 """The style of every figure, and how figures are written."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,22 @@ THEME: Any = {
 }  # fmt: skip
 
 
+# Figures of a paper: widths of one and of both columns [inch], and the size of all their letters [pt].
+WIDTHS = {"single": 3.5, "double": 7.2}
+LETTERS = 8.0
+# Columns of a paper that a figure is being drawn for, "" for a page. In a single one all panels stand in a column,
+# in a double one in two: more would leave no room between their names.
+PRINTED: ContextVar[str] = ContextVar("PRINTED", default="")
+MOST_COLUMNS = {"single": 1, "double": 2}
+# Least share of its height that a figure keeps when it becomes narrower.
+LEAST_HEIGHT_SHARE = 0.62
+# A figure of at most this height keeps it: axis labels and a legend take most of it [inch].
+LEAST_PRINT_INCH = 2.6
+# Room for a line of a legend before a figure becomes narrower [inch].
+LEGEND_INCH = 0.3
+PRINT_SETTINGS: Any = SETTINGS | {"pdf.fonttype": 42}
+
+
 def pyplot() -> Any:
     """Return pyplot on a backend without a screen (but a notebook's own), in the house style."""
     import matplotlib as mpl
@@ -70,7 +87,7 @@ def look(i: int) -> dict[str, Any]:
 
 def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list[Any]]:
     plt = pyplot()
-    columns = max(1, min(columns, n))
+    columns = max(1, min(columns, n, MOST_COLUMNS.get(PRINTED.get(), columns)))
     rows = -(-n // columns)
     size = (width * columns, height * rows)
     figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
@@ -104,6 +121,40 @@ def save(figure: Any, *paths: Path) -> None:
         for path in paths:
             without = ("Date", "Creator") if path.suffix == ".svg" else ("Software",)
             figure.savefig(path, dpi=DPI, metadata=dict.fromkeys(without))
+    pyplot().close(figure)
+
+
+def save_for_print(draw: Callable[[], Any], path: Path, width: str) -> None:
+    """Draw a figure and write it as PDF for a paper; the same figure gives the same bytes.
+
+    width: "single" or "double", of the columns of a page. All letters have one size. The title goes, as the caption
+    says it; those of several panels stay.
+    """
+    import matplotlib as mpl
+    from matplotlib.text import Text
+
+    token = PRINTED.set(width)
+    try:
+        figure = draw()
+    finally:
+        PRINTED.reset(token)
+    figure.suptitle("")
+    panels_there = [axis for axis in figure.axes if axis.get_subplotspec() is not None and axis.get_title()]
+    if len(panels_there) == 1:
+        panels_there[0].set_title("")
+    write_names_as_they_are(figure)
+    before, height = figure.get_size_inches()
+    smaller = height * max(WIDTHS[width] / before, LEAST_HEIGHT_SHARE)
+    figure.set_size_inches(WIDTHS[width], max(smaller, min(height, LEAST_PRINT_INCH)))
+    for text in figure.findobj(Text):
+        text.set_fontsize(LETTERS)
+    for axis in figure.axes:
+        axis.tick_params(which="both", labelsize=LETTERS)
+        flatten_marks(axis)
+    if not figure.get_constrained_layout():
+        figure.tight_layout()
+    with mpl.rc_context(PRINT_SETTINGS):
+        figure.savefig(path, dpi=2 * DPI, metadata=dict.fromkeys(("CreationDate", "Creator", "Producer")))
     pyplot().close(figure)
 
 
@@ -177,14 +228,13 @@ def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
 # panel needs beside its axes [inch].
 BESIDE, SAMPLE, GAP = 1.045, 0.055, 0.012
 APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
-
-
-def panel_height(n_lines: int) -> float:
-    return max(LEAST_HEIGHT, FRAME_INCH + APART_INCH * n_lines)
+# Identifiers that have a colour of their own in a report.
+MOST_NAMED = 6
 
 
 def row_names(axis: Any, i: int, names: Sequence[str]) -> None:
-    axis.set_yticks(range(len(names)), names if i % 2 == 0 else [""] * len(names))
+    names_here = i % 2 == 0 or PRINTED.get() == "single"
+    axis.set_yticks(range(len(names)), names if names_here else [""] * len(names))
 
 
 def legend_below(figure: Any, ncols: int, handles: Sequence[Any] | None = None) -> None:
@@ -192,58 +242,53 @@ def legend_below(figure: Any, ncols: int, handles: Sequence[Any] | None = None) 
     if handles is None:
         handles = figure.axes[0].get_legend_handles_labels()[0]
     labels = [handle.get_label() for handle in handles]
+    if PRINTED.get() == "single":
+        ncols = 1
+        figure.set_figheight(figure.get_figheight() + LEGEND_INCH * len(labels))
     figure.legend(handles, labels, loc="outside lower center", ncols=ncols, frameon=False)
 
 
 def named_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int]) -> None:
-    """Draw lines over a common x and name each beside its end; colours: name -> number of its colour and dashes."""
-    draw_lines(axis, x, lines, colours)
-    values = {name: np.asarray(y, float) for name, y in lines.items()}
-    finite = {name: y[np.isfinite(y)] for name, y in values.items()}
-    # lines that end alike are ordered by what they did before
-    names = sorted((n for n in lines if finite[n].size), key=lambda n: (finite[n][-1], finite[n].sum()))
-    low, high = axis.get_ylim()
-    heights = [float(np.clip((finite[n][-1] - low) / (high - low), 0.0, 1.0)) for n in names]
-    for name, height, place in zip(names, heights, spread(heights, name_distance(axis)), strict=True):
-        colour = look(colours[name])["color"]
-        axis.plot([1.0, BESIDE], [height, place], transform=axis.transAxes, color=colour, lw=0.7, clip_on=False)
-        write_name(axis, name, place, colours)
+    """Draw lines over a common x and list their names beside the axes; colours: name -> number of its colour.
 
-
-def listed_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int],
-                 names: Sequence[str]) -> None:  # fmt: skip
-    """Draw lines over a common x and list their names beside the axes from the top, in the order given."""
-    draw_lines(axis, x, lines, colours)
-    for i, name in enumerate(names):
-        write_name(axis, name, 1.0 - name_distance(axis) * (i + 0.5), colours)
-
-
-def draw_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int]) -> None:
+    The first have a colour each, all others are grey and share a name.
+    """
     # the axes keep the upright range that they have
     axis.set_ylim(*axis.get_ylim())
-    for name, y in lines.items():
-        axis.plot(x, y, lw=1.7, **look(colours[name]))
+    names = sorted(lines, key=lambda name: colours[name])
+    for name in reversed(names):
+        axis.plot(x, lines[name], **line_look(colours[name]))
     axis.margins(x=0.0)
+    coloured = [name for name in names if colours[name] < MOST_NAMED]
+    rows = [(name, colours[name]) for name in coloured]
+    if len(names) > len(coloured):
+        rows.append((f"others ({len(names) - len(coloured)})", MOST_NAMED))
+    for i, (name, number) in enumerate(rows):
+        write_name(axis, name, 1.0 - name_distance(axis) * (i + 0.5), number)
 
 
-def write_name(axis: Any, name: str, place: float, colours: Mapping[str, int]) -> None:
+def line_look(i: int) -> dict[str, Any]:
+    """Return the look of the line of an identifier, of which the first have a colour each."""
+    return {"color": COLOURS[i], "lw": 1.7, "zorder": 3} if i < MOST_NAMED else {"color": PALE, "lw": 1.0, "zorder": 1}
+
+
+def variant_handles(colours: Mapping[str, int]) -> list[Any]:
+    """Return what a legend shows of marks in the colours of identifiers, in their order."""
+    from matplotlib.lines import Line2D
+
+    names = [name for name in sorted(colours, key=lambda n: colours[n]) if colours[name] < MOST_NAMED]
+    rows = [(name, colours[name]) for name in names]
+    if len(colours) > len(names):
+        rows.append((f"others ({len(colours) - len(names)})", MOST_NAMED))
+    return [Line2D([], [], ls="", marker="o", mfc="none", mec=line_look(i)["color"], label=name) for name, i in rows]
+
+
+def write_name(axis: Any, name: str, place: float, number: int) -> None:
     there = {"transform": axis.transAxes, "clip_on": False}
-    axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], lw=1.9, **there, **look(colours[name]))
+    axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], **there, **line_look(number))
     axis.text(BESIDE + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
 
 
 def name_distance(axis: Any) -> float:
     grid = axis.get_subplotspec().get_gridspec()
     return float(APART_INCH / (axis.figure.get_size_inches()[1] / grid.nrows - FRAME_INCH))
-
-
-def spread(heights: Sequence[float], apart: float) -> Array:
-    """Return rising heights moved at least so far apart, as little as it takes in the sense of least squares.
-
-    What has to be moved moves as a group that stays around its mean; groups are kept within 0 and 1 if they fit.
-    """
-    from scipy.optimize import isotonic_regression
-
-    steps = apart * np.arange(len(heights))
-    room = max(1.0 - apart * (len(heights) - 1), 0.0)
-    return np.clip(isotonic_regression(heights - steps).x, 0.0, room) + steps

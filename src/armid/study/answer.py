@@ -122,13 +122,12 @@ def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
 
 def own(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     """Return where the identifiers of plug-ins stand."""
-    names = [str(plugin).rpartition(":")[2] for plugin in evidence.study.get("plugins", ())]
     said = []
     for setting in noisy_first(evidence)[:MOST_SETTINGS]:
         there = frame[(frame["setting"] == setting) & (frame["variant"] != PAPER)]
         medians = there.set_index("variant")["largest_median"]
         for variant in medians.index:
-            if any(variant == name or variant.startswith((f"{name} ", f"{name}+")) for name in names):
+            if variant in evidence.own:
                 place = 1 + int((medians < medians[variant]).sum())
                 said.append(f"{variant} is number {place} of {len(medians)} ({setting}, {percent(medians[variant])})")
     return (f"Your own: {'; '.join(said)}.",) if said else ()

@@ -227,8 +227,14 @@ class Evidence:
 
     @cached_property
     def colours(self) -> dict[str, int]:
-        """Variant -> number of its colour, the same in all figures."""
-        return {name: i for i, name in enumerate(self.variants)}
+        """Variant -> number of its colour, the same in all figures: those of plug-ins first, then the best."""
+        return {name: i for i, name in enumerate(dict.fromkeys([*self.own, *self.best_first]))}
+
+    @cached_property
+    def own(self) -> list[str]:
+        """Variants of identifiers that the reader brought as plug-ins."""
+        names = [str(plugin).rpartition(":")[2] for plugin in self.study.get("plugins", ())]
+        return [v for v in self.variants if any(v == n or v.startswith((f"{n} ", f"{n}+")) for n in names)]
 
     @cached_property
     def best_first(self) -> list[str]:

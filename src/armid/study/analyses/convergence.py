@@ -1,4 +1,4 @@
-"""Convergence: error and fitness of the best candidate against simulations, median and quartiles over runs."""
+"""Convergence: error and fitness of the best candidate against simulations, median over runs."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -8,26 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.report.document import Column, Figure, Part, Table, slug
-from armid.report.style import COLOURS, DASHES, PALE, legend_below, panels
+from armid.report.style import LEAST_HEIGHT, named_lines, panels
 from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
 from armid.study.analyses.running_time import PAIRS_HIT, share_hit, share_panels
 
 Array = NDArray[np.floating[Any]]
-QUARTILES = (0.25, 0.5, 0.75)
-COLUMNS = 4
-ERROR_LABEL = "largest relative\nerror [%]"
+ERROR_LABEL = "largest relative error [%]"
 # Smaller values are drawn there.
 LEAST_PERCENT, LEAST_FITNESS = 1e-6, 1e-16
 ERROR_CAPTION = (
-    "Largest relative error of the best candidate so far against simulations, over all cases and seeds: median as a "
-    "line, quartiles as a band, a colour a noise level. The error may rise, since the fitness decides what is best. "
-    "Pale: the smallest median so far of all identifiers. Errors below 1e-6 % are drawn there; a run that stops early "
-    "keeps its value up to its budget, where its curve ends."
+    "Largest relative error of the best candidate so far against simulations: median over all cases and seeds. The "
+    "error may rise, since the fitness decides what is best. Errors below 1e-6 % are drawn there. A run that stops "
+    "early keeps its value up to its budget, where its line ends. Your own identifiers and the best have a colour."
 )
 FITNESS_CAPTION = (
-    "Smallest value of the fitness {fitness} so far (of a similarity: 1 minus its degree) against simulations, over "
-    "all cases and seeds: median as a line, quartiles as a band, a colour a noise level. Pale: the smallest median so "
-    "far of all identifiers."
+    "Smallest value of the fitness {fitness} so far (of a similarity: 1 minus its degree) against simulations: median "
+    "over all cases and seeds. Your own identifiers and the best have a colour."
 )
 
 
@@ -42,7 +38,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     names = list(dict.fromkeys(map(str, evidence.runs["fitness"])))
     for name in names:
         own = (evidence.runs["fitness"] == name).to_numpy()
-        draw = partial(convergence_figure, evidence, own, kept.values, f"best fitness\n({name})", LEAST_FITNESS)
+        draw = partial(convergence_figure, evidence, own, kept.values, f"best fitness ({name})", LEAST_FITNESS)
         file = slug("convergence", name) if len(names) > 1 else "convergence_fitness"
         figures.append(Figure(file, f"Convergence of {name}", FITNESS_CAPTION.format(fitness=name), draw))
     return figures
@@ -51,49 +47,35 @@ def parts(evidence: Evidence) -> Sequence[Part]:
 CONVERGENCE = Analysis("convergence", "Convergence", parts, "error and fitness against simulations")
 
 
-def band(held_values: Array) -> Array:
-    """Return the quartiles at each count of simulations, (3, n_grid), each a value that a run had."""
-    found: Array = np.quantile(held_values, QUARTILES, axis=0, method="inverted_cdf").astype(float)
+def median(held_values: Array) -> Array:
+    """Return the median at each count of simulations, (n_grid,), a value that a run had."""
+    found: Array = np.quantile(held_values, 0.5, axis=0, method="inverted_cdf").astype(float)
     return found
 
 
 def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array, label: str, floor: float) -> Any:
-    """Draw one panel a variant: median as a line, quartiles as a band, a colour a setting.
+    """Draw one panel a setting and one line a variant, the median over its runs.
 
     own: runs to show, (n_runs,); values: quantity of the best candidate so far, (n_runs, n_grid); floor: least drawn.
     """
     grid = evidence.histories.grid
-    bands: dict[str, dict[str, Array]] = {}
+    curves: dict[str, dict[str, Array]] = {}
     for setting, variants in evidence.groups.items():
         for variant, rows in variants.items():
             if own[rows].any():
-                found = band(values[rows[own[rows]]])
+                found = median(values[rows[own[rows]]])
                 spent = grid > evidence.runs["budget"].to_numpy()[rows[own[rows]]].max()
                 shown = np.where(np.isfinite(found) & ~spent, np.maximum(found, floor), np.nan)
-                bands.setdefault(variant, {})[setting] = shown
-    every = np.concatenate([b[np.isfinite(b)] for of in bands.values() for b in of.values()])
+                curves.setdefault(setting, {})[variant] = shown
+    every = np.concatenate([line[np.isfinite(line)] for lines in curves.values() for line in lines.values()])
     limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
-    settings = list(dict.fromkeys(s for of in bands.values() for s in of))
-    # NaN where nobody has any yet
-    best = {s: np.fmin.accumulate(np.fmin.reduce([of[s][1] for of in bands.values() if s in of])) for s in settings}
-    figure, axes = panels(len(bands), COLUMNS, 4.4, 3.5)
-    for place, (axis, (variant, of)) in enumerate(zip(axes, bands.items(), strict=True)):
-        for setting, (lower, middle, upper) in of.items():
-            i = settings.index(setting)
-            axis.plot(grid, best[setting], color=PALE, lw=1.0, zorder=1)
-            axis.fill_between(grid, lower, upper, color=COLOURS[i % 7], alpha=0.22, lw=0, zorder=2)
-            axis.plot(grid, middle, color=COLOURS[i % 7], ls=DASHES[i % 3], lw=1.8, label=setting, zorder=3)
-        axis.set(xscale="log", yscale="log", xlim=(1, grid[-1]), ylim=limits)
+    figure, axes = panels(len(curves), 2, 7.8, LEAST_HEIGHT)
+    for axis, (setting, lines) in zip(axes, curves.items(), strict=True):
+        axis.set(xscale="log", yscale="log", xlim=(1, grid[-1]), ylim=limits, xlabel="simulations", ylabel=label)
+        named_lines(axis, grid, lines, evidence.colours)
         axis.minorticks_off()
         axis.grid(alpha=0.3)
-        axis.set_title(variant, fontsize="medium")
-        if place % COLUMNS == 0:
-            axis.set_ylabel(label)
-        else:
-            axis.tick_params(labelleft=False)
-        if place + COLUMNS >= len(axes):
-            axis.set_xlabel("simulations")
-    legend_below(figure, 4)
+        axis.set_title(setting)
     return figure
 
 

@@ -8,24 +8,25 @@ import numpy as np
 from pandas import DataFrame, concat
 
 from armid.report.document import Figure, Part, slug
-from armid.report.style import COLOURS, MARKERS, PALE, no_formulas, pyplot
+from armid.report.style import COLOURS, MARKERS, MOST_NAMED, PALE, PRINTED, no_formulas, pyplot
 from armid.study.analyses.analysis import Analysis, Evidence, every_nth
 
 # Range of the colours of the map [%]; cells carry numbers up to so many cases.
 LOWEST, HIGHEST = 1e-6, 1e2
 MOST_NUMBERS = 12
 # The parameters that compensate each other on the arm; others where a study has others.
-VALLEY = ("p0", "eta3", "n")
-MOST_PARAMETERS, MOST_COLOURED, MOST_POINTS = 3, 6, 600
+VALLEY = ("p0", "eta3", "n", "k")
+MOST_PARAMETERS, MOST_POINTS = 4, 600
 OTHERS = "all others"
 MAP_CAPTION = (
     "Largest relative error of a run [%], median over the seeds, by identifier and case, one map a noise level, "
-    "the best identifier (over all) on top. The colours are logarithmic from 1e-6 % to 100 %."
+    "the best identifier (over all) on top. The colours are logarithmic over the errors shown, at most from 1e-6 % to "
+    "100 %."
 )
 VALLEY_CAPTION = (
     "Deviation (value - truth)/truth [%] of the results of all finished runs in each pair of parameters, one mark a "
-    "run; counts on the diagonal. Where marks lie along a line, parameters compensate each other. Of more than 600 "
-    "runs of one identifier every n-th is drawn."
+    "run; counts on the diagonal. Near 0 the axes are linear, further out logarithmic. Where marks lie along a line, "
+    "parameters compensate each other. Of more than 600 runs of one identifier every n-th is drawn."
 )
 
 
@@ -37,7 +38,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     ends = end_points(evidence.estimates)
     if ends.shape[1] > 3 and len(ends) > 1:
         for s in (s for s in evidence.settings if (ends["setting"] == s).any()):
-            draw = partial(valley_figure, ends[ends["setting"] == s], evidence.interesting[:MOST_COLOURED])
+            draw = partial(valley_figure, ends[ends["setting"] == s], evidence.colours)
             name = slug("valley", s if len(evidence.settings) > 1 else "")
             figures.append(Figure(name, f"Where runs end, {s}", VALLEY_CAPTION, draw))
     return figures
@@ -59,22 +60,34 @@ def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
     plt = pyplot()
     n_rows = sum(len(m) for m in maps.values())
     n_columns = max(m.shape[1] for m in maps.values())
-    numbers = n_columns <= MOST_NUMBERS
+    numbers = n_columns <= (MOST_NUMBERS if PRINTED.get() != "single" else 0)
+    low, high = colour_range(np.concatenate([100.0 * m.to_numpy(float).ravel() for m in maps.values()]))
     size = (3.4 + (0.95 if numbers else 0.36) * n_columns, 1.3 * len(maps) + 0.36 * n_rows + 0.4)
     with no_formulas():
         figure, axes = plt.subplots(len(maps), 1, figsize=size, squeeze=False, layout="constrained")
         for axis, (setting, errors) in zip(axes.ravel(), maps.items(), strict=True):
             percent = 100.0 * errors
             text = percent.map(brief) if numbers else False
-            sns.heatmap(percent.clip(LOWEST, HIGHEST), ax=axis, norm=LogNorm(LOWEST, HIGHEST), cmap="cividis_r",
+            sns.heatmap(percent.clip(low, high), ax=axis, norm=LogNorm(low, high), cmap="cividis_r",
                         annot=text, fmt="", cbar=False, linewidths=0.4, annot_kws={"fontsize": 8.5}, xticklabels=True,
                         yticklabels=True)  # fmt: skip
             axis.set(title=setting, xlabel="", ylabel="")
             axis.tick_params(length=0)
+            if PRINTED.get() == "single":
+                axis.tick_params(axis="x", labelrotation=90)
     beside = {"ax": list(axes.ravel()), "pad": 0.02, "fraction": 0.05, "shrink": 1.0 / len(maps), "aspect": 25}
     bar = figure.colorbar(axes[0, 0].collections[0], extend="both", **beside)
     bar.set_label("largest relative error [%]")
     return figure
+
+
+def colour_range(percent: np.ndarray) -> tuple[float, float]:
+    """Return the powers of ten around the errors that the map shows, no further than from 1e-6 to 100 %."""
+    seen = percent[np.isfinite(percent)].clip(LOWEST, HIGHEST)
+    if not seen.size:
+        return LOWEST, HIGHEST
+    low, high = 10.0 ** np.floor(np.log10(seen.min())), 10.0 ** np.ceil(np.log10(seen.max()))
+    return float(low), float(max(high, 10.0 * low))
 
 
 def brief(percent: float) -> str:
@@ -89,31 +102,65 @@ def end_points(estimates: DataFrame) -> DataFrame:
     deviation = 100.0 * (known["value"] - known["truth"]) / known["truth"].abs()
     wide = known.assign(deviation=deviation).pivot(index="run", columns="parameter", values="deviation")
     names = list(dict.fromkeys(known["parameter"]))
-    chosen = list(VALLEY) if set(VALLEY) <= set(names) else names[:MOST_PARAMETERS]
+    chosen = [n for n in VALLEY if n in names] if set(VALLEY[:3]) <= set(names) else names[:MOST_PARAMETERS]
     groups = known.drop_duplicates("run").set_index("run")[["variant", "setting"]]
     return groups.join(wide[chosen].dropna(), how="inner")
 
 
-def valley_figure(ends: DataFrame, chosen: list[str]) -> Any:
-    """Draw the deviations of each pair of parameters, one mark a run; those that are not chosen are pale."""
+def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
+    """Draw the deviations of each pair of parameters, one mark a run; those without a colour of their own are pale."""
     import seaborn as sns
 
     pyplot()
     names = [c for c in ends.columns if c not in ("variant", "setting")]
+    chosen = [v for v in sorted(colours, key=lambda v: colours[v]) if colours[v] < MOST_NAMED]
     shown = thinned(ends.assign(shown=ends["variant"].where(ends["variant"].isin(chosen), OTHERS)))
     there = [v for v in (OTHERS, *chosen) if v in set(shown["shown"])]
-    palette = {v: PALE if v == OTHERS else COLOURS[chosen.index(v) % len(COLOURS)] for v in there}
-    marks = ["." if v == OTHERS else MARKERS[chosen.index(v) % len(MARKERS)] for v in there]
+    palette = {v: PALE if v == OTHERS else COLOURS[colours[v]] for v in there}
+    marks = ["." if v == OTHERS else MARKERS[colours[v]] for v in there]
     with no_formulas():
         grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=there, palette=palette, corner=True, height=2.9,
                             hue_kws={"marker": marks})  # fmt: skip
         grid.map_lower(scatter)
-        grid.map_diag(sns.histplot, element="step", fill=False, bins=30, common_norm=False)
+        grid.map_diag(histogram)
+        linear = linear_range(shown[names].to_numpy(float))
+        ticks = signed_powers(linear, float(np.abs(shown[names].to_numpy(float)).max()))
+        labels = [f"{tick:g}" for tick in ticks]
+        for axis in (a for a in grid.axes.flat if a is not None):
+            axis.set_xscale("symlog", linthresh=linear)
+            axis.set_xticks(ticks, labels)
+            axis.minorticks_off()
+            axis.grid(alpha=0.3)
+            axis.tick_params(labelsize=8)
+        for axis in (grid.axes[i, j] for i in range(len(names)) for j in range(i)):
+            axis.set_yscale("symlog", linthresh=linear)
+            axis.set_yticks(ticks, labels)
+            axis.minorticks_off()
         for i, name in enumerate(names):
-            grid.axes[i, 0].set_ylabel(f"{name}: deviation [%]" if i else "runs")
-            grid.axes[-1, i].set_xlabel(f"{name}: deviation [%]")
+            grid.axes[i, 0].set_ylabel(f"{name} [%]" if i else "runs")
+            grid.axes[-1, i].set_xlabel(f"{name} [%]")
         grid.add_legend(title="", loc="upper right", bbox_to_anchor=(0.99, 0.98), fontsize=10, markerscale=1.2)
     return grid.figure
+
+
+def linear_range(deviations: np.ndarray) -> float:
+    """Return the power of ten up to which the axes are linear: about what a tenth of the runs are within [%]."""
+    sizes = np.abs(deviations[deviations != 0.0])
+    return float(10.0 ** np.clip(np.floor(np.log10(np.quantile(sizes, 0.1))), -6.0, 1.0)) if sizes.size else 1.0
+
+
+def signed_powers(linear: float, largest: float) -> list[float]:
+    """Return 0, the largest power of ten on the axis and one half-way down to its linear range, with both signs."""
+    top, bottom = np.floor(np.log10(max(largest, linear))), np.log10(linear)
+    powers = sorted({float(f"1e{int(p)}") for p in (np.floor(0.5 * (top + bottom)), top) if p >= bottom})
+    powers = powers[-1:] if PRINTED.get() == "single" else powers
+    return [*(-p for p in reversed(powers)), 0.0, *powers]
+
+
+def histogram(x: np.ndarray, **look: Any) -> None:
+    """Draw how many runs deviate by as much, in bins that are as wide as the axis shows them."""
+    ends = np.geomspace(1e-7, 1e3, 41)
+    pyplot().gca().hist(x, np.concatenate([-ends[::-1], ends]), histtype="step", color=look["color"])
 
 
 def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:

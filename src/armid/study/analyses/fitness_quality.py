@@ -1,6 +1,6 @@
 """Which fitness gives right parameters, and whether a high similarity says so."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import COLOURS, MARKERS, legend_below, panels
+from armid.report.style import INK, legend_below, line_look, panels, row_names, variant_handles
 from armid.study.analyses.analysis import N_RUNS, SETTING, Analysis, Evidence, every_nth
 
-# Smaller values of 1 - S and of relative errors are drawn there.
+# Smaller relative errors are drawn there.
 FLOOR = 1e-16
 MOST_POINTS = 800
 COLUMNS = (
@@ -27,17 +27,17 @@ TABLE_CAPTION = (
     "and the largest error; near 1 a higher similarity means better parameters, near 0 it says nothing about them."
 )
 FIGURE_CAPTION = (
-    "Each mark is a run: the largest relative error of its result against 1 - S, the similarity degree that it "
-    "reached on the train records, whatever was minimised. A fitness that gives right parameters is low; one that "
-    "only gives a high similarity is left but not low. Failed runs are left out; values below 1e-16 are drawn there."
+    "Largest relative error of the result of each run, one mark a run and one strip a fitness; the line is the median "
+    "of the strip. A fitness that gives right parameters is left. Failed runs are left out; errors below 1e-14 % are "
+    "drawn there. Your own identifiers and the best have a colour."
 )
 
 
 def parts(evidence: Evidence) -> Sequence[Part]:
     if evidence.runs["fitness"].nunique() < 2 or not evidence.knows_truth:
         return ()
-    figure = Figure("fitness", "Error against the similarity reached", FIGURE_CAPTION,
-                    lambda: fitness_quality_figure(evidence.runs))  # fmt: skip
+    figure = Figure("fitness", "Errors by fitness", FIGURE_CAPTION,
+                    lambda: fitness_quality_figure(evidence.runs, evidence.colours))  # fmt: skip
     return fitness_quality(evidence.runs), figure
 
 
@@ -69,19 +69,26 @@ def rank_correlation(first: NDArray[np.float64], second: NDArray[np.float64]) ->
     return float(spearmanr(x, y).statistic)
 
 
-def fitness_quality_figure(runs: DataFrame) -> Any:
+def fitness_quality_figure(runs: DataFrame, colours: Mapping[str, int]) -> Any:
+    """Draw the error of each run in a strip of its fitness, one panel a setting and one colour an identifier."""
     settings = list(dict.fromkeys(runs["setting"]))
     names = list(dict.fromkeys(runs["fitness"]))
-    figure, axes = panels(len(settings), 2, 6.8, 5.2)
-    for axis, setting in zip(axes, settings, strict=True):
+    figure, axes = panels(len(settings), 2, 6.8, 1.8 + 0.55 * len(names))
+    random = np.random.default_rng(1)
+    for i, (axis, setting) in enumerate(zip(axes, settings, strict=True)):
         own = runs[(runs["setting"] == setting) & (runs["status"] == "done")]
         for k, name in enumerate(names):
-            group = every_nth(own[own["fitness"] == name], MOST_POINTS)
-            misfit = np.maximum(1.0 - group["train_s"].to_numpy(float), FLOOR)
-            error = np.maximum(100.0 * group["largest_error"].to_numpy(float), 100.0 * FLOOR)
-            axis.plot(misfit, error, MARKERS[k % 7], ms=4.5, mfc="none", mew=0.9, color=COLOURS[k % 7], label=name)
-        axis.set(xscale="log", yscale="log", title=setting, ylabel="largest relative error [%]",
-                 xlabel="1 - S reached (similarity degree on the train records)")  # fmt: skip
-        axis.grid(alpha=0.3)
-    legend_below(figure, 4)
+            for _, group in own[own["fitness"] == name].groupby("variant", sort=False):
+                shown = every_nth(group, MOST_POINTS)
+                error = np.maximum(100.0 * shown["largest_error"].to_numpy(float), 100.0 * FLOOR)
+                look = line_look(colours[str(shown["variant"].iloc[0])])
+                axis.plot(error, k + random.uniform(-0.32, 0.32, error.size), "o", ms=3.0, mfc="none", mew=0.8,
+                          mec=look["color"], zorder=look["zorder"])  # fmt: skip
+            middle = 100.0 * own.loc[own["fitness"] == name, "largest_error"].median()
+            if np.isfinite(middle):
+                axis.plot([max(middle, 100.0 * FLOOR)] * 2, [k - 0.42, k + 0.42], color=INK, lw=2.0, zorder=5)
+        row_names(axis, i, names)
+        axis.set(xscale="log", title=setting, xlabel="largest relative error [%]", ylim=(len(names) - 0.5, -0.5))
+        axis.grid(axis="x", alpha=0.3)
+    legend_below(figure, 3, variant_handles(colours))
     return figure

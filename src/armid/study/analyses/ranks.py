@@ -14,7 +14,7 @@ from pandas import DataFrame, Series
 
 from armid.model import Array
 from armid.report.document import Column, Figure, Part, Table, Text, slug
-from armid.report.style import INK, look, pyplot
+from armid.report.style import INK, line_look, pyplot
 from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, is_swarm
 
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
@@ -59,7 +59,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         said += [arrived_sentence(reached, setting)] if len(reached) else []
         tables += [mean_ranks(tests, reached, setting, slug("ranks", end)), pairs(tests, setting, slug("pairs", end))]
         if tests.n_cases >= LEAST_CASES and len(tests.ranks) > 2:
-            draw = partial(critical_difference_figure, tests, setting)
+            draw = partial(critical_difference_figure, tests, evidence.colours)
             name = slug("critical_difference", end)
             figures.append(Figure(name, f"Critical differences, {setting}", FIGURE_CAPTION, draw))
     note = "" if figures else f" A critical-difference diagram wants {LEAST_CASES} cases or more."
@@ -264,22 +264,22 @@ def p_matrix(tests: RankTests) -> DataFrame:
     return DataFrame(matrix, index=names, columns=names)
 
 
-def critical_difference_figure(tests: RankTests, setting: str) -> Any:
+def critical_difference_figure(tests: RankTests, colours: Mapping[str, int]) -> Any:
     """Draw the mean ranks on a line (Demsar 2006); a bar joins identifiers that do not differ significantly at 5 %."""
     import scikit_posthocs as sp
 
     plt = pyplot()
     n = len(tests.ranks)
     figure, axis = plt.subplots(figsize=(10.5, 1.6 + 0.26 * n), layout="constrained")
-    colours = {name: look(i)["color"] for i, name in enumerate(tests.blocks.columns)}
+    look = {name: line_look(colours[str(name)])["color"] for name in tests.blocks.columns}
     with warnings.catch_warnings():
         # pandas warns scikit-posthocs of what it does inside
         warnings.simplefilter("ignore", FutureWarning)
         sp.critical_difference_diagram(
-            tests.ranks, p_matrix(tests), ax=axis, color_palette=colours, label_fmt_left="{label} ({rank:.2f})",
+            tests.ranks, p_matrix(tests), ax=axis, color_palette=look, label_fmt_left="{label} ({rank:.2f})",
             label_fmt_right="({rank:.2f}) {label}", label_props={"fontsize": 10}, crossbar_props={"color": INK},
         )  # fmt: skip
-    axis.set_title(f"mean rank over {tests.n_cases} cases, {setting}: 1 is best", fontsize="medium")
+    figure.supxlabel(f"mean rank over {tests.n_cases} cases, 1 is best", fontsize="medium")
     return figure
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import listed_lines, named_lines, panel_height, panels
+from armid.report.style import LEAST_HEIGHT, named_lines, panels
 from armid.study.analyses.analysis import N_RUNS, SETTING, TARGETS, VARIANT, Analysis, Evidence
 from armid.study.analyses.success import TOLERANCES
 
@@ -29,13 +29,13 @@ TARGET = "Target: the largest relative error of the best candidate so far is at 
 ECDF_CAPTION = (
     "Share of all pairs of a run and a target that are hit within so many simulations. The 51 targets are largest "
     "relative errors of the parameters, evenly spread in their logarithm from 100 % to 1e-8 %; a target is hit when "
-    "the best candidate so far (by fitness) is first that near to the truth. Names stand in the order in which the "
-    "lines end; a run that stops early stays where it ended."
+    "the best candidate so far (by fitness) is first that near to the truth. Your own identifiers and the best have "
+    "a colour, the others are grey. A run that stops early stays where it ended."
 )
 FIGURE_CAPTION = (
     "Simulations that one success costs on average when a method is started again until it has one: those of all runs "
     "until the target is first hit (all that were used where it is not), divided by the number of runs that hit. A "
-    "line ends at the strictest target that any run hit; names are listed from the strictest one on."
+    "line ends at the strictest target that any run hit. Your own identifiers and the best have a colour."
 )
 
 
@@ -111,10 +111,9 @@ def share_panels(
     curves: Sequence[tuple[str, ArrayLike, Mapping[str, Array]]], colours: Mapping[str, int], columns: int, width: float
 ) -> tuple[Any, list[Any]]:
     """Draw shares that rise with the simulations, one panel each. curves: title, simulations, and name -> share."""
-    figure, axes = panels(len(curves), columns, width, panel_height(len(colours)))
-    largest = max((float(np.max(shares)) for *_, lines in curves for shares in lines.values()), default=1.0)
+    figure, axes = panels(len(curves), columns, width, LEAST_HEIGHT)
     for axis, (title, grid, lines) in zip(axes, curves, strict=True):
-        axis.set(xscale="log", ylim=(0.0, min(1.0, 1.1 * largest) or 1.0))
+        axis.set(xscale="log", ylim=(0.0, 1.0))
         named_lines(axis, grid, lines, colours)
         axis.set_title(title)
         axis.grid(alpha=0.3)
@@ -123,21 +122,15 @@ def share_panels(
 
 def running_time_figure(evidence: Evidence, hits: Array, targets: Array, label: str) -> Any:
     """Draw one panel a setting and one line a variant; a line ends where no run hits the target."""
-    figure, axes = panels(len(evidence.groups), 2, 7.8, panel_height(len(evidence.colours)))
+    figure, axes = panels(len(evidence.groups), 2, 7.8, LEAST_HEIGHT)
     for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
         lines = {v: expected_running_time(hits[rows], evidence.used[rows])[0] for v, rows in variants.items()}
         lines = {v: np.where(np.isfinite(ert), ert, np.nan) for v, ert in lines.items()}
         axis.set(xscale="log", yscale="log", xlim=(targets[0], targets[-1]), ylim=powers_around(lines.values()))
-        listed_lines(axis, targets, lines, evidence.colours, sorted(lines, key=lambda v: strictest(lines[v])))
+        named_lines(axis, targets, lines, evidence.colours)
         axis.set(title=setting, xlabel=label, ylabel="expected running time [simulations]")
         axis.grid(alpha=0.3)
     return figure
-
-
-def strictest(line: Array) -> tuple[int, float]:
-    """Return what sorts lines: how many targets are not reached, then the running time to the last that is."""
-    reached = line[np.isfinite(line)]
-    return line.size - reached.size, float(reached[-1]) if reached.size else np.inf
 
 
 def powers_around(lines: Iterable[Array]) -> tuple[float, float]:
@@ -204,8 +197,6 @@ def data_profile_figure(evidence: Evidence) -> Any:
         lines = {v: data_profile(kept.value_hits[rows, place], n_free[rows], grid) for v, rows in variants.items()}
         curves.append((f"{setting}, {share:g} left", grid, lines))
     figure, axes = share_panels(curves, evidence.colours, columns, 6.6)
-    for axis in axes[-columns:]:
-        axis.set_xlabel("simulations / (free parameters + 1)")
-    for axis in axes[::columns]:
-        axis.set_ylabel("share of problems solved")
+    for axis in axes:
+        axis.set(xlabel="simulations / (free parameters + 1)", ylabel="share of problems solved")
     return figure

@@ -10,6 +10,7 @@ from pandas import DataFrame
 from armid.report.document import Column, Figure, Part, Table
 from armid.report.style import COLOURS, MARKERS, legend_below, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, VARIANT, Analysis, Evidence
+from armid.study.analyses.table1 import paper_layout
 from armid.units import shown
 
 COLUMNS = (
@@ -44,7 +45,8 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         return ()
     figure = Figure("table2", "Repeated identifications beside the paper's", FIGURE_CAPTION,
                     lambda: table2_figure(estimates, published))  # fmt: skip
-    return table2(estimates, published), table2_records(estimates), figure
+    layout = paper_layout(evidence, "Table II", with_truth=False)
+    return layout, table2(estimates, published), table2_records(estimates), figure
 
 
 TABLE2 = Analysis("table2", "Table II of the paper beside ours", parts, "mean and spread, where the study asks for it")
