@@ -56,7 +56,7 @@ SAME = 0.01
 LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 # Integration steps between samples, relative fall of squares at which a rough fit has arrived.
 SUBSTEPS, TOLERANCE = 4, 1e-3
-# Samples of a motion that a motor drives are not further apart [s].
+# Longest sample interval of a motion that a motor drives [s].
 LONGEST_INTERVAL = 1.0
 # A record begins elsewhere than the model where each of so many first samples is more than so many times the noise, and
 # than this share of the motion, away.

@@ -113,7 +113,7 @@ class SearchOptions(Options):
 
     @abstractmethod
     def search(self, task: SearchTask) -> None:
-        """Ask for candidates until the task drops the search, or to its own end."""
+        """Request candidates until the search converges or the task ends it."""
 
     def build(self, budget: int) -> SearchAlgorithm:
         """Return the search as an algorithm of pymoo."""

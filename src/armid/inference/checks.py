@@ -33,7 +33,7 @@ MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
 DEPENDENT = 1e-11
 # Share of the samples of a record over which lines are drawn where they are no data.
 MOST_BRIDGED = 0.05
-# Shares of the largest speed and of its largest change, up to which it is a rest and an even speed.
+# Below this share of the largest speed a machine is at rest; below this share of the largest change its speed is even.
 STILL, EVEN = 0.02, 0.1
 
 

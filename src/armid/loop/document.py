@@ -68,7 +68,7 @@ MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
 WEAK = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
-# A smaller share would read as 0 %.
+# Smallest share that is shown: a smaller one is rounded to 0 %.
 LEAST_SHARE = 0.005
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {

@@ -169,8 +169,8 @@ def with_unit(name: str, unit: str, where: str) -> str:
         return name
     other = max((e for e in UNIT_ENDS.values() if name.endswith(f"_{e}")), key=len, default="")
     if other:
-        raise ArmidError(f"{where}: the unit of {quoted(name)} is {quoted(unit)} there, the unit that its name ends in "
-                         "is expected")  # fmt: skip
+        raise ArmidError(f"{where}: the unit of {quoted(name)} is {quoted(unit)}, the unit at the end of its name is "
+                         "expected")  # fmt: skip
     return f"{name}_{end}"
 
 
