@@ -36,7 +36,7 @@ LEFT_BY_TWO = 0.2
 NOTHING, UNLIKE = 0.95, 0.3
 # An error up to this, where the model explains nothing as told, shows an exchange that a missing effect half hides.
 EXCHANGED = 0.6
-# A record stands out where its error is so many times that of the others; an error from which on records disagree.
+# A record disagrees if its error is APART times that of the others. Errors well below AGREED count as agreement.
 APART, AGREED = 3.0, 0.05
 # Candidates spread over the box, samples of all records together that are looked at, least of one record.
 N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
@@ -135,7 +135,7 @@ class Trial:
     def spread(self, records: Sequence[Record], most: int = N_SPREAD) -> Array:
         n_samples, n = sum(r.n_samples for r in records), int(self.space.free.sum())
         spread = probes(np.zeros(n), np.ones(n), max(min(most, MOST_VALUES // n_samples), 8))
-        # boxes are wide, and most machines lie in their lower part
+        # ranges are wide, and most machines lie in their lower part
         spread[::2] **= 3
         return spread
 

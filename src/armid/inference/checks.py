@@ -419,7 +419,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
 
 
 def bridged(signal: Array, replay: Replay) -> Array:
-    """Return a signal with straight lines over the few samples that are no data: a jump in slow noise would ring."""
+    """Return a signal with invalid samples interpolated linearly: a jump in slow noise would ring."""
     times, spacing = replay.times, replay.record.spacing
     even = np.arange(times[0], times[-1] + 0.5 * spacing, spacing)
     is_nearly_whole = len(times) < len(even) < (1.0 + MOST_BRIDGED) * len(times)

@@ -441,7 +441,7 @@ def carried_sentence(found: ClosedLoop) -> str:
         named = f"With {' + '.join(found.effects)} the declared model" if found.effects else "The declared model"
         return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}"
     if found.withdrawn is None:
-        return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
+        return (f"Only noise remains on the train records, but of the held-out records {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip
     last = found.after.holdout
     assert last is not None
