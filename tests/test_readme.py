@@ -279,6 +279,8 @@ def test_every_snippet_runs_and_every_output_is_true(page, root, elsewhere, caps
         if language == "python" and not named:
             done = subprocess.run([sys.executable, "-c", text], check=True, capture_output=True, text=True)
             printed = done.stdout
+        elif language == "toml" and not named:
+            assert tomllib.loads(text), "lines to put into a file"
         elif language in ("python", "toml"):
             file = elsewhere / named[1]
             file.parent.mkdir(exist_ok=True)

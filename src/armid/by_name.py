@@ -92,7 +92,7 @@ def opened(
     bounds: Bounds | None = None, fix: Mapping[str, float] | None = None, plant: str | Plant | None = None,
     model: Model | None = None, units: str | None = None,
 ) -> Opened:  # fmt: skip
-    """Return what is meant by a campaign, its effects and its overrides; model: in place of the declared one."""
+    """Return the campaign, effects and overrides that the arguments name; model: used instead of the declared one."""
     refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
     if isinstance(plant, Plant):

@@ -61,7 +61,7 @@ def on_a_line(sentence: str) -> str:
     return line if len(line) <= LONGEST else f"{line[: LONGEST - END - 5]} ... {line[-END:]}"
 
 
-# Letters of a list of valid words that is told whole.
+# Longest list of valid words that a message shows in full [letters].
 LONGEST_LIST = 120
 
 

@@ -77,6 +77,32 @@ def test_a_unit_that_nothing_tells_is_a_guess(run, tmp_path):
     assert run("check", "mine").code == 0
 
 
+def test_one_file_of_steps_tells_that_the_drive_is_held(run, tmp_path):
+    times, drive, speed, _ = wheel(4)
+    for name, driven in (("chirp.csv", np.sin(times**2)), ("steps.csv", drive)):
+        rows = "\n".join(f"{t:.3f},{u:.4f},{v:.4f}" for t, u, v in zip(times, driven, speed))
+        (tmp_path / name).write_text(f"time_s,voltage_V,speed_rad_s\n{rows}\n")
+    holds = {("chirp.csv",): "linear", ("chirp.csv", "steps.csv"): "zero"}
+    for i, (files, hold) in enumerate(holds.items()):
+        assert run("new", "campaign", f"c{i}", "--from", *files).code == 0
+        text = (tmp_path / f"c{i}" / "campaign.toml").read_text()
+        assert tomllib.loads(text)["hold"] == hold
+    assert "from row to row in 1 of 2 files" in text
+
+
+def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, refused, tmp_path):
+    times, drive, speed, _ = wheel(5)
+    rows = "\n".join(f"{t:.3f},{u:.4f},{v:.4f}" for t, u, v in zip(times, drive, speed))
+    (tmp_path / "a.csv").write_text(f"time_s,voltage_V,speed_rad_s\n{rows}\n")
+    assert run("new", "campaign", "mine", "--from", "a.csv").code == 0
+    sheet = tmp_path / "mine" / "campaign.toml"
+    guessed = sheet.read_text()
+    sheet.write_text(guessed.replace("[[records]]", "[constants]\ngain = 0.5\n\n[[records]]", 1))
+    assert "is a parameter of plant 'rotary_arm', [parameters.gain] with fixed = VALUE is" in refused("check", "mine")
+    sheet.write_text(guessed.replace("[[records]]", "[parameters.gain]\nfixed = 0.5\n\n[[records]]", 1))
+    assert "at mid-range, measured up to" in run("check", "mine").out
+
+
 @pytest.mark.parametrize(("text", "words"), [
     ("time_s,drive_V\n0,1\n1,2\n", "a speed or an angle"), ("time_s,speed\n0,1\n1,2\n", "an input"),
     ("speed,drive\n1,1\n1,2\n", "no column of"), ("time_s,angle_counts,drive_V\n0,1,2\n1,2,3\n", "in counts"),

@@ -228,11 +228,11 @@ def close_loop_command(
 ) -> None:  # fmt: skip
     """Find the effects that the declared model lacks, and report the error before and after.
 
-    Tells how probable each missing effect, each fault of a record and something without a name is, from the train
-    records. Takes the most probable model of which every part has a name. Simulates the records held out after the last
-    decision, and withdraws steps that they deny. --bounds and --fix may name parameters of candidates too. Searches
-    start from evenly spread points, so that nothing is random. Every verdict exits with 0. What is cut off goes on with
-    the same command, from the fits that DIR/progress.jsonl holds until then.
+    Computes the probability of each missing effect, of each fault of a record and of something without a name from the
+    train records. Takes the most probable model in which every part has a name. Simulates the held-out records after
+    the last decision, and withdraws steps that increase their error. --bounds and --fix also take parameters of
+    candidates. Searches start from evenly spread points, so nothing is random. Every verdict exits with 0. After an
+    interruption the same command continues from the fits in DIR/progress.jsonl.
     """
     from numpy.random import default_rng
 

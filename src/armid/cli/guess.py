@@ -164,9 +164,9 @@ def campaign_text(
     name: str, tables: Sequence[CsvTable], roles: Mapping[str, Column], written: Mapping[str, Mapping[str, Array]],
     renamed: Mapping[str, str], linear: bool, notes: Sequence[str],
 ) -> str:  # fmt: skip
-    first = next(iter(written.values()))
-    drive = first[renamed[roles["drive"].header]]
-    held = float(np.mean(np.diff(drive) == 0.0)) > KEPT
+    drives = [columns[renamed[roles["drive"].header]] for columns in written.values()]
+    # One device drives all records: steps show that it holds, a chirp cannot.
+    held = [float(np.mean(np.diff(drive) == 0.0)) > KEPT for drive in drives]
     lines = ["# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
              "# headers that armid reads. Numbers are those of the originals, times in seconds.", "#"]  # fmt: skip
     lines += [f"# {note}" for note in notes]
@@ -178,8 +178,9 @@ def campaign_text(
         ]
     else:
         lines += ['plant = "rotary_arm"  # GUESS: it turns; inertia, damping and the moment of gravity are searched']
-    kept = "keeps its value from row to row" if held else "changes in each row"
-    lines += [f'hold = "{"zero" if held else "linear"}"  # GUESS: the drive {kept}']
+    stays = f"keeps its value from row to row in {held.count(True)} of {len(held)} files"
+    kept = stays if any(held) else "changes in each row"
+    lines += [f'hold = "{"zero" if any(held) else "linear"}"  # GUESS: the drive {kept}']
     wrapped = [new for old, new in renamed.items() for t in tables if wraps_at(t.columns[old], new)]
     if wrapped:
         lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"]

@@ -44,16 +44,17 @@ DIGITS = 6
 
 @command("new", short_help="Write a starting file of your own.", epilog=examples(
     "armid new effect my_drag", "armid check my_drag.py:my_drag", "armid new campaign my_axis --out studies/campaigns",
+    "armid new campaign my_motor --from first.csv second.csv",
 ))  # fmt: skip
 @click.argument("kind", metavar="|".join(KINDS), shell_complete=completes(words=KINDS))
 @click.argument("name", metavar="NAME")
 @click.option(
     "--style", default="", metavar="function",
-    help="Of an identifier: function, for any optimiser that is no algorithm of pymoo (scipy, nevergrad).",
+    help="Of an identifier: function, for any optimiser that is not an algorithm of pymoo (scipy, nevergrad).",
 )  # fmt: skip
 @click.option(
     "--from", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
-    help="Of a campaign: a CSV file of yours, as often as there are; what its columns are is guessed.",
+    help="Of a campaign: your CSV files, all after one --from. The meaning of each column is guessed.",
 )  # fmt: skip
 @click.option(
     "--out", default=".", show_default="this folder", type=click.Path(path_type=Path), metavar="FOLDER",

@@ -22,7 +22,7 @@ def kept(context: click.Context, option: click.Parameter, value: bool) -> None:
     context.meta[f"armid.{option.name}"] = value
 
 
-# Every command has these two; they are no settings of a result.
+# Options of every command. They do not change a result.
 OUTPUT = (
     (("--json", "json"), "Print the result as one JSON object on the standard output, and nothing else there."),
     (("--quiet", "quiet"), "Print nothing but errors and warnings; `list` prints names alone."),
@@ -117,7 +117,7 @@ def present(document: "Document") -> None:
 
 
 def give(**found: Any) -> None:
-    """Print what was found as one JSON object where --json was given; once a command."""
+    """Print the result as one JSON object if --json is given. Each command calls this once."""
     if wants("json"):
         with while_read(sys.stdout):
             print(json.dumps(found, allow_nan=False, default=str), flush=True)

@@ -191,7 +191,8 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
             signal = replay.signal(middle)[0]
             whole = bool(np.isfinite(signal).all())
             size = f"up to {np.max(np.abs(signal)):.3g}" if whole else "diverges"
-            text = f"simulated {size}, measured up to {np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
+            measured = f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
+            text = f"simulated {size} at mid-range, measured up to {measured}"
             yield ContractPoint(f"moves in {replay.record.file}", whole, text)
         yield from plausible(screen(campaign, model, space))
     except ArmidError as error:

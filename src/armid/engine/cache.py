@@ -45,7 +45,7 @@ def keep(compiled: Any, of: str) -> Any:
 class KeptCode:
     """Keep the machine code of one function, as numba asks for it: one file a signature and processor.
 
-    Before each file stands the digest of its name and the rest. What is damaged is removed and compiled again.
+    Each file begins with the digest of its name and content. A damaged file is removed and compiled again.
     """
 
     def __init__(self, function: Callable[..., Any], of: str) -> None:

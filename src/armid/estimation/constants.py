@@ -43,7 +43,7 @@ class Product:
 
     @property
     def public(self) -> str:
-        """Name in reports, such as `constant:L_loaded*m_loaded`; members of a sum stand side by side with `+`."""
+        """Name in reports, such as `constant:L_loaded*m_loaded`; `+` joins the members of a sum."""
         is_product = all(abs(abs(e) - 1.0) < WHOLE for e in self.exponents)
         signs = [("*" if e > 0.0 else "/") if is_product else "+" for e in self.exponents[1:]]
         return NAMED + self.names[0] + "".join(s + n for s, n in zip(signs, self.names[1:], strict=True))

@@ -18,7 +18,7 @@ from armid.problem.space import Space
 from armid.record import Record
 
 Key = float | bool | str
-# Before any record the box is all that is known: variance range^2/12, so 12 of information in shares of the range.
+# Information before any record, per squared range: a uniform density over the bounds has the variance range^2/12.
 BOX = 12.0
 VOLUME, WORST, SHRINKAGE = "volume", "worst", "shrinkage"
 # How many places of the travel are tried, its ends left alone by so much of it; start and target are so far apart.

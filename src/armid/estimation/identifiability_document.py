@@ -289,8 +289,8 @@ def point_remarks(found: Examination) -> list[str]:
     wider = np.nan_to_num(wider, nan=1.0, posinf=1.0)
     if found.given and away.max() > AWAY:
         return [f"The point that was given is not the least-squares minimum: {names[int(away.argmax())]} is "
-                f"{away.max():.3g} standard deviations from it; the profiles are drawn about the minimum, all else is "
-                "at the point."]  # fmt: skip
+                f"{away.max():.3g} standard deviations from it. The profiles are drawn around the minimum. All other "
+                "results belong to the point."]  # fmt: skip
     if not found.given and wider.max() >= WIDENS:
         return [f"Records start from measured states, whose noise widens the deviation of {names[int(wider.argmax())]} "
                 f"{wider.max():.3g} times; the profiles do not show it."]  # fmt: skip

@@ -172,9 +172,9 @@ def identify(
     """Search the free parameters on the train records, then judge the best candidate on train and holdout.
 
     Starts of train records in motion are fitted with the parameters, about those of the least-squares estimate. Holdout
-    records are simulated once, after the search. Ctrl-C ends the search and not the run: the best candidate so far is
-    judged, `stopped` is "interrupted". Intervals are those of the estimator: of a sum of squares from sensitivities, of
-    any other fitness from a bootstrap. Arguments are those of `armid.identify`. Raises ArmidError for a negative seed,
+    records are simulated once, after the search. After Ctrl-C the best candidate so far is judged, and `stopped` is
+    "interrupted". Intervals come from sensitivities for a sum of squares, from a bootstrap for any other fitness.
+    Arguments are those of `armid.identify`. Raises ArmidError for a negative seed,
     a budget too large, a target that is not finite, a fitness that the identifier cannot minimise, and when every
     candidate diverged.
     """

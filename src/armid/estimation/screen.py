@@ -36,7 +36,7 @@ LEFT_BY_TWO = 0.2
 NOTHING, UNLIKE = 0.95, 0.3
 # An error up to this, where the model explains nothing as told, shows an exchange that a missing effect half hides.
 EXCHANGED = 0.6
-# A record stands out where its error is so many times that of the others; an error from which on records disagree.
+# A record disagrees if its error is APART times that of the others. Errors well below AGREED count as agreement.
 APART, AGREED = 3.0, 0.05
 # Candidates spread over the box, samples of all records together that are looked at, least of one record.
 N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
@@ -56,7 +56,7 @@ SAME = 0.01
 LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 # Integration steps between samples, relative fall of squares at which a rough fit has arrived.
 SUBSTEPS, TOLERANCE = 4, 1e-3
-# Samples of a motion that a motor drives are not further apart [s].
+# Longest sample interval of a motion that a motor drives [s].
 LONGEST_INTERVAL = 1.0
 # A record begins elsewhere than the model where each of so many first samples is more than so many times the noise, and
 # than this share of the motion, away.
@@ -135,7 +135,7 @@ class Trial:
     def spread(self, records: Sequence[Record], most: int = N_SPREAD) -> Array:
         n_samples, n = sum(r.n_samples for r in records), int(self.space.free.sum())
         spread = probes(np.zeros(n), np.ones(n), max(min(most, MOST_VALUES // n_samples), 8))
-        # boxes are wide, and most machines lie in their lower part
+        # ranges are wide, and most machines lie in their lower part
         spread[::2] **= 3
         return spread
 

@@ -113,7 +113,7 @@ class SearchOptions(Options):
 
     @abstractmethod
     def search(self, task: SearchTask) -> None:
-        """Ask for candidates until the task drops the search, or to its own end."""
+        """Request candidates until the search converges or the task ends it."""
 
     def build(self, budget: int) -> SearchAlgorithm:
         """Return the search as an algorithm of pymoo."""
@@ -121,7 +121,7 @@ class SearchOptions(Options):
 
 
 class FiniteEvaluator(Evaluator):  # type: ignore[misc]
-    """Give PENALTY instead of a fitness that is no finite number, for algorithms that a NaN would poison."""
+    """Replace fitness values that are not finite by PENALTY, for algorithms that cannot handle NaN."""
 
     def eval(self, problem: Problem, pop: Population, *args: Any, **kwargs: Any) -> Population:
         """Evaluate as pymoo does, then replace what is not finite."""

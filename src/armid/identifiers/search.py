@@ -113,7 +113,7 @@ class Calls:
 
 
 class Height:
-    """Turn fitness values into heights of about 1, and give what failed a height above all that was seen.
+    """Scale fitness values to a size of about 1, and give failed candidates a larger value than all others.
 
     Line searches expect a scale of 1. A failure that is much higher than everything else would distort every model that
     a search fits through it.

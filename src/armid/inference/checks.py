@@ -33,7 +33,7 @@ MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
 DEPENDENT = 1e-11
 # Share of the samples of a record over which lines are drawn where they are no data.
 MOST_BRIDGED = 0.05
-# Shares of the largest speed and of its largest change, up to which it is a rest and an even speed.
+# Below this share of the largest speed a machine is at rest; below this share of the largest change its speed is even.
 STILL, EVEN = 0.02, 0.1
 
 
@@ -419,7 +419,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
 
 
 def bridged(signal: Array, replay: Replay) -> Array:
-    """Return a signal with straight lines over the few samples that are no data: a jump in slow noise would ring."""
+    """Return a signal with invalid samples interpolated linearly: a jump in slow noise would ring."""
     times, spacing = replay.times, replay.record.spacing
     even = np.arange(times[0], times[-1] + 0.5 * spacing, spacing)
     is_nearly_whole = len(times) < len(even) < (1.0 + MOST_BRIDGED) * len(times)

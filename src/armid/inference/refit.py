@@ -104,7 +104,7 @@ def with_free_shapes(fit: Fit, key: EffectKey, library: Library, posed: WhiteRec
 
 
 def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -> Array:
-    """Return a candidate with one of its free parameters where it does best, the others as they are, (n_free,)."""
+    """Return a candidate with one free parameter at its best value on a grid, the others unchanged, (n_free,)."""
     tried = np.tile(z, (n, 1))
     tried[:, place] = (np.arange(n) + 0.5) / n
     return np.asarray(tried[np.argmin(records.chi2(tried))])

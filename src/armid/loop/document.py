@@ -68,7 +68,7 @@ MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
 WEAK = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
-# A smaller share would read as 0 %.
+# Smallest share that is shown: a smaller one is rounded to 0 %.
 LEAST_SHARE = 0.005
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {
@@ -441,7 +441,7 @@ def carried_sentence(found: ClosedLoop) -> str:
         named = f"With {' + '.join(found.effects)} the declared model" if found.effects else "The declared model"
         return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}"
     if found.withdrawn is None:
-        return (f"What remains on the train records is noise, but of those held out {missed}: something acts there "
+        return (f"Only noise remains on the train records, but of the held-out records {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip
     last = found.after.holdout
     assert last is not None

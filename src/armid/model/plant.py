@@ -201,9 +201,9 @@ def sole_output(signal: str, unit: str) -> Output:
 class Plant:
     """Declare a machine: equations are plain scalar functions bound by argument name.
 
-    An argument is a state, parameter, constant, input, latch, port or quantity of that name, or `time` [s]; what an
-    initial value asks for must not move. Functions use numpy, math, numbers and functions of their own kind; np.where,
-    np.minimum and np.maximum choose. studies/your_own_machine/ explains a whole plant line by line.
+    An argument is a state, parameter, constant, input, latch, port or quantity of that name, or `time` [s]. What an
+    initial value takes must not vary in time. Functions use numpy, math, numbers and functions of their own kind;
+    np.where, np.minimum and np.maximum choose. studies/your_own_machine/ explains a whole plant line by line.
 
     name: as campaign.toml spells it. parameters: what is searched. states: what is integrated.
     quantities: name -> function of states, parameters, constants, inputs, latches, ports and other quantities; the

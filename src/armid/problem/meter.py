@@ -100,9 +100,9 @@ class Meter:
         return max(0, min(int(n), self.left))
 
     def refuse(self, n: int) -> None:
-        """Count candidates that were asked for after the budget was used.
+        """Count the candidates that an optimiser requests after the budget is used.
 
-        Raises BudgetIgnoredError after a generation, which is the largest number asked for at once, at least 100.
+        Raises BudgetIgnoredError when they exceed the largest earlier request (a generation), and at least 100.
         """
         self._refused += n
         if self._refused > self._largest:

@@ -126,12 +126,11 @@ def suite(
     Parameters
     ----------
     objectives
-        "one", or "records": an objective a record, and then those problems alone that have several.
+        "one", or "records": the problems with several records, one objective for each record.
     units
         "box": candidates in the unit cube; "SI": in the parameters' own units.
     campaigns
-        One or several campaigns of measured machines, or their folders: a `MeasuredProblem` of each, `NAME/1`, comes on
-        top.
+        One or several campaigns of measured machines, or their folders. Each is a further problem, `NAME/1`.
 
     Returns
     -------

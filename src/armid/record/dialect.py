@@ -169,8 +169,8 @@ def with_unit(name: str, unit: str, where: str) -> str:
         return name
     other = max((e for e in UNIT_ENDS.values() if name.endswith(f"_{e}")), key=len, default="")
     if other:
-        raise ArmidError(f"{where}: the unit of {quoted(name)} is {quoted(unit)} there, the unit that its name ends in "
-                         "is expected")  # fmt: skip
+        raise ArmidError(f"{where}: the unit of {quoted(name)} is {quoted(unit)}, the unit at the end of its name is "
+                         "expected")  # fmt: skip
     return f"{name}_{end}"
 
 
@@ -200,7 +200,7 @@ def has_decimal_comma(rows: Sequence[Sequence[str]], separator: str, lines: Sequ
 
 
 def columns_of(cells: Cells) -> Iterator[tuple[str, Array | tuple[int, str]]]:
-    """Yield each column: name, and its numbers (NaN where a cell is empty), or line and text of what is no number."""
+    """Yield each column: name, and its numbers (NaN where a cell is empty), or line and text of a cell without one."""
     for name, column in zip(cells.names, zip(*cells.rows, strict=True), strict=True):
         if COLUMN.fullmatch("\n".join(column) + "\n"):
             yield name, np.array(column, dtype=np.float64)

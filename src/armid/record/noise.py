@@ -121,7 +121,7 @@ def new_share(residual: Array) -> float:
 
 
 def difference_rms(motion: Array, times: Array | None = None) -> float:
-    """Return the rms of what high differences leave of a motion [unit]; white noise is assumed.
+    """Return the rms of the noise in a motion [unit], from its differences of high order; the noise is taken as white.
 
     The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
     where the next order gives less than a tenth of it, the motion was still in it (low-passed noise falls less fast)

@@ -224,8 +224,10 @@ def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordShe
     for what, given in (("constants of the campaign", shared), ("constants", sheet.constants)):
         for name in given:
             if name not in known:
-                raise ArmidError(f"{where}: {quoted(name)} in {what} is no constant of plant '{plant.name}', "
-                                 f"{nearest(name, known)}")  # fmt: skip
+                is_parameter = any(name == parameter.name for parameter in plant.parameters)
+                kind = "a parameter" if is_parameter else "no constant"
+                hint = f"[parameters.{name}] with fixed = VALUE is expected" if is_parameter else nearest(name, known)
+                raise ArmidError(f"{where}: {quoted(name)} in {what} is {kind} of plant '{plant.name}', {hint}")
             if not plant.from_rest and plant.records_one_speed and name in (POSITION, SPEED):
                 raise ArmidError(f"{where}: '{name}' in {what} is set, but it comes from the first samples of a "
                                  "record: another constant is expected")  # fmt: skip

@@ -142,9 +142,9 @@ def grid_size(times: Array, start: float, interval: float, file: str) -> int:
 def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear") -> Array:
     """Return a column on the even grid, (n_samples,), from values and times, both (n_rows,).
 
-    Else than on the grid: a straight line, which never overshoots at the kinks of a record; `hold` "zero": what the
-    column, holding each value until the next, is on average over the interval that a grid sample begins, so that no
-    impulse comes late.
+    `hold` "linear" interpolates between rows, which never overshoots at the kinks of a record. With "zero" the column
+    keeps each value until the next row; a grid sample is its mean over the interval that follows, so that no impulse
+    comes late.
     """
     if not timing.resampled:
         return np.ascontiguousarray(values[timing.first :])

@@ -143,7 +143,7 @@ def list_of(inner: Kind, shortest: int = 0, longest: float = inf) -> Kind:
 
 
 def key(kind: Kind, expected: str, meaning: str) -> dict[str, Any]:
-    """Return what a field of a sheet carries: its kind, that kind in words, and what the value means."""
+    """Return the metadata of a field of a sheet: its kind, the kind in words, and the meaning of the value."""
     return {"kind": kind, "expected": expected, "meaning": meaning}
 
 

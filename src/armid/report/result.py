@@ -124,7 +124,7 @@ class Result(Shown):
         return self.kind.document(self.parts.result, self.parts.details, {}, "")
 
     def plot(self, name: str = "") -> Any:
-        """Draw one figure and return it, matplotlib's. name: which, "" for the first."""
+        """Draw one figure and return it as a figure of matplotlib. name: of the figure, "" for the first."""
         from armid.report.style import detached
 
         figures = self.parts.figures

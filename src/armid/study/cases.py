@@ -329,7 +329,7 @@ def _with_signal(record: Record, measured: Array) -> Record:
 
 
 def in_window(record: Record, window: Sequence[float] | str) -> Record:
-    """Return the record in a window [s]; the word for all of it leaves what its file says."""
+    """Return the record in a window [s]; the word for the whole record keeps the window of its file."""
     return record if window == WHOLE else with_window(record, (float(window[0]), float(window[1])), record.file)
 
 

@@ -62,7 +62,7 @@ def run_study(
     retry: bool = False,
     progress: bool = False,
 ) -> "StudyResults":
-    """Run what is missing of a study and return all that its store holds.
+    """Perform the runs that the store of a study lacks, and return all runs of the store.
 
     Parameters
     ----------

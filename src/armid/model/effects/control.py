@@ -56,8 +56,8 @@ tachometer_ripple = Effect(
 
 # The control acts late: the switch and every command come a dead time after what was measured.
 #
-# A digital control samples every `period`, first at the start of the stroke, and holds its command between samples:
-# after the dead time its switch waits for the next sample, and the hold is late by half a period on average. The hold
+# A digital control samples every `period`, first at the start of the stroke, and holds its command between samples.
+# After the dead time its switch waits for the next sample. On average the hold is late by half a period. The hold
 # is approximated by 1 / (1 + T s/2 + T^2 s^2/12), T the period, for (1 - exp(-T s)) / (T s). A period of 0 does not
 # sample. Source of the hold: Franklin, Powell, Workman, Digital Control of Dynamic Systems, chapter 4.
 #
@@ -208,7 +208,7 @@ command_filter = replace(
 voltage_filter = replace(
     late_voltage, form="voltage_filter", exact=late_voltage, delays=(), adds={"winding": filtered_drive},
     states=tuple(replace(s, unit=s.unit.replace("effort", "V")) for s in command_filter.states),
-    note="the voltage at the motor comes a dead time late (second-order filter)", source=PADE,
+    note="the voltage at the motor is late by a dead time (second-order filter)", source=PADE,
 )  # fmt: skip
 controller_delay = replace(
     late_feedback_of_plant,

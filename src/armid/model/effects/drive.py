@@ -65,12 +65,12 @@ def late_effort(late, drive_effort):
 torque_delay = Effect(
     name="drive_delay", form="effort", adds={"drive": late_effort}, delays=(Delay("late", drive_now, "delay"),),
     parameters=(Parameter("delay", "s", 0.0, 0.1, null=0.0, note="dead time of the drive"),),
-    note="the force or torque of the drive comes a dead time late",
+    note="the force or torque of the drive is late by a dead time",
     source="Astrom and Murray, Feedback Systems, chapter 9",
 )  # fmt: skip
 voltage_delay = replace(
     torque_delay, form="voltage", unless="command", adds={"winding": late_effort}, binds={"drive_effort": "voltage"},
-    note="the voltage at the motor comes a dead time late",
+    note="the voltage at the motor is late by a dead time",
 )  # fmt: skip
 drive_delay = replace(torque_delay, forms=(voltage_delay,))
 

@@ -34,7 +34,7 @@ def effects_at(output: Output, plant: Plant) -> list[Effect]:
     found.append(Effect(f"{output.name}_scale", gyro_scale.parameters, {output.port: scale_error}, binds=binds,
                         note=f"error {of} in proportion to it", source=source))  # fmt: skip
     found.append(Effect(f"{output.name}_delay", output_delay.parameters, {output.port: delay_error}, binds=binds,
-                        delays=output_delay.delays, note=f"{output.name} is recorded a dead time late",
+                        delays=output_delay.delays, note=f"{output.name} is recorded late by a dead time",
                         source=source))  # fmt: skip
     if seen[0] in {s.name for s in plant.states}:
         states = (State("lagging", output.unit, lagging_rate, start_speed),)
@@ -113,7 +113,7 @@ def delay_error(late, omega):
 output_delay = Effect(
     name="output_delay", adds={"output": delay_error}, delays=(Delay("late", start_speed, "delay"),),
     parameters=(Parameter("delay", "s", 0.0, 0.1, null=0.0, note="dead time of the sensor or of its transmission"),),
-    note="the recorded speed comes a dead time late", source="Doebelin, Measurement Systems, chapter 3",
+    note="the recorded speed is late by a dead time", source="Doebelin, Measurement Systems, chapter 3",
 )  # fmt: skip
 
 EFFECTS = (gyro_lag, gyro_bias, gyro_scale, output_lag, output_delay)

@@ -56,7 +56,7 @@ def recorded_deflection(twist, deflection_sensor):
 
 
 def recorded_hub_speed(hub_speed, output):
-    """Speed of the hub that is recorded [rad/s]."""
+    """Recorded speed of the hub [rad/s]."""
     return hub_speed + output
 
 

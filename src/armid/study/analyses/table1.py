@@ -27,11 +27,11 @@ COLUMNS = (
 TABLE_CAPTION = (
     "truth and paper: Table I as printed. ours: median over the seeds. Errors are abs(value - truth)/truth: of our "
     "median, and the median and mean over the seeds with a 95 % percentile bootstrap interval of the median (2000 "
-    "resamples). The percentile says which share of our runs has a smaller error than the paper's value on that row "
-    f"(equal ones by half): 90 means that nine in ten of our runs were better. The rows '{MEAN_ROW}' average over the "
+    "resamples). Percentile: share of our runs that beat the paper on that row (ties count half); 90 means "
+    f"that nine in ten of our runs have a smaller error. The rows '{MEAN_ROW}' average over the "
     "rows: the paper's errors, the errors of our medians, our median errors, and our mean errors (which is the mean "
-    "over rows and seeds). Ours is synthetic: simulated from the truth with the constants of an estimated arm, since "
-    "the paper prints none."
+    "over rows and seeds). Our records are synthetic: simulated from the truth with estimated constants of the arm, "
+    "since the paper prints none."
 )
 FIGURE_CAPTION = (
     "Relative error [%] on a logarithmic axis, all rows and seeds together: the box spans the quartiles, the thick "
