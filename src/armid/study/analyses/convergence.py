@@ -71,7 +71,8 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
     limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
     figure, axes = panels(len(curves), 2, 7.8, LEAST_HEIGHT)
     for axis, (setting, lines) in zip(axes, curves.items(), strict=True):
-        axis.set(xscale="log", yscale="log", xlim=(1, max(grid[-1], 2)), ylim=limits, xlabel="simulations", ylabel=label)
+        axis.set(xscale="log", yscale="log", xlim=(1, max(grid[-1], 2)), ylim=limits)
+        axis.set(xlabel="simulations", ylabel=label)
         named_lines(axis, grid, lines, evidence.colours)
         axis.minorticks_off()
         axis.grid(alpha=0.3)
