@@ -37,9 +37,6 @@ i.stopped, r.status, r.error, r.seconds, i.train_rmse, i.train_s, i.train_s1, i.
 r.model, r.versions
 FROM plan p JOIN runs r USING (run) LEFT JOIN identified i USING (run) ORDER BY p.place
 """
-WITHOUT_RESULT = """
-SELECT count(*) FROM runs WHERE status = ? AND run NOT IN (SELECT run FROM identified UNION SELECT run FROM loops)
-"""
 PARAMETERS = """
 SELECT p."case", q.* FROM plan p JOIN parameters q USING (run) ORDER BY p.place, q.rowid
 """
@@ -197,8 +194,6 @@ def load_study(path: str | Path) -> StudyResults:
         study["n_planned"] = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
         study["n_done"] = ended.get(DONE, 0)
         study["n_failed"] = sum(ended.values()) - study["n_done"]
-        if connection.execute(WITHOUT_RESULT, (DONE,)).fetchone()[0]:
-            raise ArmidError(f"{file} is damaged: its runs cannot be shown, what armid wrote is expected")
         with corruption_guard(file, "what it says of its study, its runs or their versions"):
             study |= {"versions": _versions(connection), "folder": str(file.parent)}
             study["parameters"] = list(dict.fromkeys(str(name) for case in study["cases"] for name in case["bounds"]))
