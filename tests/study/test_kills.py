@@ -142,8 +142,11 @@ def test_a_second_runner_is_refused_and_harms_nothing(start, write_study, tmp_pa
     file = write_study(SEEDS)
     first = start(file, "--out", tmp_path / "out", "--jobs", 1)
     wait_for(first, tmp_path / "out", 1)
+    # The first might end before the second is there: it stands still meanwhile.
+    first.send_signal(signal.SIGSTOP)
     second = start(file, "--out", tmp_path / "out", "--jobs", 1)
     out, err = second.communicate(timeout=600)
+    first.send_signal(signal.SIGCONT)
     assert (second.returncode, out) == (2, "")
     assert "another process is at the runs of" in err
     ended_well(first)
