@@ -7,7 +7,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.inference import infer
-from armid.inference.calibration import calibration
+from armid.inference.decisions import calibration
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 

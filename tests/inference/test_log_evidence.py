@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from armid.inference.calibration import Calibration, calibration
+from armid.inference.decisions import Calibration, calibration
 from armid.inference.evidence import Expansion, Scale, forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.posterior import Atom, Posterior, truncated

@@ -76,7 +76,7 @@ def exploration(posteriors, expanded=(), misfit=False, monkeypatch=None):
     ranked = sorted(((model(n), p) for n, p in posteriors.items()), key=lambda pair: -pair[1])
     monkeypatch.setattr(found, "ranked", lambda: ranked)
     monkeypatch.setattr(search, "is_significant", lambda _: misfit)
-    monkeypatch.setattr(search, "is_near", lambda *_: not misfit)
+    monkeypatch.setattr(search, "is_near", lambda _: not misfit)
     return found
 
 

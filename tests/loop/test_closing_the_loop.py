@@ -12,7 +12,7 @@ import armid
 from armid.errors import ArmidError
 from armid.estimation.constants import moved_record
 from armid.estimation.mends import Suspicion
-from armid.inference.calibration import calibration
+from armid.inference.decisions import calibration
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion, details_of, loop_document
 from armid.model import EFFECTS, Model

@@ -6,8 +6,7 @@ infer         the whole way: campaign -> probabilities and intervals
 whitening     train records with their noise -> residuals whose noise is white
 library       the candidate effects, compiled together and ready to be tried
 hypothesis    what may be true of the machine or its records beside the declared model
-calibration   what is believed before the records are read, from calibration.toml; `decisions`: all other numbers that
-              decide
+decisions     prior beliefs, from calibration.toml, and all other numbers that decide
 kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form
 model         a model at its estimate; `unknowns`: constants, faults and drifts, fitted with their priors
 evidence      how probable the records are in a model, and what a hypothesis more would do to that
@@ -15,7 +14,7 @@ search        which models are fitted
 posterior     probabilities of hypotheses and sets; intervals that count what may be missing
 checks        whether a residual is more than noise, and where; `carry_over`: on records held out
 
-Also here: prediction (which model is put in force where none is right), scales (sizes of strengths), refit
+Also here: prediction (which model is put in force where none is right), refit
 (starts of fits), missing_signal (the signal that a model lacks at each port).
 """
 

@@ -1,12 +1,17 @@
-"""Every number with which the loop and its inference compare to decide, in one list.
+"""Every number with which the loop and its inference compare to decide, in one list; and prior beliefs.
 
-Priors and temperature stand in `calibration.toml`. Numerics, layout and budgets of computing are no decisions and stand
-where they are used. `estimation/screen.py` and `mends.py` keep the numbers of the data checks.
+Prior beliefs and temperature stand in `calibration.toml`. Numerics, layout and budgets of computing are no decisions
+and stand where they are used. `estimation/screen.py` and `mends.py` keep the numbers of the data checks.
 """
 
 import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 
-# Probability from which a name is claimed. Of claims 97 % are to be true; results/calibration counts them.
+# Probability from which a name is claimed. Of claims 97 % are to be true; studies/calibration counts them.
 CLAIMED = 0.95
 # Probability from which a fault or something unknown enters the verdict: more likely than not.
 MENTIONED = 0.5
@@ -39,3 +44,26 @@ NOT_CARRIED = 2.0
 OUTSIDE = 0.1
 # Share of the squared error of a held-out record that one changed parameter takes away where it is named.
 EXPLAINS = 0.9
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Hold prior beliefs.
+
+    temperature: log evidence is divided by it. expected: kind of hypothesis -> how many of it a campaign has.
+    odds: name of an effect -> how many times the odds of other effects.
+    """
+
+    temperature: float
+    expected: Mapping[str, float]
+    odds: Mapping[str, float]
+
+    def log_odds(self, kind: str, n: int, name: str = "") -> float:
+        """Return the log prior odds of one of n hypotheses of a kind."""
+        p = min(self.expected[kind] / max(n, 1), 0.5)
+        return math.log(p / (1.0 - p) * self.odds.get(name, 1.0))
+
+
+@cache
+def calibration() -> Calibration:
+    return Calibration(**tomllib.loads(files("armid.inference").joinpath("calibration.toml").read_text()))

@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
-from armid.inference.calibration import calibration
 from armid.inference.checks import is_certain
+from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
 from armid.inference.search import Exploration
@@ -165,7 +165,7 @@ def beside(
         hypothesis = ahead.proposal.hypothesis
         if model | {hypothesis} in found.fits or model | {hypothesis} in found.refused:
             continue
-        weight = value + hypothesis.log_prior
+        weight, prior = value + hypothesis.log_prior, log_prior(model | {hypothesis})
         for i, k in np.argwhere(ahead.log_factor + weight > top + NEGLIGIBLE):
             if ahead.proposal.joint:
                 moved = -span * ahead.answer[places, 0]
@@ -177,7 +177,6 @@ def beside(
                     strength, deviation = truncated(float(strength), float(deviation))
                 moved = -span * answer * strength
                 spread = (span * answer * deviation) ** 2
-            prior = log_prior(model | {hypothesis})
             atoms.append(Atom(weight - prior + float(ahead.log_factor[i, k]), prior, names | {hypothesis.public},
                               mean + moved, np.sqrt(np.diag(covariance) + spread)))  # fmt: skip
     return atoms

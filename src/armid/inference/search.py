@@ -130,19 +130,19 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
     in_vain = 0
     while len(found.forecasts) < most and in_vain < MOST_IN_VAIN:
         model, best = next_model(found), found.ranked()[0][0]
-        if model is None and not add_unknown(found):
-            break
         if model is None:
+            if not add_unknown(found):
+                break
             continue
         complete(found, model)
         # Near the noise a second name must not stand for a shape of the first that was held.
-        for less in simpler(found, model) if is_near(found, model) else []:
+        for less in simpler(found, model) if is_near(found) else []:
             if has_shapes(found, less):
                 complete(found, less)
         if next_model(found) == model:
             expand(found, model)
             finish(found)
-        in_vain = 0 if found.ranked()[0][0] != best or is_near(found, best) else in_vain + 1
+        in_vain = 0 if found.ranked()[0][0] != best or is_near(found) else in_vain + 1
     add_unknown(found)
     finish_all(found)
     return found
@@ -178,7 +178,7 @@ def next_model(found: Exploration) -> Hypotheses | None:
     if is_significant(found.fits[best]) and found.fits[best].records.data.cover is None:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         beam = [m for n in range(1, len(best) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
-        near = [*near, *beam] if is_near(found, best) else [*beam, *near]
+        near = [*near, *beam] if is_near(found) else [*beam, *near]
     return next((m for m in near if m not in found.forecasts and len(m) < MOST_EFFECTS), None)
 
 
@@ -219,11 +219,12 @@ def expand(found: Exploration, model: Hypotheses) -> None:
         for i in sorted(added, key=lambda i: -max(ahead[i].posterior, ahead_held[i].posterior))[:N_ADDED]:
             trials += trial_of(found, model, held, ahead_held[i], limit)
     trials += [t for f in leading(beside) for t in trial_of(found, model, about, f, limit)]
-    trials += drops(found, model, fit)
     ranked = found.ranked()
-    if is_significant(fit) and not is_near(found, model):
-        trials += exchanges(found, model, fit, limit) if model == ranked[0][0] else []
-    elif found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
+    is_far = is_significant(fit) and not is_near(found)
+    if is_far and model == ranked[0][0]:  # before the drops: it fits what it stands on
+        trials += exchanges(found, model, fit, limit)
+    trials += drops(found, model, fit)
+    if not is_far and found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
         forms = effects.propose_forms(fit, found.known, library)
         trials += swaps(found, model, fit, scale, [*proposals, *forms])
     made = library.each(lambda t: t[1](), trials)
@@ -473,14 +474,14 @@ def complete(found: Exploration, model: Hypotheses) -> None:
         weight = found.completed[model] = found.scale().weight
         if not (model or found.constants):
             return
-        fit, near_noise = found.fits[model], is_near(found, model)
-        again = unless_diverged(partial(completed, fit, found.library, found.constants, weight, near_noise))
+        fit = found.fits[model]
+        again = unless_diverged(partial(completed, fit, found.library, found.constants, weight, is_near(found)))
         found.fits[model] = again or replace(found.fits[model], rough=False)
 
 
-def is_near(found: Exploration, model: Hypotheses) -> bool:
+def is_near(found: Exploration) -> bool:
     """Tell whether the best model is near the noise, so that a few log units count."""
-    return NEAR * found.scale().weight * len(found.fits[model].residual) > found.scale().n
+    return NEAR * found.scale().weight * len(found.declared.residual) > found.scale().n
 
 
 def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float, afresh: bool) -> Fit:

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from armid.estimation.constants import Product, moved_replays
-from armid.inference.calibration import calibration
+from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.kinds.faults import simulated_file, with_measured

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from armid.estimation.least_squares import descend
-from armid.inference.calibration import calibration
+from armid.inference.decisions import calibration
 from armid.inference.evidence import SCALES, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import EffectKey, Library, activation_grid
@@ -62,15 +62,14 @@ def propose_with_free_shapes(
     def shapes(k: EffectKey) -> set[str]:
         return {name.rpartition(".")[2] for name in library.fixed_shapes(k)}
 
-    rivals = [k for k in library.joinable(fit.active) if shapes(k) & shapes(key)]
-    each = library.each(lambda k: proposal(fit, known[k], replace(k, free_shape=True), library), rivals)
-    return [p for p in each if p is not None]
+    rivals = [replace(k, free_shape=True) for k in library.joinable(fit.active) if shapes(k) & shapes(key)]
+    return proposals(fit, rivals, known, library)
 
 
 def proposals(
     fit: Fit, keys: list[EffectKey], known: dict[EffectKey, Hypothesis], library: Library
 ) -> list[Proposal]:  # fmt: skip
-    each = library.each(lambda key: proposal(fit, known[key], key, library), keys)
+    each = library.each(lambda key: proposal(fit, known[key.declared], key, library), keys)
     return [p for p in each if p is not None]
 
 

@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from armid.inference.calibration import calibration
-from armid.inference.decisions import MOVES
+from armid.inference.decisions import MOVES, calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.kinds.faults import Fault, column_of, faults_of, moved_by, with_record

@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 import numpy as np
 from scipy.linalg import block_diag
 
-from armid.inference.calibration import calibration
+from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
