@@ -11,6 +11,7 @@ import numpy as np
 from machines.campaign import files_of
 from machines.catalogue import MACHINES
 from machines.draw import drawn, plan
+from machines.make import replaced
 from stand.blind.campaign import SUITE
 from stand.blind.suite import read_suite
 from stand.families import make
@@ -41,6 +42,15 @@ class Task:
         return f"one_{self.index:03d}" if self.family == HIDDEN else self.name
 
 
+def file_of(folder: Path, task: Task) -> Path:
+    """Return where what a closed campaign says is kept."""
+    return folder / "closed" / f"{task.name}.json"
+
+
+def truth_file(folder: Path, task: Task) -> Path:
+    return folder / "truth" / f"{task.campaign}.json"
+
+
 def tasks(size: int) -> Iterator[Task]:
     """List the campaigns, families in turn; size: of each family of the arm."""
     made = 0
@@ -54,7 +64,7 @@ def tasks(size: int) -> Iterator[Task]:
 
 def campaign_of(task: Task, folder: Path, seed: int, without_left_out: bool) -> tuple[Path, dict[str, Any]]:
     """Return the folder of a campaign, made where it is not there yet, and its truth."""
-    there, key = folder / "campaigns" / task.campaign, folder / "truth" / f"{task.campaign}.json"
+    there, key = folder / "campaigns" / task.campaign, truth_file(folder, task)
     if not key.exists():
         files, entry = made_machine(task, seed, without_left_out) if task.family == MACHINE else made_arm(task, seed)
         there.mkdir(parents=True, exist_ok=True)
@@ -78,9 +88,7 @@ def made_machine(task: Task, seed: int, without_left_out: bool) -> tuple[dict[st
 
 def written(path: Path, content: Any) -> None:
     """Write JSON whole or not at all."""
-    fresh = path.with_suffix(".new")
-    fresh.write_text(json.dumps(content, default=plain))
-    fresh.replace(path)
+    replaced(path, json.dumps(content, default=plain))
 
 
 def plain(value: Any) -> Any:

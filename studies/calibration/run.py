@@ -24,7 +24,7 @@ from armid.model import EFFECTS
 from armid.model.effects.sensor import sensor_effects
 from armid.record import read_campaign
 from armid.registry import load_registry
-from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, tasks, written
+from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, file_of, tasks, written
 
 KEPT = ("version", "verdict", "also", "effects", "steps", "suspects", "withdrawn", "error", "parameters",
         "probabilities")  # fmt: skip
@@ -60,10 +60,6 @@ def main(words: Sequence[str]) -> int:
         for line in pool.map(close, open_tasks):
             print(line, flush=True)
     return 0
-
-
-def file_of(folder: Path, task: Task) -> Path:
-    return folder / "closed" / f"{task.name}.json"
 
 
 def closed(folder: Path, seed: int, without_left_out: bool, task: Task) -> str:

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import matplotlib as mpl
 import pandas as pd
 
-from calibration.campaigns import HIDDEN, MACHINE, Task, tasks
+from calibration.campaigns import HIDDEN, MACHINE, Task, file_of, tasks, truth_file
 from calibration.scores import Closed, Score, reliability, scores_of
 from calibration.truth import truth_of
 
@@ -27,29 +27,29 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args(words)
-    plan = json.loads((options.folder / "plan.json").read_text())
-    planned = list(tasks(plan["size"]))
-    there = [task for task in planned if file_of(options.folder, task).exists()]
-    kept = [(task, *read(options.folder, task)) for task in there]
-    failed = [task.name for task, _, said in kept if "failed" in said]
-    every = [closed_of(task, entry, said) for task, entry, said in kept if "failed" not in said]
+    plan, every, failed = read(options.folder)
     options.out.mkdir(parents=True, exist_ok=True)
     lines = scores_of(every)
     table(lines).to_csv(options.out / "scores.csv", index=False, lineterminator="\n", float_format="%.4g")
     campaigns(every).to_csv(options.out / "campaigns.csv", index=False, lineterminator="\n", float_format="%.4g")
     diagram(every, options.out / "reliability.png")
-    (options.out / "report.md").write_text(page(plan, len(planned), there, failed, lines))
+    n_planned, n_closed = len(list(tasks(plan["size"]))), len(every) + len(failed)
+    (options.out / "report.md").write_text(page(plan, n_planned, n_closed, failed, lines))
     print(table(lines).to_string(index=False))
     return 0
 
 
-def file_of(folder: Path, task: Task) -> Path:
-    return folder / "closed" / f"{task.name}.json"
-
-
-def read(folder: Path, task: Task) -> tuple[dict[str, Any], dict[str, Any]]:
-    truth = json.loads((folder / "truth" / f"{task.campaign}.json").read_text())
-    return truth, json.loads(file_of(folder, task).read_text())
+def read(folder: Path) -> tuple[dict[str, Any], list[Closed], list[str]]:
+    """Return the plan of a study, its closed campaigns as far as there are any, and names of those that failed."""
+    plan, every, failed = json.loads((folder / "plan.json").read_text()), [], []
+    for task in tasks(plan["size"]):
+        if file_of(folder, task).exists():
+            said = json.loads(file_of(folder, task).read_text())
+            if "failed" in said:
+                failed.append(task.name)
+            else:
+                every.append(closed_of(task, json.loads(truth_file(folder, task).read_text()), said))
+    return plan, every, failed
 
 
 def closed_of(task: Task, entry: dict[str, Any], said: dict[str, Any]) -> Closed:
@@ -101,14 +101,13 @@ def diagram(every: Sequence[Closed], path: Path) -> None:
                 [p for _, p, _ in bins], [true for _, _, true in bins], "o-", ms=4, label=f"{group}, {len(pairs)}"
             )
     axes.set(xlabel="probability of a name", ylabel="share that is right", xlim=(0, 1.02), ylim=(-0.02, 1.02))
-    axes.legend(title="campaigns of, names", frameon=False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(title="campaigns of, names", frameon=False)
     figure.tight_layout()
     figure.savefig(path, dpi=150, metadata={"Software": None})
 
 
-def page(
-    plan: dict[str, Any], n_planned: int, there: Sequence[Task], failed: Sequence[str], lines: Sequence[Score]
-) -> str:
+def page(plan: dict[str, Any], n_planned: int, n_closed: int, failed: Sequence[str], lines: Sequence[Score]) -> str:
     rows = [[s.score, s.group, s.question, str(s.n), f"{s.value:.3g}", f"{s.low:.3g} to {s.high:.3g}", s.target,
              {True: "yes", False: "no", None: ""}[s.met]] for s in lines]  # fmt: skip
     head = ["score", "group", "question", "campaigns", "value", "95 % interval", "target", "met"]
@@ -116,7 +115,7 @@ def page(
     text = [
         "# Are the probabilities to be bet on, and do the intervals hold?", "",
         f"{sum(bool(s.met) for s in asked)} of {len(asked)} targets are met: the interval touches the target.",
-        f"Seed {plan['seed']}: {len(there)} of {n_planned} planned campaigns were closed; {len(failed)} ended in an "
+        f"Seed {plan['seed']}: {n_closed} of {n_planned} planned campaigns were closed; {len(failed)} ended in an "
         "error. All campaigns are synthetic. Intervals come from a bootstrap over campaigns.",
         "", "![how often a name is right against its probability](reliability.png)", "",
         "| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(row) + " |" for row in rows), "",

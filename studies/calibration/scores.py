@@ -12,15 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from calibration.truth import Truth, all_found, claims
+from blind.families import AT_NOISE, MOVES, WORSE
+from calibration.truth import Truth, all_found
+from stand.score.judge import LARGEST_GROUP, read_claim
 
 # A pair of campaign and effect counts in the calibration error from this probability on; bins of equal count.
 COUNTS, N_BINS = 0.02, 10
-SURE, NEARLY_SURE, LARGEST_GROUP, ACCUSED = 0.95, 0.9, 4, 0.5
-# An error is at the noise, and held-out records are worse, beyond these factors.
-WORSE, OVER_NOISE = 1.02, 1.1
-# An effect, or a fault, that moves no record by so many times its noise may stay unseen.
-MOVES = 2.0
+NEARLY_SURE, ACCUSED = 0.9, 0.5
 N_BOOTSTRAP, LEVEL = 1000, 0.05
 
 
@@ -42,7 +40,7 @@ class Closed:
 
     @cached_property
     def groups(self) -> list[frozenset[str]]:
-        return claims(self.said, SURE)
+        return list(read_claim(self.said).groups.values())
 
     @property
     def is_unlisted(self) -> bool:
@@ -164,7 +162,7 @@ def ratio(one: Closed) -> list[float]:
     """Return the held-out error over the noise where the declared model is off by at least 1.3 times the noise."""
     floor = one.entry["floor"]["holdout"]
     before, after = (one.said["error"][when]["holdout"] for when in ("before", "after"))
-    if not floor or before is None or len(one.said["error"]["after"].get("outputs") or [0]) > 1:
+    if not floor or before is None or len(after["outputs"]) > 1:
         return []
     return [after["rmse"] / floor] if before["rmse"] >= 1.3 * floor else []
 
@@ -174,7 +172,7 @@ def is_worse(one: Closed) -> list[bool]:
     before, after = (one.said["error"][when]["holdout"] for when in ("before", "after"))
     if not floor or before is None:
         return []
-    return [after["rmse"] > max(WORSE * before["rmse"], OVER_NOISE * floor)]
+    return [after["rmse"] > max(WORSE * before["rmse"], AT_NOISE * floor)]
 
 
 def accused(one: Closed) -> bool:

@@ -60,18 +60,6 @@ def truth_of(entry: Mapping[str, Any], hidden: bool) -> Truth:
     return Truth(tuple(effects), entry["fault"], entry["parameters"], is_exact)
 
 
-def claims(report: Mapping[str, Any], sure: float) -> list[frozenset[str]]:
-    """Return what a report claims: a name that is claimed alone, or a group that is as probable as a claim."""
-    chances, found = report["probabilities"]["effects"], []
-    for step in report["steps"]:
-        group = frozenset((step["effect"], *step["alternatives"]))
-        if step["claimed"]:
-            found.append(frozenset((step["effect"],)))
-        elif len(group) > 1 and sum(chances.get(name, 0.0) for name in group) >= sure:
-            found.append(group)
-    return found
-
-
 def all_found(truth: Truth, groups: Sequence[frozenset[str]], largest: int) -> bool:
     """Tell whether each planted effect is named, or stands in a group of at most so many names."""
     said = [group for group in groups if len(group) <= largest]
