@@ -1,0 +1,64 @@
+"""The study of probabilities and intervals: its order, its truth, and its scores on answers that are made up."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from calibration.campaigns import ARM, HIDDEN, MACHINE, tasks
+from calibration.scores import Score, calibration_error, interval_score, reliability, score
+from calibration.truth import all_found, truth_of
+
+ENTRY = {
+    "effects": [
+        {"name": "drive_lag", "listed": True, "library": [["drive_lag"], ["output_lag"]], "family": "lag"},
+        {"name": "saturation:hard", "listed": False, "library": [], "family": "saturation"},
+    ],
+    "fault": {}, "parameters": {"mass": 2.0}, "tolerances": {"length": 0.0},
+}  # fmt: skip
+
+
+def test_a_study_that_is_cut_short_has_seen_all_families_alike():
+    every = list(tasks(3))
+    assert Counter(t.family for t in every) == {**dict.fromkeys((*ARM, HIDDEN), 3), MACHINE: 8}
+    assert {t.family for t in every[:12]} == {*ARM, HIDDEN, MACHINE}
+    hidden = next(t for t in every if t.family == HIDDEN)
+    assert (hidden.name, hidden.campaign) == ("hidden_000", "one_000")
+
+
+def test_names_that_nobody_can_tell_apart_share_their_truth():
+    truth = truth_of(ENTRY, hidden=False)
+    assert truth.exact
+    assert truth.holds("output_lag")
+    assert not truth.holds("drive_saturation")
+    assert truth.is_same_physics("drive_saturation")
+    assert truth.share("drive_lag", {"drive_lag": 0.3, "output_lag": 0.6}) == pytest.approx(1 / 3)
+    assert truth.share("coulomb", {"coulomb": 0.9}) == 0.0
+    # an effect of no library is named by nobody
+    assert not all_found(truth, [frozenset({"drive_lag"})], 4)
+    assert not truth_of(ENTRY, hidden=True).holds("drive_lag")
+
+
+def test_probabilities_that_come_true_have_no_error_and_sure_ones_that_do_not_have_all():
+    rng = np.random.default_rng(1)
+    p = rng.random(40_000)
+    honest = list(zip(p, (rng.random(p.size) < p).astype(float), strict=True))
+    assert calibration_error(honest) < 0.01
+    assert [n for n, *_ in reliability(honest)] == [4000] * 10
+    assert calibration_error([(0.9, 0.0)] * 20) == pytest.approx(0.9)
+
+
+def test_an_interval_that_misses_costs_forty_times_by_how_much():
+    assert interval_score([(1.0, 0.99, 1.01)]) == pytest.approx(0.02)
+    assert interval_score([(1.1, 1.05, 1.15)]) == pytest.approx(0.1 + 40.0 * 0.05)
+
+
+def test_a_target_is_met_where_the_interval_touches_it():
+    sound = [[True]] * 19 + [[False]]
+    found = score("S2", "made up", "arm", sound, lambda one: one, ">= 0.97")
+    assert found.value == 0.95
+    assert found.met
+    assert not Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6, ">= 0.97").met
+    assert Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6).met is None
+    # all alike: the rule of three
+    assert score("S2", "made up", "arm", [[True]] * 30, lambda one: one).low == pytest.approx(0.9)
