@@ -53,7 +53,7 @@ class Mixture:
     """Hold the models of one campaign as arrays, and the statements that are true or false of it."""
 
     def __init__(self, one: Closed) -> None:
-        models = one.said["mixture"]
+        models = one.answer["mixture"]
         sets = [frozenset((kind, name) for kind, name in m["names"]) for m in models]
         self.evidence = np.array([m["log_evidence"] for m in models])
         self.prior = np.array([m["log_prior"] for m in models])

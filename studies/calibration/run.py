@@ -63,7 +63,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def closed(folder: Path, seed: int, without_left_out: bool, task: Task) -> str:
-    """Close one campaign, keep what is said, and return a line about it."""
+    """Close one campaign, keep the answer, and return a line about it."""
     warnings.simplefilter("ignore")
     there, entry = campaign_of(task, folder, seed, without_left_out)
     before = seconds()

@@ -44,24 +44,24 @@ def read(folder: Path) -> tuple[dict[str, Any], list[Closed], list[str]]:
     plan, every, failed = json.loads((folder / "plan.json").read_text()), [], []
     for task in tasks(plan["size"]):
         if file_of(folder, task).exists():
-            said = json.loads(file_of(folder, task).read_text())
-            if "failed" in said:
+            answer = json.loads(file_of(folder, task).read_text())
+            if "failed" in answer:
                 failed.append(task.name)
             else:
-                every.append(closed_of(task, json.loads(truth_file(folder, task).read_text()), said))
+                every.append(closed_of(task, json.loads(truth_file(folder, task).read_text()), answer))
     return plan, every, failed
 
 
-def closed_of(task: Task, entry: dict[str, Any], said: dict[str, Any]) -> Closed:
+def closed_of(task: Task, entry: dict[str, Any], answer: dict[str, Any]) -> Closed:
     if task.family != MACHINE:
-        return Closed(task.name, task.family, "arm", "arm", truth_of(entry, task.family == HIDDEN), entry, said)
+        return Closed(task.name, task.family, "arm", "arm", truth_of(entry, task.family == HIDDEN), entry, answer)
     family = (
         "fault" if entry["fault"] and not entry["effects"] else {"single": "one"}.get(entry["class"], entry["class"])
     )
     if any(not effect["listed"] for effect in entry["effects"]):
         family = "unlisted"
     group = "left out" if entry["left_out"] else "machines"
-    return Closed(task.name, family, group, entry["machine"], truth_of(entry, False), entry, said)
+    return Closed(task.name, family, group, entry["machine"], truth_of(entry, False), entry, answer)
 
 
 def table(lines: Sequence[Score]) -> pd.DataFrame:
@@ -73,18 +73,18 @@ def table(lines: Sequence[Score]) -> pd.DataFrame:
 
 
 def campaigns(every: Sequence[Closed]) -> pd.DataFrame:
-    """Return one line a campaign, what is true and what was said."""
+    """Return one line a campaign, truth and answer."""
     rows = []
     for one in every:
-        chances, said = one.said["probabilities"], one.said
+        chances, answer = one.answer["probabilities"], one.answer
         rows.append({
             "campaign": one.name, "machine": one.machine, "family": one.family,
             "truth": " + ".join(e["name"] for e in one.entry["effects"]), "fault": one.truth.fault.get("kind", ""),
-            "verdict": said["verdict"], "claims": "; ".join(" or ".join(sorted(g)) for g in one.groups),
+            "verdict": answer["verdict"], "claims": "; ".join(" or ".join(sorted(g)) for g in one.groups),
             "probable": ", ".join(f"{n} {p:.2f}" for n, p in list(chances["effects"].items())[:4]),
             "nothing": chances["nothing"], "unknown": chances["unknown"],
-            "suspects": "; ".join(f"{s['record']} {s['kind']}" for s in said["suspects"]),
-            "outside": sum(not (low <= 1.0 <= high) for _, low, high in one.held()), "cpu_s": said["cpu_s"],
+            "suspects": "; ".join(f"{s['record']} {s['kind']}" for s in answer["suspects"]),
+            "outside": sum(not (low <= 1.0 <= high) for _, low, high in one.held()), "cpu_s": answer["cpu_s"],
         })  # fmt: skip
     return pd.DataFrame(rows)
 

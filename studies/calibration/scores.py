@@ -24,7 +24,7 @@ N_BOOTSTRAP, LEVEL = 1000, 0.05
 
 @dataclass(frozen=True, eq=False)
 class Closed:
-    """Hold one closed campaign: its family, its group (arm, machines, left out), its truth, what was said of it."""
+    """Hold one closed campaign: its family, its group (arm, machines, left out), its truth, the answer."""
 
     name: str
     family: str
@@ -32,15 +32,15 @@ class Closed:
     machine: str
     truth: Truth
     entry: dict[str, Any]
-    said: dict[str, Any]
+    answer: dict[str, Any]
 
     @property
     def chances(self) -> dict[str, float]:
-        return dict(self.said["probabilities"]["effects"])
+        return dict(self.answer["probabilities"]["effects"])
 
     @cached_property
     def groups(self) -> list[frozenset[str]]:
-        return list(read_claim(self.said).groups.values())
+        return list(read_claim(self.answer).groups.values())
 
     @property
     def is_unlisted(self) -> bool:
@@ -54,7 +54,7 @@ class Closed:
     @property
     def leaves_more(self) -> bool:
         """Tell whether the model in force misses the records by more than noise."""
-        return bool(self.said["leaves_more"])
+        return bool(self.answer["leaves_more"])
 
     @property
     def leaves_declared(self) -> bool:
@@ -75,7 +75,7 @@ class Closed:
         """Return value, low and high of each parameter, in units of the true value."""
         found = []
         for name, true in self.truth.parameters.items():
-            one = self.said["parameters"]["after"][name]
+            one = self.answer["parameters"]["after"][name]
             found.append((one["value"] / true, *sorted((one["low"] / true, one["high"] / true))))
         return found
 
@@ -158,32 +158,38 @@ def off_and_narrow(one: Closed) -> list[bool]:
     return [abs(value - 1.0) > 0.01 for value, low, high in one.held() if max(value - low, high - value) <= 0.01]
 
 
+def over_noise(one: Closed) -> tuple[float, float] | None:
+    """Return held-out errors of the declared model and of the one in force, over the noise; None without records.
+
+    The noise of several outputs has no common unit, so that only machines with one output count.
+    """
+    floor = one.entry["floor"]["holdout"]
+    before, after = (one.answer["error"][when]["holdout"] for when in ("before", "after"))
+    if not floor or before is None or len(after["outputs"]) > 1:
+        return None
+    return before["rmse"] / floor, after["rmse"] / floor
+
+
 def ratio(one: Closed) -> list[float]:
     """Return the held-out error over the noise where the declared model is off by at least 1.3 times the noise."""
-    floor = one.entry["floor"]["holdout"]
-    before, after = (one.said["error"][when]["holdout"] for when in ("before", "after"))
-    if not floor or before is None or len(after["outputs"]) > 1:
-        return []
-    return [after["rmse"] / floor] if before["rmse"] >= 1.3 * floor else []
+    errors = over_noise(one)
+    return [errors[1]] if errors is not None and errors[0] >= 1.3 else []
 
 
 def is_worse(one: Closed) -> list[bool]:
-    floor = one.entry["floor"]["holdout"]
-    before, after = (one.said["error"][when]["holdout"] for when in ("before", "after"))
-    if not floor or before is None:
-        return []
-    return [after["rmse"] > max(WORSE * before["rmse"], AT_NOISE * floor)]
+    errors = over_noise(one)
+    return [] if errors is None else [errors[1] > max(WORSE * errors[0], AT_NOISE)]
 
 
 def accused(one: Closed) -> bool:
     """Tell whether a record is accused that has no fault; of a gap the report counts the samples only."""
     there = one.truth.fault.get("record")
-    return any(s["record"] != there for s in one.said["suspects"] if s["kind"] not in ("gap", "trend"))
+    return any(s["record"] != there for s in one.answer["suspects"] if s["kind"] not in ("gap", "trend"))
 
 
 def fault_found(one: Closed) -> bool:
     fault = one.truth.fault
-    return any((s["record"], s["kind"]) == (fault["record"], fault["kind"]) for s in one.said["suspects"])
+    return any((s["record"], s["kind"]) == (fault["record"], fault["kind"]) for s in one.answer["suspects"])
 
 
 def named(one: Closed) -> bool:
@@ -192,9 +198,9 @@ def named(one: Closed) -> bool:
 
 def off_reported(one: Closed) -> bool:
     """Tell whether a constant that is off, or a doubt of the model, is reported."""
-    said = one.said
-    return bool(said["probabilities"]["nothing"] < ACCUSED or said["probabilities"]["drifts"]
-                or max((abs(z) for z in said["probabilities"]["constants"].values()), default=0.0) > 2.0)  # fmt: skip
+    answer = one.answer
+    return bool(answer["probabilities"]["nothing"] < ACCUSED or answer["probabilities"]["drifts"]
+                or max((abs(z) for z in answer["probabilities"]["constants"].values()), default=0.0) > 2.0)  # fmt: skip
 
 
 def scores_of(every: Sequence[Closed]) -> list[Score]:
@@ -245,8 +251,10 @@ def of_group(group: str, mine: Sequence[Closed]) -> list[Score]:
     line("S4", "of these off by more than 1 %", off_and_narrow, "<= 0.01", exact)
     more = [one for one in unlisted if one.leaves_more]
     line("S5", "unknown at 0.5 where the library lacks an effect and more than noise is left",
-         lambda c: [c.said["probabilities"]["unknown"] >= 0.5], ">= 0.85", more)  # fmt: skip
-    line("S5", "unknown at 0.5 in controls", lambda c: [c.said["probabilities"]["unknown"] >= 0.5], "<= 0.03", controls)
+         lambda c: [c.answer["probabilities"]["unknown"] >= 0.5], ">= 0.85", more)  # fmt: skip
+    line(
+        "S5", "unknown at 0.5 in controls", lambda c: [c.answer["probabilities"]["unknown"] >= 0.5], "<= 0.03", controls
+    )
     for name, target in (("one", ">= 0.98"), ("two", ">= 0.97"), ("three", ">= 0.95")):
         line("S6", f"all effects named or grouped: {name}", lambda c: [named(c)], target,
              [one for one in family.get(name, []) if not one.is_unlisted])  # fmt: skip
@@ -257,7 +265,7 @@ def of_group(group: str, mine: Sequence[Closed]) -> list[Score]:
     line("S6", "held out worse than the declared model", is_worse, "<= 0")
     line("held out", "error over noise up to 1.1", lambda c: [r <= 1.1 for r in ratio(c)], ">= 0.85")
     line("held out", "error over noise up to 1.5", lambda c: [r <= 1.5 for r in ratio(c)], ">= 0.97")
-    line("time", "processor time of a campaign, median [s]", lambda c: [c.said["cpu_s"]], "",
+    line("time", "processor time of a campaign, median [s]", lambda c: [c.answer["cpu_s"]], "",
          total=lambda values: float(np.median(values)))  # fmt: skip
-    line("time", "processor time of a campaign, longest [s]", lambda c: [c.said["cpu_s"]], "", total=max)
+    line("time", "processor time of a campaign, longest [s]", lambda c: [c.answer["cpu_s"]], "", total=max)
     return [one for one in found if one.n]

@@ -62,5 +62,5 @@ def truth_of(entry: Mapping[str, Any], hidden: bool) -> Truth:
 
 def all_found(truth: Truth, groups: Sequence[frozenset[str]], largest: int) -> bool:
     """Tell whether each planted effect is named, or stands in a group of at most so many names."""
-    said = [group for group in groups if len(group) <= largest]
-    return all(any(all(any(n in g for g in said) for n in names) for names in sets) for sets, _ in truth.effects)
+    answer = [group for group in groups if len(group) <= largest]
+    return all(any(all(any(n in g for g in answer) for n in names) for names in sets) for sets, _ in truth.effects)
