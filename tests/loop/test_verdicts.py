@@ -10,6 +10,7 @@ from armid.inference.hypothesis import Hypothesis
 from armid.inference.posterior import Atom, Posterior
 from armid.loop import Judgement, Step
 from armid.loop.close_loop import confirmed, is_denied, limits_of, path_of, steps_of, verdicts_of
+from armid.loop.figures import ends_of
 from armid.loop.result import HELD, Estimate, Withdrawn
 
 QUIET, LOUD = SimpleNamespace(significant=False), SimpleNamespace(significant=True)
@@ -173,3 +174,9 @@ def test_a_limit_that_holds_a_parameter_is_told():
     said = limits_of(SimpleNamespace(estimates=(at_limit, other, length)))
     assert [s.partition(":")[0] for s in said] == ["n sits at its limit 1.5", "x.width sits at its limit 0.02 m"]
     assert said[0].endswith("widen its bounds, or fix it.")
+
+
+def test_an_interval_is_drawn_as_it_is_and_not_about_its_value():
+    assert ends_of({"value": 3.0, "low": 1.0, "high": 3.5}, 2.0) == [[4.0], [1.0]]
+    assert ends_of({"value": 4.0, "low": 1.0, "high": 3.5}, 1.0) == [[3.0], [0.0]]
+    assert ends_of({"value": 4.0, "low": None, "high": None}, 1.0) == [[0.0], [0.0]]

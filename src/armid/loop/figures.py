@@ -172,8 +172,7 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
         factor, unit = shown(1.0, averaged[name]["unit"])
         each = [*(m["parameters"][name] for m in models), averaged[name]]
         for i, p in enumerate(each):
-            ends = [[factor * (p["value"] - p["low"])], [factor * (p["high"] - p["value"])]]
-            axis.errorbar([factor * p["value"]], [i], xerr=ends, fmt="o", capsize=4,
+            axis.errorbar([factor * p["value"]], [i], xerr=ends_of(p, factor), fmt="o", capsize=4,
                           color=AFTER if i == len(models) else GREY)  # fmt: skip
         axis.set_yticks(range(len(labels)), labels, fontsize="small")
         axis.set(xlabel=f"{name} [{unit}]", ylim=(len(labels) - 0.5, -0.5))
@@ -181,6 +180,16 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
         axis.tick_params(axis="x", labelrotation=30, labelsize="small")
     figure.suptitle(f"{campaign}: 95 % intervals by model, and over all", fontsize="medium")
     return figure
+
+
+def ends_of(p: Mapping[str, Any], factor: float) -> list[list[float]]:
+    """Return how far an interval reaches below and above its value, [[below], [above]]; 0 where there is none.
+
+    The interval counts all models, and the value is that of one: it need not lie in the middle, nor inside.
+    """
+    if p["low"] is None or p["high"] is None:
+        return [[0.0], [0.0]]
+    return [[max(factor * (p["value"] - p["low"]), 0.0)], [max(factor * (p["high"] - p["value"]), 0.0)]]
 
 
 def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]]) -> Any:
@@ -199,8 +208,7 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]])
         for place, (p, (_, colour, _)) in enumerate(zip(pair, LOOKS, strict=True)):
             if p is None:
                 continue
-            half = 0.0 if p["low"] is None or p["high"] is None else 0.5 * factor * (p["high"] - p["low"])
-            axis.errorbar([place], [factor * p["value"]], yerr=[[half], [half]], fmt="o", color=colour, capsize=5,
+            axis.errorbar([place], [factor * p["value"]], yerr=ends_of(p, factor), fmt="o", color=colour, capsize=5,
                           mfc=colour if p["trusted"] else "white")  # fmt: skip
         axis.set_xticks([0, 1], ["before", "after"])
         axis.set(xlim=(-0.6, 1.6), ylabel=f"{name} [{unit}]")
