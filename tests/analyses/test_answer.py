@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from armid.study.analyses.analysis import Evidence
+from armid.study.analyses.answer import answer_of
 from armid.study.analyses.overview import main_table
 from armid.study.analyses.ranks import RANKS, arrived, rank_tests, steps_of, tied
-from armid.study.answer import answer_of
 
 
 def on_the_same_noise(made, offsets, **more):

@@ -7,12 +7,11 @@ Where a run goes, in reading order:
 - inputs: what drives the machine in a manoeuvre
 - tasks: builds the list of runs of a study of either kind, and executes a single run
 - runner: run what is missing of a study
-- pool: worker processes on this machine, each run with a time limit
-- worker: the program of such a process
+- workers: processes on this machine that perform runs, or a cluster
 - store: one SQLite file: the planned runs and all finished ones
 
-Beside them: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind of
-study that closes the loop), dask_pool (a cluster in place of own processes), tune (options of identifiers, learnt on
-other instances), results (the store as tables), export (the store in formats of others). The report: analyses
-(statistics, a file a topic), answer (to the question of a study), document (facts and the sections of the analyses).
+The other files: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind
+of study that closes the loop), tune (options of identifiers, learnt on other instances), results (the store as tables),
+export (the store in formats of others). The report: analyses (statistics, a file a topic, and the answer), document
+(facts and the sections of the analyses).
 """

@@ -11,11 +11,11 @@ from armid.report.html import html
 from armid.report.markdown import markdown
 from armid.report.result import NewFiles
 from armid.study.analyses.analysis import Evidence, wide_runs
+from armid.study.analyses.answer import answer_of
 from armid.study.analyses.catalogue import ANALYSES, OF_SUITES, OwnAnalyses, own_sections
 from armid.study.analyses.loops import campaigns, counted, loop_runs, verdicts
 from armid.study.analyses.overview import main_table
 from armid.study.analyses.ranks import class_ranks
-from armid.study.answer import answer_of
 from armid.study.outcome import DONE
 from armid.study.results import StudyResults
 from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES

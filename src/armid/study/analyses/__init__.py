@@ -12,4 +12,5 @@
 - errors: by identifier and case; where runs end
 - ranks: which identifiers differ
 - loops: what closed loops found
+- answer: to the question of a study, a sentence for its kind
 """

@@ -22,7 +22,7 @@ from typing import Any
 
 from armid.errors import ArmidError
 from armid.study.outcome import FAILED, MissingRun, Outcome
-from armid.study.worker import FINISHED, READY, REFUSED
+from armid.study.workers.worker import FINISHED, READY, REFUSED
 
 # How often a run may take its worker with it: the first time it may have been someone else's kill.
 MOST_DEATHS = 2
@@ -86,7 +86,7 @@ class Worker:
     def _start(self) -> None:
         for _ in range(MOST_STARTS):
             ours, theirs = Pipe()
-            command = [sys.executable, "-P", "-m", "armid.study.worker", str(theirs.fileno()), str(os.getpid())]
+            command = [sys.executable, "-P", "-m", "armid.study.workers.worker", str(theirs.fileno()), str(os.getpid())]
             nothing = subprocess.DEVNULL
             with self._lock, theirs, sigint_blocked():
                 if self._is_stopped:

@@ -9,7 +9,7 @@ from typing import Any
 
 from armid.errors import ArmidError
 from armid.study.outcome import MissingRun, Outcome
-from armid.study.pool import Worker, WorkerSetup
+from armid.study.workers.pool import Worker, WorkerSetup
 
 CONNECT_S = 20.0
 OF_THREAD = threading.local()
