@@ -98,8 +98,9 @@ def identified(machine: Machine, number: int, seed: int) -> Iterator[dict[str, A
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = armid.identify(record, fitness=fitness, budget=BUDGET, seed=number + 1, **machine.given)
+        parameters = found.parameters
         for parameter in machine.truth:
-            p = found.parameters[parameter]
+            p = parameters[parameter]
             yield {"machine": machine.name, "fitness": name, "parameter": parameter, "noise": number,
                    "value": p.value, "low": p.low, "high": p.high, "doubt": p.doubt}  # fmt: skip
 

@@ -84,7 +84,7 @@ def console() -> "Console | None":
 def search_bar(is_shown: bool = True) -> Iterator[Callable[[Any], None]]:
     """Yield what shows the state of a search, a Meter, with rate and time left; nothing where no bar can be drawn.
 
-    What else has `budget`, `used`, `best_f` and a word on `what` is counted gets a bar of its own.
+    What else has `budget`, `used` and a word on `what` is counted gets a bar of its own.
     """
     drawn_on = console() if is_shown else None
     if drawn_on is None:

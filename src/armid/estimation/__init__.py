@@ -3,7 +3,7 @@
 identify        search the free parameters, judge the best candidate on train and holdout
 least_squares   the least-squares problem, its Jacobian, Levenberg-Marquardt, starts
 information     sensitivities, Fisher information, intervals
-bootstrap       intervals of a fitness that is no sum of squares
+bootstrap       intervals of a fitness that is not a sum of squares
 constants       constants within tolerances: what they do to the records, what they leave undetermined
 profile         profile likelihood
 design          what one more record would buy

@@ -1,7 +1,8 @@
-"""Intervals of an estimate that minimises no sum of squares: parametric bootstrap (Efron, Tibshirani 1993, chapter 6).
+"""Intervals of an estimate that does not minimise a sum of squares: parametric bootstrap.
 
 Records are simulated at the estimate, noise as it was measured is added, and the same fitness is minimised again from
 the estimate: once for each draw of the noise. The scatter of the draws is that of the estimator.
+Source: Efron, Tibshirani 1993, chapter 6.
 All draws are refined side by side, each by a CMA-ES of its own (Hansen 2016, arXiv:1604.00772), so that one step of all
 of them is one population of the engine. Parameters are whitened by the Cramer-Rao covariance at the estimate.
 """
@@ -21,6 +22,7 @@ from armid.model import Array
 from armid.problem.fitness import Fitness
 from armid.problem.problem import LANES, MOST_VALUES, Replay, fitness_of, output_sizes, signals_of, weights_of
 from armid.problem.space import Space
+from armid.problem.starts import by_file
 
 # Draws, enough for a standard deviation to 7 %; where the estimates are skewed so many, for quantiles.
 DRAWS, MANY_DRAWS = 100, 400
@@ -32,7 +34,6 @@ FIRST_STEP, LAST_STEP = 2.0, 0.02
 MOST_GENERATIONS, MOST_LOST = 400, 0.05
 # The search has ended at the minimum when its refinement moves no parameter by more standard deviations than this.
 AT_MINIMUM = 0.5
-FAR = "the search has not come to the minimum of {}"
 
 
 @dataclass
@@ -41,7 +42,6 @@ class Refined:
 
     budget: int
     used: int = 0
-    best_f: float = float("nan")
     what: str = "draws of the noise"
 
 
@@ -52,7 +52,7 @@ class Scatter:
     draws: estimates that converged, SI, (n_draws, n_free). low, high: ends of the 95 % interval, SI, (n_free,): the
     estimate +- 1.96 standard deviations, and the quantiles of the draws where these are skewed. bias: their mean less
     the estimate, SI, (n_free,). moved: how far the estimate itself moves when it is refined, in standard deviations.
-    doubt: why there is no interval, "" where there is one.
+    doubt: why there is no interval, "" where there is one. is_far: the estimate is not at the minimum of its fitness.
     """
 
     draws: Array
@@ -61,6 +61,7 @@ class Scatter:
     bias: Array
     moved: Array
     doubt: str = ""
+    is_far: bool = False
 
 
 def bootstrap(
@@ -80,7 +81,8 @@ def bootstrap(
     seed : int
         Of the noise that is drawn.
     progress : callable
-        Told how many draws have converged, after each generation; where it returns True the bootstrap ends.
+        Called after each generation with the number of draws that have converged. If it returns True, the bootstrap
+        ends.
 
     Returns
     -------
@@ -113,11 +115,9 @@ class Task:
     ) -> None:
         self.fitness, self.replays, self.space, self.x = fitness, replays, space, x
         self.levels = information.levels
-        covariance = information.correlation * np.outer(information.deviation, information.deviation)
-        values, vectors = np.linalg.eigh(information.correlation)
-        self.deviation = np.sqrt(np.diag(covariance))
         # in units of the deviations, as parameters differ by orders of magnitude
-        self.white = self.deviation[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, 0.0))
+        values, vectors = np.linalg.eigh(information.correlation)
+        self.white = information.deviation[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, 0.0))
         self.weights, self.sizes = weights_of(fitness, replays), output_sizes(replays)
         self.ends = np.cumsum([r.record.n_samples for r in replays])[:-1]
         self.measured = np.concatenate([r.measured for r in replays])
@@ -139,23 +139,16 @@ class Task:
         return list(start_changes(records, records.shares(self.x)))
 
     def beyond_starts(self, noise: Array) -> Array:
-        """Return noise less what starts that are fitted beside the parameters take up of it."""
+        """Return noise without the part that fitted starts take up."""
         parts = np.split(noise, self.ends, axis=1)
         left = [part.copy() for part in parts]
         first = [np.cumsum([0, *(p.n_samples for p in r.pieces)]) for r in self.replays]
-        groups: dict[tuple[int, ...], list[int]] = {}
-        for i, replay in enumerate(self.replays):
-            groups.setdefault(replay.simulated, []).append(i)
-        for group in groups.values():
-            for k, piece in enumerate(self.replays[group[0]].pieces):
-                correction = piece.correction
-                if correction is None:
+        for outputs in by_file(self.replays):
+            places = {r.place: self.replays.index(r) for r in outputs}
+            for k, correction in enumerate(piece.correction for piece in outputs[0].pieces):
+                if correction is None or not places.keys() >= set(correction.places):
                     continue
-                places = {self.replays[i].place: i for i in group}
                 rows = {place: slice(first[i][k], first[i][k + 1]) for place, i in places.items()}
-                absent = [place for place in correction.places if place not in places]
-                if absent:
-                    continue
                 seen = np.concatenate([parts[places[p]][:, rows[p]] for p in correction.places], axis=1)
                 starts = seen @ correction.gain.T
                 pairs = zip(correction.places, correction.slopes.swapaxes(0, 1), correction.samples, strict=True)
@@ -195,18 +188,19 @@ def coloured(rng: np.random.Generator, shape: tuple[int, int], level: Level) -> 
 
 def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Callable[[Refined], bool]) -> Scatter:
     """Minimise the fitness for each draw from the estimate; the first of them is the measurement itself."""
-    state, told = Swarm(len(measured), len(task.x)), Refined(len(measured) - 1)
+    searches, state = ParallelCmaes(len(measured), len(task.x)), Refined(len(measured) - 1)
     for _ in range(MOST_GENERATIONS):
-        moving = state.moving
-        told.used = int(np.count_nonzero(~moving[1:]))
-        if progress(told):
+        moving = searches.moving
+        state.used = int(np.count_nonzero(~moving[1:]))
+        if progress(state):
             return without(task.x, "the bootstrap was interrupted")
         if not moving.any():
             break
-        state.step(moving, rng, partial(task.values, measured=measured[moving]))
-    lost, draws = state.moving, task.candidates(state.best)
-    if not np.isfinite(state.value).all() or lost[1:].mean() > MOST_LOST:
-        return without(task.x, f"the fitness does not converge in {lost[1:].sum()} of {told.budget} draws of the noise")
+        searches.step(moving, rng, partial(task.values, measured=measured[moving]))
+    lost, draws = searches.moving, task.candidates(searches.best)
+    if not np.isfinite(searches.value).all() or lost[1:].mean() > MOST_LOST:
+        n_lost = f"{lost[1:].sum()} of {state.budget}"
+        return without(task.x, f"the fitness does not converge in {n_lost} draws of the noise")
     x, kept = task.x, draws[1:][~lost[1:]]
     deviation = np.std(kept, axis=0, ddof=1)
     low, high = x - NORMAL_95 * deviation, x + NORMAL_95 * deviation
@@ -217,11 +211,11 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
     moved = (draws[0] - x) / np.maximum(deviation, 1e-300)
     found = Scatter(kept, low, high, kept.mean(axis=0) - x, moved)
     if lost[0] or np.abs(moved).max() > AT_MINIMUM:
-        return replace(found, doubt=FAR.format(task.fitness.name))
+        return replace(found, doubt=f"the search has not come to the minimum of {task.fitness.name}", is_far=True)
     return found
 
 
-class Swarm:
+class ParallelCmaes:
     """A CMA-ES for each draw, all of them arrays over the draws; the start is 0, the unit a standard deviation."""
 
     def __init__(self, n_draws: int, n: int) -> None:
@@ -229,8 +223,7 @@ class Swarm:
         parents = self.size // 2
         weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
         self.weights = weights / weights.sum()
-        self.mass = 1.0 / float(np.sum(self.weights**2))
-        mass = self.mass
+        self.mass = mass = 1.0 / float(np.sum(self.weights**2))
         self.c_step = (mass + 2.0) / (n + mass + 5.0)
         self.damping = 1.0 + 2.0 * max(0.0, np.sqrt((mass - 1.0) / (n + 1.0)) - 1.0) + self.c_step
         self.c_path = (4.0 + mass / n) / (n + 4.0 + 2.0 * mass / n)
@@ -251,7 +244,8 @@ class Swarm:
     def step(self, moving: NDArray[np.bool_], rng: np.random.Generator, value: Callable[[Array], Array]) -> None:
         """Move the draws that have not converged by one generation."""
         values, vectors = np.linalg.eigh(self.covariance[moving])
-        axes = vectors * np.sqrt(np.maximum(values, 1e-20))[:, np.newaxis, :]
+        lengths = np.sqrt(np.maximum(values, 1e-20))[:, np.newaxis, :]
+        axes = vectors * lengths
         steps = rng.standard_normal((len(axes), self.size, self.n)) @ axes.swapaxes(1, 2)
         sigma = self.sigma[moving]
         tried = self.mean[moving][:, np.newaxis] + sigma[:, np.newaxis, np.newaxis] * steps
@@ -265,8 +259,7 @@ class Swarm:
         parents = np.take_along_axis(steps, order[:, : len(self.weights), np.newaxis], axis=1)
         mean = np.einsum("p,dpn->dn", self.weights, parents)
         self.mean[moving] += sigma[:, np.newaxis] * mean
-        whitened = np.einsum("dij,dj->di", vectors / np.sqrt(np.maximum(values, 1e-20))[:, np.newaxis, :],
-                             np.einsum("dji,dj->di", vectors, mean))  # fmt: skip
+        whitened = np.einsum("dij,dj->di", vectors / lengths, np.einsum("dji,dj->di", vectors, mean))
         gain = np.sqrt(self.c_step * (2.0 - self.c_step) * self.mass)
         self.step_path[moving] = (1.0 - self.c_step) * self.step_path[moving] + gain * whitened
         length = np.linalg.norm(self.step_path[moving], axis=1)

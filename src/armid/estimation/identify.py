@@ -135,18 +135,18 @@ class Identification(Result):
     @property
     def parameters(self) -> dict[str, "ParameterEstimate"]:
         """Name -> value, 95 % interval and what stands against it, SI: `found.parameters["p0"].low`."""
-        keys = {"value": "value", "low": "low", "high": "high", "unit": "unit", "doubt": "interval_doubt"}
-        return {name: ParameterEstimate(**{k: entry.get(key, "") for k, key in keys.items()})
-                for name, entry in self.to_dict()["parameters"].items()}  # fmt: skip
+        return {name: ParameterEstimate(p["value"], p["low"], p["high"], p["unit"], p.get("interval_doubt", ""))
+                for name, p in self.to_dict()["parameters"].items()}  # fmt: skip
 
     @property
     def table(self) -> "DataFrame":
         """Parameters as people read them; `low` and `high` are numbers in the unit of the value."""
+        found = self.parameters.values()
         with angles_in(self.campaign.angle):
-            scales = [scale_of(p.unit, p.value)[1] for p in self.parameters.values()]
-        ends = {end: [np.nan if getattr(p, end) is None else getattr(p, end) for p in self.parameters.values()]
-                for end in ("low", "high")}  # fmt: skip
-        return super().table.assign(**{end: np.multiply(values, scales) for end, values in ends.items()})
+            scales = [scale_of(p.unit, p.value)[1] for p in found]
+        # None becomes NaN
+        ends = {"low": np.array([p.low for p in found], float), "high": np.array([p.high for p in found], float)}
+        return super().table.assign(**{end: values * scales for end, values in ends.items()})
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
@@ -259,12 +259,13 @@ def judged(
 
         scatter = bootstrap(fitness, replays, space, x, information, seed, is_over)
     if len(scatter.draws) > 1:
-        both = np.hypot(scatter.draws.std(axis=0, ddof=1), information.deviation)
+        deviation = scatter.draws.std(axis=0, ddof=1)
+        both = np.hypot(deviation, information.deviation)
         apart = float(np.max(np.abs(x - scatter.bias - least) / both))
         if apart > APART and not scatter.doubt:
             doubt = f"it lies {apart:.3g} standard deviations from the least-squares estimate, as a local minimum does"
             scatter = replace(scatter, doubt=doubt)
-        information = replace(information, deviation=scatter.draws.std(axis=0, ddof=1), step=scatter.moved,
+        information = replace(information, deviation=deviation, step=scatter.moved,
                               correlation=np.atleast_2d(np.corrcoef(scatter.draws.T)))  # fmt: skip
     return information, scatter
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from armid.engine.calibrate import NOISE_HIDES
-from armid.estimation.bootstrap import FAR
 from armid.estimation.identify import Identification, errors_by_file, errors_entry, outputs_entry, versions_of
 from armid.estimation.information import collinear
 from armid.model import Array
@@ -355,7 +354,7 @@ def interval_doubts(found: Identification) -> dict[str, str]:
 
 def far_from_minimum(found: Identification) -> bool:
     if found.scatter is not None:
-        return found.scatter.doubt == FAR.format(found.fitness.name)
+        return found.scatter.is_far
     return bool(np.nan_to_num(np.abs(found.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
 
 

@@ -95,10 +95,8 @@ def searching(name: str, function: Callable[..., Any], budget: int, **options: A
 def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: SearchTask) -> None:
     """Let a function search that calls for values until they raise."""
     low, high, cube = task.problem.xl, task.problem.xu, task.cube
-    value, start = (
-        Value(task.ask, low, high),
-        cube.candidates(cube.first(task))[0] if task.start is None else task.start,
-    )
+    value = Value(task.ask, low, high)
+    start = cube.candidates(cube.first(task))[0] if task.start is None else task.start
     given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": task.budget, "random": task.random,
              "start": start.copy()}  # fmt: skip
     try:

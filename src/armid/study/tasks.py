@@ -150,18 +150,23 @@ def versions() -> dict[str, str]:
 class Entry:
     """One identifier of a study with all that was left to the study filled in.
 
-    budget: of a run at most; per_parameter: budgets in simulations a free parameter, empty: the budgets in `several`.
+    several: budgets of its runs. per_parameter: simulations a free parameter, used instead where there are any; no run
+    then has more than the largest of `several`.
     """
 
     label: str
     name: str
     options: Mapping[str, Any]
-    budget: int
+    several: tuple[int, ...]
     fitness: tuple[str, ...]
     noise_deg_s: tuple[float, ...]
     seeds: tuple[int, ...]
-    per_parameter: tuple[int, ...] = ()
-    several: tuple[int, ...] = ()
+    per_parameter: tuple[int, ...]
+
+    @property
+    def budget(self) -> int:
+        """Largest budget of a run."""
+        return max(self.several)
 
     def budgets(self, n_free: int) -> list[int]:
         return sorted({min(self.budget, each * n_free) for each in self.per_parameter}) or [*self.several]
@@ -361,10 +366,9 @@ def _entries(spec: StudySpec, registry: StudyRegistry, where: str) -> tuple[Entr
         at = f"{where}, identifier {quoted(name) if isinstance(name, str) else i + 1}"
         own = validated(EntrySpec, table, at)
         noise = spec.noise_deg_s if own.noise_deg_s is None else own.noise_deg_s
-        budgets = own.budget or spec.budget
-        entry = Entry(own.label or own.name, own.name, dict(own.options), max(budgets),
+        entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
                       own.fitness or spec.fitness, noise, own.seeds or spec.seeds,
-                      own.budget_per_parameter or spec.budget_per_parameter, budgets)  # fmt: skip
+                      own.budget_per_parameter or spec.budget_per_parameter)  # fmt: skip
         _check_built(entry, registry, at)
         entries.append(entry)
     for i, entry in enumerate(entries):

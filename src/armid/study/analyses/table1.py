@@ -108,11 +108,10 @@ def paper_layout(evidence: Evidence, title: str, with_truth: bool) -> Table:
             at = [rows_of[rows_of["case"] == case] for rows_of in of.values()]
             rows.append((source, case, *(float(a[key].iloc[0]) if len(a) else np.nan for a in at for key in PRINTED)))
         values = [[rows_of[key].mean() for key in PRINTED[1:]] for rows_of in of.values()]
-        scatter = [rows_of["value"].std(ddof=0) for rows_of in of.values()]
-        if with_truth:
-            rows.append((source, "mean", *(x for _, error in values for x in (np.nan, np.nan, error))))
-        else:
-            rows.append((source, "mean", *(x for mean, error in values for x in (np.nan, mean, error))))
+        means = [(np.nan, np.nan if with_truth else mean, error) for mean, error in values]
+        rows.append((source, "mean", *(x for group in means for x in group)))
+        if not with_truth:
+            scatter = [rows_of["value"].std(ddof=0) for rows_of in of.values()]
             rows.append((source, "deviation", *(x for s in scatter for x in (np.nan, s, np.nan))))
     frame = DataFrame(rows, columns=[c.key for c in columns])
     name = slug(title, "as printed")
