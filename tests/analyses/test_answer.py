@@ -74,3 +74,19 @@ def test_the_answer_to_table_2_is_how_repeats_agree_and_what_is_off(made):
     said = answer_of(evidence, main_table(evidence))[0]
     assert re.match(r"Repeats on a record agree to [\d.e-]+ % with cmaes, to [\d.]+ % with pso \(0.3 deg/s", said)
     assert said.endswith("off is eta3 by 10 %, since the model lacks an effect of these records.")
+
+
+def test_a_study_that_was_cut_off_after_its_first_case_has_an_answer_and_ranks_nobody(made):
+    results = made(seeds=2)
+    runs = results.runs
+    is_common = (runs["case"] == runs["case"].iloc[0]) | (runs["identifier"] == runs["identifier"].iloc[0])
+    kept = runs[is_common]
+    rows = results.parameters[results.parameters["run"].isin(kept["run"])]
+    evidence = Evidence(replace(results, runs=kept, parameters=rows))
+    assert len(evidence.cases) > 1
+    assert rank_tests(evidence.of("0.3 deg/s")).n_cases == 1
+    (answer,) = answer_of(evidence, main_table(evidence))
+    assert answer.startswith("Best: 0.3 deg/s: ")
+    assert "the tests" not in answer
+    (text,) = RANKS.parts(evidence)
+    assert "arrive" not in text.text

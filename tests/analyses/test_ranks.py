@@ -68,6 +68,7 @@ def test_signed_rank_of_pairs_that_all_agree_is_two_of_all_signs_and_1_without_a
     for n in (5, 8):
         assert signed_rank(np.arange(1.0, n + 1), 3.0 * np.arange(1.0, n + 1) ** 2) == pytest.approx(2.0 ** (1 - n))
     assert signed_rank(np.ones(6), np.ones(6)) == 1.0
+    assert signed_rank(np.ones(1), 2.0 * np.ones(1)) == 1.0
     assert signed_rank(np.full(6, np.inf), np.full(6, np.inf)) == 1.0
 
 

@@ -16,6 +16,7 @@ from armid.study.results import StudyResults
 
 Small = NDArray[np.float32]
 P = TypeVar("P", bound=Part)
+T = TypeVar("T")
 # 51 targets, as COCO takes, five a decade: largest relative errors of the parameters from 100 % to 1e-8 %, and shares
 # of the way from a first candidate to the best fitness that anyone found.
 TARGETS = 10.0 ** (-np.arange(51) / 5.0)
@@ -143,6 +144,7 @@ class Evidence:
 
     def __init__(self, results: StudyResults) -> None:
         self.results = results
+        self._made: dict[Any, Any] = {}
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
         self.runs = ordered(outcomes(results.runs, self.parameters), self.study)
@@ -253,6 +255,13 @@ class Evidence:
 
     def of(self, setting: str) -> DataFrame:
         return self.runs[self.runs["setting"] == setting]
+
+    def once(self, make: Callable[["Evidence", str], T], setting: str) -> T:
+        """Return what a function makes of the runs at a setting; section and answer share it."""
+        if (make, setting) not in self._made:
+            self._made[make, setting] = make(self, setting)
+        found: T = self._made[make, setting]
+        return found
 
 
 def is_swarm(variant: str) -> bool:

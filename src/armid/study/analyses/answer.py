@@ -7,13 +7,13 @@ from pandas import DataFrame, Series
 
 from armid.report.document import listed
 from armid.study.analyses.analysis import PAPER, Evidence, is_swarm
-from armid.study.analyses.ranks import arrived, arrived_sentence, rank_tests, steps_of, suite_answer
+from armid.study.analyses.ranks import arrived_text, compared, suite_answer
 
-# Of more settings the table tells.
+# The answer names so many settings; the table holds all.
 MOST_SETTINGS = 3
 # Of the paper's simulations: what its table is to be beaten with.
 QUARTER = 0.25
-# Identifiers that cannot be told from the best and are named.
+# Of the identifiers that do not differ significantly from the best, so many are named.
 MOST_ALIKE = 4
 # A parameter whose mean error is more times its scatter than this is off, whatever the search does.
 OFF = 3.0
@@ -92,7 +92,7 @@ def by_fitness(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
 
 
 def best(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
-    """Return who is best at each setting, whom the tests cannot tell from it, and how many arrived."""
+    """Return the best identifier of each setting, those that do not differ from it, and how many arrived."""
     known = frame[frame["variant"] != PAPER].dropna(subset="largest_median")
     settings = [s for s in noisy_first(evidence) if (known["setting"] == s).any()]
     said = [best_at(evidence, known[known["setting"] == setting], setting) for setting in settings[:MOST_SETTINGS]]
@@ -101,23 +101,20 @@ def best(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
 
 
 def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
-    compared = len(own) > 1 and len(evidence.cases) > 1
-    tests = rank_tests(evidence.of(setting), steps_of(evidence, setting)) if compared else None
-    ranked = tests is not None and tests.n_cases > 1
-    rows = own.set_index("variant")
-    name = str(tests.ranks.index[0] if tests is not None and ranked else rows["largest_median"].idxmin())
+    tests, reached = evidence.once(compared, setting)
+    ranked, rows = len(own) > 1 and tests.n_cases > 1, own.set_index("variant")
+    name = str(tests.ranks.index[0] if ranked else rows["largest_median"].idxmin())
     row: Any = rows.loc[name]
     text = (f"{setting}: {name}, largest error of a run {percent(row['largest_median'])} (median), "
             f"{percent(row['largest_p95'])} (95 % of {row['n']} runs)")  # fmt: skip
-    if tests is None or not ranked:
+    if not ranked:
         return text
     pairs = tests.pairs[(tests.pairs["first"] == name) | (tests.pairs["second"] == name)]
     named = zip(pairs["first"], pairs["second"], pairs["p_holm"], strict=True)
     alike = [str(a if b == name else b) for a, b, p in named if not p < SURE]
     some = listed(alike[:MOST_ALIKE]) + (f" and {len(alike) - MOST_ALIKE} more" if len(alike) > MOST_ALIKE else "")
     text += f"; the tests cannot tell {some} from it" if alike else "; it is better than each other by the tests"
-    reached = arrived(evidence, setting)
-    return f"{text}; {arrived_sentence(reached, setting).partition(': ')[2].rstrip('.')}" if len(reached) else text
+    return f"{text}; {arrived_text(reached)}" if len(reached) else text
 
 
 def own(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:

@@ -32,8 +32,8 @@ RANK_CAPTION = (
     "Largest relative error of a run, median over the seeds: one number a case and identifier. A case is one block, "
     "since its seeds are repeats and no independent evidence. Errors of 1e-6 % and below count as equal, and so do "
     "those that differ by less than a hundredth of the Cramer-Rao bound. Rank 1 is the best of a case; the table shows "
-    "the mean over the cases. arrived: share of the runs of which no parameter is more than that from the run with the "
-    "lowest fitness on the same noise."
+    "the mean over the cases. arrived: share of the runs that end within that distance, in each parameter, of the run "
+    "with the lowest fitness on the same noise."
 )
 PAIRS_CAPTION = (
     "Wilcoxon's signed-rank test of the logarithms of the same block values (two-sided, Pratt's rule for ties), "
@@ -52,11 +52,11 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         return ()
     tables, figures, said = [], [], []
     for setting in evidence.settings:
-        tests, reached = rank_tests(evidence.of(setting), steps_of(evidence, setting)), arrived(evidence, setting)
+        tests, reached = evidence.once(compared, setting)
         if tests.n_cases < 2 or len(tests.ranks) < 2:
             continue
         end = "" if len(evidence.settings) == 1 else setting
-        said += [arrived_sentence(reached, setting)] if len(reached) else []
+        said += [f"{setting}: {arrived_text(reached)}."] if len(reached) else []
         tables += [mean_ranks(tests, reached, setting, slug("ranks", end)), pairs(tests, setting, slug("pairs", end))]
         if tests.n_cases >= LEAST_CASES and len(tests.ranks) > 2:
             draw = partial(critical_difference_figure, tests, evidence.colours)
@@ -64,6 +64,11 @@ def parts(evidence: Evidence) -> Sequence[Part]:
             figures.append(Figure(name, f"Critical differences, {setting}", FIGURE_CAPTION, draw))
     note = "" if figures else f" A critical-difference diagram wants {LEAST_CASES} cases or more."
     return Text(" ".join([INTRODUCTION + note, *said])), *tables, *figures
+
+
+def compared(evidence: Evidence, setting: str) -> tuple["RankTests", Series]:
+    """Return the tests of all variants at a setting, and the share of the runs of each that arrive."""
+    return rank_tests(evidence.of(setting), steps_of(evidence, setting)), arrived(evidence, setting)
 
 
 RANKS = Analysis("ranks", "Ranks", parts, "which identifiers differ: Friedman, Wilcoxon with Holm, effect sizes")
@@ -125,8 +130,8 @@ def steps_of(evidence: Evidence, setting: str) -> dict[str, float]:
 def arrived(evidence: Evidence, setting: str) -> Series:
     """Return the share of the runs of each variant that end where the lowest fitness on the same noise lies.
 
-    A run has arrived of which no parameter is further from it than a hundredth of the Cramer-Rao bound. Variants that
-    nobody shares a fitness with are left out.
+    A run has arrived if each of its parameters lies there within a hundredth of the Cramer-Rao bound. A variant is left
+    out if no other variant minimises its fitness.
     """
     problem, runs = ["case", "seed", "fitness"], evidence.of(setting)
     shared = runs[runs.groupby(problem)["variant"].transform("nunique") > 1]
@@ -143,9 +148,9 @@ def arrived(evidence: Evidence, setting: str) -> Series:
     return shared.assign(near=shared["run"].map(near).eq(True)).groupby("variant", sort=False)["near"].mean()
 
 
-def arrived_sentence(reached: Series, setting: str) -> str:
-    return (f"{setting}: {(reached > HALF).sum()} of {len(reached)} identifiers arrive at the lowest fitness in more "
-            "than half of their runs.")  # fmt: skip
+def arrived_text(reached: Series) -> str:
+    return (f"{(reached > HALF).sum()} of {len(reached)} identifiers arrive at the lowest fitness in more than half of "
+            "their runs")  # fmt: skip
 
 
 def blocks_of(runs: DataFrame, quantity: str) -> DataFrame:
@@ -179,7 +184,7 @@ def pair_tests(blocks: DataFrame, runs: DataFrame) -> DataFrame:
 
 
 def signed_rank(first: Array, second: Array) -> float:
-    """Return the two-sided probability of Wilcoxon's signed-rank test; 1 when no pair differs.
+    """Return the two-sided probability of Wilcoxon's signed-rank test; 1 for a single pair or when no pair differs.
 
     Differences are taken between the logarithms, since errors span many powers of ten, zero and infinity counting as
     the ends of all floats; Pratt's rule for ties.
@@ -189,7 +194,7 @@ def signed_rank(first: Array, second: Array) -> float:
     ends = np.finfo(np.float64)
     x, y = (np.log(np.clip(v, ends.tiny, ends.max)) for v in (first, second))
     differences = np.where(first == second, 0.0, x - y)
-    if not differences.any():
+    if len(differences) < 2 or not differences.any():
         return 1.0
     if len(differences) > MOST_EXACT:
         return float(wilcoxon(differences, zero_method="pratt").pvalue)
