@@ -69,7 +69,7 @@ def population(default: int | None, meaning: str, **limits: Any) -> Any:
 class Options(ABC):
     """Check the options of an algorithm, a frozen dataclass of fields made by `option`, and build it.
 
-    package: what it needs beside armid's own dependencies, "" for nothing.
+    package: what it needs in addition to armid's own dependencies, "" for nothing.
     """
 
     package: ClassVar[str] = ""
@@ -125,7 +125,8 @@ class Identifier:
     any; note: what it is, in words.
     is_global: it searches the whole box; uses_gradient: it asks for derivatives; is_stochastic: a seed changes it;
     needs_residuals: it works on residual vectors, so the fitness has to be a sum of squares.
-    package: what it needs beside armid's own dependencies, "" for nothing. algorithm: the dataclass of its options.
+    package: what it needs in addition to armid's own dependencies, "" for nothing. algorithm: the dataclass of its
+    options.
     """
 
     name: str
@@ -165,7 +166,7 @@ class Identifier:
 
 
 def declared(name: str, note: str, algorithm: Any, *fixed: Any, **flags: Any) -> Identifier:
-    """Return the identifier of a dataclass of options; fixed: values of its first fields, which are no options."""
+    """Return the identifier of a dataclass of options; fixed: values of its first fields, which are not options."""
     build = partial(built, algorithm, fixed, name)
     return Identifier(name, build, note, package=algorithm.package, algorithm=algorithm, **flags)
 

@@ -37,7 +37,7 @@ class TrustRegion(SearchOptions):
         from scipy.optimize import least_squares
 
         residual = Residual(task, self.step, self.differences)
-        # no limit on the gradient: it is no share of anything
+        # no limit on the gradient: its size is not a share of the range
         least_squares(
             residual.at, start, residual.derivative, (0.0, 1.0), "trf", ftol=self.tolerance, xtol=self.tolerance,
             gtol=None, max_nfev=MOST_CALLS,

@@ -33,8 +33,8 @@ class SearchAlgorithm(Algorithm):  # type: ignore[misc]
     search: the search; budget: simulations after which the run ends when no termination is given. is_seeded: in a chain
     it draws from a generator of its own, as pymoo's algorithms do. of_pymoo: options of pymoo's Algorithm, such as
     termination, callback, seed. All that is random comes from `random_state`.
-    `opt` is the best candidate so far. A search that comes to its own end ends the run. It runs as a whole: pymoo's
-    `minimize`, or `run`; it is not asked and told.
+    `opt` is the best candidate so far. The run ends when the search returns. A search runs as a whole, by pymoo's
+    `minimize` or by `run`; it refuses `ask` and `next`.
     """
 
     def __init__(self, search: Search, budget: int, is_seeded: bool = False, **of_pymoo: Any) -> None:
@@ -52,7 +52,7 @@ class SearchAlgorithm(Algorithm):  # type: ignore[misc]
         return super().setup(problem, **options)
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> Result:
-        """Search to the end; is_over: asked after each generation, beside the termination."""
+        """Search to the end; is_over: called after each generation, as the termination is."""
         if self.problem is None or self.is_initialized:
             raise ArmidError("the search has no problem, or has run before: setup(problem) of a new one is expected")
         self._initialize()

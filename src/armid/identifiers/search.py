@@ -31,7 +31,7 @@ class Asker(Protocol):
 
 
 class Dropped(BaseException):
-    """Unwind a search: nobody wants its candidates any more. No error, so that nobody catches it by the way."""
+    """Unwind a search whose run has ended. It is not an Exception, so that `except Exception` does not catch it."""
 
 
 class NoFitnessError(Exception):

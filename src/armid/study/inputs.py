@@ -1,7 +1,7 @@
 """Inputs of simulated cases: a column of a CSV file, or a signal by its name.
 
 A manoeuvre of a study holds `inputs = { NAME = { ... } }`. With `kind` a signal is made: `chirp`, `multisine`, `steps`
-or `prbs`, in the unit of the input. With `csv` and `column` it is read from a file beside the study's.
+or `prbs`, in the unit of the input. With `csv` and `column` it is read from a file in the study's folder.
 """
 
 from collections.abc import Mapping
@@ -96,7 +96,7 @@ class Prbs(Steps):
 class Column:
     """A column of a CSV file in the folder of the study, its times from the first sample on."""
 
-    csv: str = field(metadata=key(text, "a file beside the study's file", "The CSV file."))
+    csv: str = field(metadata=key(text, "a file in the folder of the study", "The CSV file."))
     column: str = field(metadata=key(text, "the header of a column", "Its column."))
 
 
@@ -139,7 +139,8 @@ def column_values(asked: Column, folder: Path, times: Array, where: str) -> list
     table = read_table(path, asked.csv)
     if asked.column not in table.headers:
         raise unknown_name("column", asked.column, table.headers, f"{where}, {asked.csv}")
-    seen = time_column(table) - time_column(table)[0]
+    seen = time_column(table)
+    seen = seen - seen[0]
     if seen[-1] < times[-1] - 1e-9:
         raise ArmidError(f"{where}: {asked.csv} lasts {seen[-1]:.6g} s, at least the {times[-1]:.6g} s of the "
                          "manoeuvre are expected")  # fmt: skip

@@ -61,7 +61,7 @@ class StudyResults(Shown):
     runs: one row a finished run. noise_deg_s: that the study added, NaN for records that are read. used, n_failed:
     simulations. value: best fitness. train_rmse, holdout_rmse: SI. status: "done" or "failed", with the reason in
     `error`. model, versions: hashes, see `text_of`. x_NAME: value of a parameter, SI; error_NAME: its relative error.
-    parameters: one row a run and free parameter, SI. deviation: one sigma as of `armid.identify`, the Cramer-Rao bound
+    parameters: one row a run and free parameter, SI. deviation: one sigma as in `armid.identify`, the Cramer-Rao bound
     at the solution where the fitness weighs records by their noise. relative_error: abs(value - truth)/abs(truth),
     NaN where the truth is not known.
     """

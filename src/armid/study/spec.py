@@ -73,7 +73,7 @@ any_whole, count = whole_number(), whole_number(1)
 
 @kind(anyOf=[list_of(any_whole, 1).schema, whole_number(1, MOST_SEEDS).schema])
 def seeds(value: object) -> tuple[int, ...]:
-    """Return seeds: n stands for 1 to n."""
+    """Return seeds: n means 1 to n."""
     if isinstance(value, list):
         return tuple(list_of(any_whole, 1)(value))
     return tuple(range(1, whole_number(1, MOST_SEEDS)(value) + 1))
@@ -136,9 +136,7 @@ STUDY_NAME = key(
 )
 LINE = key(line_of_text, "a text on one line", "The name of the case on pages.")
 QUESTION = key(any_text, "a text", "The question that the study answers, shown at the head of its report.")
-SEEDS = key(
-    seeds, "at most 1,000,000 seeds or a list", "Seeds of the searches, each of which is a run; n stands for 1 to n."
-)
+SEEDS = key(seeds, "at most 1,000,000 seeds or a list", "Seeds of the searches, one run each; n means 1 to n.")
 PER_PARAMETER = key(
     rising_counts, "a whole number above 0, or a rising list of such",
     "Budget of a problem of the suite: simulations for each of its free parameters.",
@@ -199,7 +197,7 @@ class CaseSpec:
     fixed: Mapping[str, float] = field(default_factory=dict, metadata=FIXED)
     manoeuvres: tuple[dict[str, Any], ...] = field(default=(), metadata=MANOEUVRES)
     campaign: str | None = field(default=None, metadata=key(
-        text, "a folder beside the study's file", "A campaign whose records take the place of manoeuvres.",
+        text, "a folder in the folder of the study", "A campaign whose records are used instead of manoeuvres.",
     ))  # fmt: skip
     records: tuple[str, ...] | None = field(default=None, metadata=key(
         list_of(text, 1), "a list of files of the campaign", "The records of the campaign that are used.",
@@ -226,7 +224,7 @@ class SuiteSpec:
     """Declare [suite]: instances of problems of `armid.suite()`. train: instances that `armid tune` learns from."""
 
     problems: tuple[str, ...] = field(default=("*",), metadata=key(
-        list_of(text, 1), "a list of names of problems", "Problems of the suite; * stands for any letters.",
+        list_of(text, 1), "a list of names of problems", "Problems of the suite; * matches any letters.",
     ))  # fmt: skip
     instances: tuple[int, ...] = field(default=(1, 2, 3, 4, 5), metadata=key(
         list_of(count, 1), "a list of instances", "Instances of each problem, from 1 to 15.",
@@ -309,7 +307,7 @@ class LoopSpec:
     name: str = field(metadata=STUDY_NAME)
     campaigns: str = field(metadata=key(
         line_of_text, "a folder of campaigns, relative to this file",
-        "Folder of the campaigns, each of which is a run.",
+        "Folder of the campaigns, one run each.",
     ))  # fmt: skip
     kind: str = field(metadata=kind_key(CLOSES_LOOP), default=CLOSES_LOOP)
     question: str = field(default="", metadata=QUESTION)
@@ -318,7 +316,7 @@ class LoopSpec:
         line_of_text, "the command that makes the campaigns", "Shown to readers; nothing runs it.",
     ))  # fmt: skip
     only: tuple[str, ...] = field(default=("*",), metadata=key(
-        list_of(text, 1), "a list of names of campaigns", "Campaigns that are used; * stands for any letters.",
+        list_of(text, 1), "a list of names of campaigns", "Campaigns that are used; * matches any letters.",
     ))  # fmt: skip
     candidates: tuple[str, ...] = field(default=(), metadata=key(
         EFFECT_NAMES, "a list of names of effects", "Effects to look for; all where none is named.",
@@ -331,7 +329,7 @@ class LoopSpec:
     seed: int = field(default=1, metadata=SEED)
     rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict, metadata=key(
         table_of(list_of(text, 1)), "lists of effects by names of campaigns",
-        "Effects to look for in campaigns of a name, in place of the candidates.",
+        "Effects to look for in campaigns of a name, instead of the candidates.",
     ))  # fmt: skip
     suite: Mapping[str, Any] = field(default_factory=dict, metadata=key(
         any_table, "a table", "What the campaigns are made of, for their maker; the study does not read it.",

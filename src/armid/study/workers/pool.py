@@ -129,7 +129,7 @@ class Worker:
             code = process.wait()
             return (LATE, "") if late.is_set() else (DIED, f"the worker process ended {_cause(code)}")
         except Exception:
-            # of bytes that are no pickle, or of another thing
+            # the bytes are not a pickle, or the object is not a word and its content
             return DIED, NO_MESSAGE
         finally:
             limit.cancel()
