@@ -1,4 +1,4 @@
-"""What the site has beside its written pages: references made from the code, the gallery, figures of results.
+"""The pages of the site that are made: references from the code, the gallery, figures of results.
 
 MkDocs calls `on_files` and `on_page_markdown`. A page that lies elsewhere in the repository is shown from there.
 """
@@ -17,7 +17,7 @@ from mkdocs.structure.pages import Page
 
 import armid
 from armid.cli.main import app
-from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, is_required
+from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, default_of, is_required, toml
 from armid.study.spec import CaseSpec, EntrySpec, LoopSpec, ManoeuvreSpec, RandomCasesSpec, StudySpec, SuiteSpec
 
 ROOT = Path(__file__).parents[2]
@@ -71,9 +71,9 @@ def keys_page() -> str:
 
 
 def key_row(f: Any) -> str:
-    default = "required" if is_required(f) else "" if f.default in (None, "", ()) or callable(f.default) else f.default
-    shown = default if isinstance(default, str) else str(default)
-    cells = (f"`{f.name}`", f.metadata["expected"], "" if "MISSING" in shown else shown, f.metadata["meaning"])
+    default = default_of(f)
+    shown = "required" if is_required(f) else "" if default is None else f"`{toml(default)}`"
+    cells = (f"`{f.name}`", f.metadata["expected"], shown, f.metadata["meaning"])
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

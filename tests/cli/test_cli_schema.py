@@ -84,6 +84,18 @@ def test_every_key_has_a_meaning_of_one_sentence_and_its_kind_in_words():
             assert f.metadata["kind"].schema, (sheet, f.name)
 
 
+def test_every_default_is_a_value_that_its_key_takes(schemas):
+    sheets = {"campaign": schemas["campaign"], "study": schemas["study"]["else"], "loops": schemas["study"]["then"]}
+    defaults = {(sheet, key): own["default"] for sheet, schema in sheets.items()
+                for key, own in schema["properties"].items() if "default" in own}  # fmt: skip
+    for (sheet, key), default in defaults.items():
+        jsonschema.Draft7Validator(sheets[sheet]["properties"][key]).validate(default)
+    assert defaults["study", "windows_s"] == ["whole"]
+    assert defaults["study", "noise_deg_s"] == [0.0]
+    assert defaults["campaign", "unwrap"] is False
+    assert ("study", "report") not in defaults
+
+
 def test_a_schema_offers_what_is_registered_and_takes_other_names(schemas):
     plant = schemas["study"]["else"]["properties"]["plant"]
     assert "driven_axis" in plant["anyOf"][0]["enum"]

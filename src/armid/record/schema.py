@@ -163,8 +163,8 @@ def sheet_schema(sheet: "type[DataclassInstance]") -> dict[str, Any]:
     for name, f in declared.items():
         text = f"{f.metadata['meaning']} Expected: {f.metadata['expected']}."
         properties[name] = {**f.metadata["kind"].schema, "description": text}
-        if isinstance(f.default, str | bool | int | float) and f.default != "":
-            properties[name]["default"] = f.default
+        if (default := default_of(f)) is not None:
+            properties[name]["default"] = default
     required = [name for name, f in declared.items() if is_required(f)]
     open_to = {} if len(declared) == len(fields(sheet)) else {OF_PLANTS: True}
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": False, **open_to}
@@ -172,6 +172,11 @@ def sheet_schema(sheet: "type[DataclassInstance]") -> dict[str, Any]:
 
 def is_required(f: "Field[Any]") -> bool:
     return f.default is MISSING and f.default_factory is MISSING
+
+
+def default_of(f: "Field[Any]") -> Any:
+    """Return the default of a key; None where it is required, and where its default is empty."""
+    return None if f.default in (MISSING, None, "", ()) else f.default
 
 
 def key_schema(key: ManoeuvreKey) -> dict[str, Any]:
@@ -222,7 +227,7 @@ TOLERANCES = key(
 LOST = key(share, "a share from 0 to below 1", "Share of a record that may be invalid: clipped, frozen or wild.")
 INPUTS = key(table_of(text), "the name of a column", "Which column of the CSV file brings an input of the plant.")
 WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds", "Part of the record that fitness and errors see.")
-EFFECTS = key(list_of(name_in("effects")), "a list of names of effects", "Effects that the model has beside the plant.")
+EFFECTS = key(list_of(name_in("effects")), "a list of names of effects", "Effects that the model adds to the plant.")
 PLANT = key(name_in("plants"), "the name of a plant", "The declared machine; `armid list plants` shows them.")
 
 
