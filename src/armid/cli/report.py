@@ -54,11 +54,11 @@ STUDY, PAGE = "study.sqlite", "report.html"
               help="Truth of blind campaigns, which studies/blind/score.py scores.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["page", "pdf"]), default="page", show_default=True,
               help="page with its files, or only the figures of a study as PDF for a paper.")  # fmt: skip
-@click.option("--width", type=click.Choice(["single", "double"]), default="double", show_default=True,
+@click.option("--width", type=click.Choice(["single", "double"]), show_default="double",
               help="Columns of the paper that a PDF figure spans.")  # fmt: skip
 @plugin_option
-def report_command(folder: Path, key: Path | None, form: str, width: str, plugins: tuple[str, ...]) -> None:
-    """Write report.html, one self-contained page, beside stored results.
+def report_command(folder: Path, key: Path | None, form: str, width: str | None, plugins: tuple[str, ...]) -> None:
+    """Write report.html, one self-contained page, into the folder of stored results.
 
     DIR is a folder that `armid study`, `armid close-loop`, `armid identify` or `armid identifiability` (whose page is
     identifiability.html) has written. The same results give the same bytes, and nothing is simulated. The answer stands
@@ -67,9 +67,11 @@ def report_command(folder: Path, key: Path | None, form: str, width: str, plugin
     is, and says so. An analysis of your own, --plugin FILE.py:name, becomes a section; plug-ins of another kind may be
     named as for the study, and change nothing.
     """
+    if width is not None and form != "pdf":
+        raise ArmidError(f"--width {width} is given without --format pdf: a width of PDF figures alone is expected")
     kind = kind_in(folder)
     if kind is None:
-        report_study(folder, key, width if form == "pdf" else "", plugins)
+        report_study(folder, key, width or "double" if form == "pdf" else "", plugins)
         return
     if form == "pdf":
         raise ArmidError(f"{folder} holds no study: --format pdf draws the figures of a study, leave it out here")
