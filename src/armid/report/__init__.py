@@ -1,6 +1,6 @@
 """One document a result, and what renders it.
 
 Reading order: `document` (the classes, and what several results say alike), `terminal`, `markdown`, `html` with its
-templates, `files` (CSV, PNG, SVG, PDF), `latex`, `style` (colours, names beside lines, and how figures are written),
+templates, `files` (CSV, PNG, SVG, PDF), `latex`, `style` (colours, legends, and how figures are written),
 `result` (what every result shows of itself: repr, table, figure, files; and results read back).
 """

@@ -50,7 +50,7 @@ def latex(table: Table) -> str:
 
 
 def split(widths: Sequence[float], first: Sequence[int], headed: bool) -> list[list[int]]:
-    """Return the columns of each part beside the first ones, as many as the width takes."""
+    """Return the columns of each part that follow the first ones, as many as the width takes."""
     taken = sum(widths[i] for i in first)
     parts: list[list[int]] = [[]]
     for i in range(len(widths)):

@@ -224,8 +224,8 @@ def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
     return np.unique(np.array(chosen, dtype=np.intp))
 
 
-# Where names stand beside the axes, as shares of their width; the distance between two [inch], and what an upright
-# panel needs beside its axes [inch].
+# Where names stand right of the axes, as shares of their width; the distance between two [inch], and the height that
+# an upright panel needs outside its axes [inch].
 BESIDE, SAMPLE, GAP = 1.045, 0.055, 0.012
 APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
 # Identifiers that have a colour of their own in a report.
@@ -249,22 +249,24 @@ def legend_below(figure: Any, ncols: int, handles: Sequence[Any] | None = None) 
 
 
 def named_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours: Mapping[str, int]) -> None:
-    """Draw lines over a common x and list their names beside the axes; colours: name -> number of its colour.
+    """Draw lines over a common x and list their names right of the axes; colours: name -> number of its colour.
 
     The first have a colour each, all others are grey and share a name.
     """
     # the axes keep the upright range that they have
     axis.set_ylim(*axis.get_ylim())
-    names = sorted(lines, key=lambda name: colours[name])
-    for name in reversed(names):
+    for name in sorted(lines, key=lambda name: colours[name], reverse=True):
         axis.plot(x, lines[name], **line_look(colours[name]))
     axis.margins(x=0.0)
-    coloured = [name for name in names if colours[name] < MOST_NAMED]
-    rows = [(name, colours[name]) for name in coloured]
-    if len(names) > len(coloured):
-        rows.append((f"others ({len(names) - len(coloured)})", MOST_NAMED))
-    for i, (name, number) in enumerate(rows):
+    for i, (name, number) in enumerate(legend_rows({name: colours[name] for name in lines})):
         write_name(axis, name, 1.0 - name_distance(axis) * (i + 0.5), number)
+
+
+def legend_rows(colours: Mapping[str, int]) -> list[tuple[str, int]]:
+    """Return name and number of each row of a legend in the order of the colours; all that are grey share a row."""
+    rows = sorted(((name, i) for name, i in colours.items() if i < MOST_NAMED), key=lambda row: row[1])
+    n_others = len(colours) - len(rows)
+    return [*rows, (f"others ({n_others})", MOST_NAMED)] if n_others else rows
 
 
 def line_look(i: int) -> dict[str, Any]:
@@ -276,11 +278,8 @@ def variant_handles(colours: Mapping[str, int]) -> list[Any]:
     """Return what a legend shows of marks in the colours of identifiers, in their order."""
     from matplotlib.lines import Line2D
 
-    names = [name for name in sorted(colours, key=lambda n: colours[n]) if colours[name] < MOST_NAMED]
-    rows = [(name, colours[name]) for name in names]
-    if len(colours) > len(names):
-        rows.append((f"others ({len(colours) - len(names)})", MOST_NAMED))
-    return [Line2D([], [], ls="", marker="o", mfc="none", mec=line_look(i)["color"], label=name) for name, i in rows]
+    return [Line2D([], [], ls="", marker="o", mfc="none", mec=line_look(i)["color"], label=name)
+            for name, i in legend_rows(colours)]  # fmt: skip
 
 
 def write_name(axis: Any, name: str, place: float, number: int) -> None:
