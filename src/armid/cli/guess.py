@@ -39,7 +39,6 @@ LINEAR = {"m", "mm", "m_s", "mm_s", "N"}
 AT_REST = 0.01
 # Share of equal neighbours from which on an input keeps its value between samples.
 KEPT = 0.5
-SHOWN_FILES = 3
 
 
 @dataclass(frozen=True)
