@@ -1,21 +1,8 @@
 """Simulate, identify, examine and close the loop by names: a campaign's folder, an identifier, a fitness, effects.
 
 Every name may be the object itself: a Campaign or tables of pandas, a Plant, an Effect, a Fitness or a function, an
-Identifier, an algorithm of pymoo. The commands and `armid` itself call these functions. What several of them take:
-
-campaign : path, Campaign, or pandas DataFrames
-    The folder of a campaign, or its campaign.toml; or one or several tables with the headers of a campaign's CSV files,
-    whose `table.attrs` holds the keys of its [[records]] entry.
-effects : names or Effects
-    Added to those that the campaign declares; NAME takes the first form that fits, NAME:FORM another.
-plugins : list of FILE.py:attribute
-    Things of the user, whose code is run.
-window : (begin, end), s
-    What is seen of every record.
-bounds, fix : mappings of parameter to (low, high) and to value, SI
-    Of the search; a parameter with bounds is free.
-plant : name or Plant
-    Of tables; or a plant of the user that campaign.toml names.
+Identifier, an algorithm of pymoo. The commands and `armid` itself call these functions. `identify` describes the
+arguments that several of them take.
 """
 
 import warnings
@@ -66,7 +53,7 @@ Window: TypeAlias = tuple[float, float]
 # Of studies/benchmark.toml (30 arms, 20 identifiers, with and without noise) no identifier ends nearer to the truth
 # than this one on the rmse with 3,000 simulations, and the swarm before it looks at the whole box.
 IDENTIFIER, FITNESS, BUDGET = "pso+least_squares", "rmse", 3_000
-# Where the fitness is no sum of squares: the best of those that need none.
+# Where the fitness is not a sum of squares: the best optimiser that needs no residual vectors.
 WITHOUT_RESIDUALS = "cmaes"
 # The paper's section IV: swarm, similarity degree, 150 iterations of 80 particles, the first 0.7 s.
 PAPER_IDENTIFIER, PAPER_FITNESS, PAPER_BUDGET, PAPER_WINDOW = "pso", "similarity", 12_000, (0.0, 0.7)
@@ -100,9 +87,10 @@ def opened(
     read = campaign if isinstance(campaign, Campaign) else campaign_of(campaign, plant, registry)
     if window is not None:
         read = read.with_window(*window)
-    if units is not None and units not in ANGLES:
-        raise ArmidError(f"units is {quoted(units)}: {nearest(str(units), ANGLES)}")
-    read = read if units is None else replace(read, angle=units)
+    if units is not None:
+        if units not in ANGLES:
+            raise ArmidError(f"units is {quoted(units)}: {nearest(str(units), ANGLES)}")
+        read = replace(read, angle=units)
     effects_known = registry.effects_for(read.plant)
     if model is None:
         for name in read.effects:
@@ -115,7 +103,7 @@ def opened(
 
 
 def refuse_others(effects: Any, plugins: Any, window: Any, bounds: Any, fix: Any) -> None:
-    """Raise ArmidError for what has not the form that `opened` tells."""
+    """Raise ArmidError for an argument that has not the form that `identify` describes."""
     pair = (list, tuple)
     forms = {
         "effects": (effects, isinstance(effects, str | Effect | Iterable), "names or Effects are"),
@@ -186,9 +174,9 @@ def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
 
 def warn_of_far(fixed: Mapping[str, float], bounds: Bounds, model: Model) -> None:
     """Warn of fixed values and bounds far outside the declared range, as a forgotten factor gives."""
-    told = {name: ([v], f"fix {name} = {v:g}") for name, v in fixed.items() if isfinite(v)}
-    told |= {n: ([a, b], f"bounds {n} = {a:g} to {b:g}") for n, (a, b) in bounds.items() if -inf < a < b < inf}
-    for name, (values, text) in told.items():
+    given = {name: ([v], f"fix {name} = {v:g}") for name, v in fixed.items() if isfinite(v)}
+    given |= {n: ([a, b], f"bounds {n} = {a:g} to {b:g}") for n, (a, b) in bounds.items() if -inf < a < b < inf}
+    for name, (values, text) in given.items():
         if name in model.parameters:
             warn_if_far(model.parameters[name], values, text)
 
@@ -209,13 +197,14 @@ def identify(
     Parameters
     ----------
     campaign : path, Campaign, or pandas DataFrames
-        The records; a table has the headers of a CSV file, and `table.attrs` the keys of its [[records]] entry.
+        The folder or its campaign.toml; or tables with the headers of the CSV files, `table.attrs` of each holds the
+        keys of its [[records]] entry.
     model, space : optional
         The model and the box of its parameters, in place of those that the other arguments describe.
     fitness : name, Fitness or function (measured, simulated), default "rmse"; "rmse:hub_angle" for one output
         What is minimised.
     identifier : name, Identifier, pymoo algorithm or function
-        The optimiser; by default "pso+least_squares", and "cmaes" for a fitness that is no sum of squares.
+        The optimiser; by default "pso+least_squares", and "cmaes" for a fitness that is not a sum of squares.
     budget : int
         Simulations, one candidate through all train records counting as one; by default 3,000, and 12,000 (the paper's)
         for an identifier that is named.
@@ -231,7 +220,7 @@ def identify(
     paper : bool
         The paper's swarm, similarity degree, budget and window, where nothing else is given.
     interval : bool
-        Whether intervals are wanted; of a fitness that is no sum of squares they take a bootstrap, some seconds.
+        Whether intervals are wanted; for a fitness that is not a sum of squares they take a bootstrap, some seconds.
     effects : names or Effects
         Added to those that the campaign declares; NAME takes the first form that fits, NAME:FORM another.
     plugins : list of FILE.py:attribute
@@ -337,8 +326,7 @@ def examine(
     there = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
     box = space or there.space()
     at = free_values(box, x, where) if isinstance(x, Mapping) else x if x is None else np.asarray(x, dtype=np.float64)
-    with angles_in(there.campaign.angle):
-        return run(there.campaign, there.model, box, at, noise, by, accuracy)
+    return run(there.campaign, there.model, box, at, noise, by, accuracy)
 
 
 def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array:
@@ -425,17 +413,17 @@ def close_loop(
     return found
 
 
-def with_known(campaign: Campaign, told: Mapping[str, Sequence[float]]) -> Campaign:
-    """Return a campaign with what is known of parameters of its plant; told: name -> (mean, deviation), SI."""
+def with_known(campaign: Campaign, given: Mapping[str, Sequence[float]]) -> Campaign:
+    """Return a campaign with what is known of parameters of its plant; given: name -> (mean, deviation), SI."""
     names = [p.name for p in campaign.plant.parameters]
-    for name, pair in told.items():
+    for name, pair in given.items():
         if name not in names:
             raise ModelError(f"priors: parameter {quoted(name)} is not in the plant, {nearest(name, names)}")
         if len(pair) != 2 or not all(map(isfinite, pair)) or not pair[1] > 0.0:
             raise ArmidError(
                 f"priors: '{name}' is {quoted(list(pair))}, (mean, standard deviation above 0) is expected"
             )
-    known = {name: Known(mean=float(mean), sd=float(sd)) for name, (mean, sd) in told.items()}
+    known = {name: Known(mean=float(mean), sd=float(sd)) for name, (mean, sd) in given.items()}
     return replace(campaign, known={**campaign.known, **known})
 
 

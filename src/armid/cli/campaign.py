@@ -30,7 +30,7 @@ from armid.cli.options import (
 )
 from armid.cli.report import show_and_save
 from armid.errors import ArmidError, nearest
-from armid.progress import search_bar, status_line
+from armid.progress import status_line
 from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_unwritable
 
 
@@ -70,7 +70,7 @@ def simulate_command(
 
 DEFAULT = (
     "pso+least_squares: no other of 20 identifiers ends nearer to the truth in results/benchmark, and its swarm looks "
-    "at the whole box; cmaes for a fitness that is no sum of squares"
+    "at the whole box; cmaes for a fitness that is not a sum of squares"
 )
 
 
@@ -102,10 +102,12 @@ DEFAULT = (
 )  # fmt: skip
 @click.option(
     "--paper", is_flag=True,
-    help="As the paper does, where nothing else is said: pso, similarity, 12,000 simulations, --window 0:0.7.",
+    help="As the paper does, where no other option is given: pso, similarity, 12,000 simulations, --window 0:0.7.",
 )  # fmt: skip
 @click.option(
-    "--no-interval", is_flag=True, help="Give no intervals: skip the bootstrap of a fitness that is no sum of squares."
+    "--no-interval",
+    is_flag=True,
+    help="Give no intervals: skip the bootstrap of a fitness that is not a sum of squares.",
 )
 @seed_option
 @out_option("Folder for report.html, report.md, result.json and the figures.")
@@ -117,8 +119,8 @@ def identify_command(
     """Identify parameters from the train records.
 
     The result is judged on train and holdout. Prints parameters with 95 % intervals (from sensitivities and measured
-    noise; of a fitness that is no sum of squares from 100 to 400 draws of the noise, each minimised again; an interval
-    that does not hold is struck), warnings in words, and errors. Without --out nothing is written. Ctrl-C
+    noise; for a fitness that is not a sum of squares from 100 to 400 draws of the noise, each minimised again; an
+    interval that does not hold is struck), warnings in words, and errors. Without --out nothing is written. Ctrl-C
     ends the search, judges the best so far, and exits with 130.
     """
     from armid.by_name import FITNESS, PAPER_FITNESS
@@ -130,9 +132,8 @@ def identify_command(
     goal = 1.0 - target if target is not None and minimised.partition(":")[0] in SIMILARITIES else target
     named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
     refuse_unwritable(out, IDENTIFICATION.file)
-    with search_bar(speaks()) as update:
-        found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), update,
-                    options=named, paper=paper, interval=not no_interval, **given(**problem))  # fmt: skip
+    found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), speaks(),
+                options=named, paper=paper, interval=not no_interval, **given(**problem))  # fmt: skip
     show_and_save(found, out)
     if found.stopped == INTERRUPTED:
         sys.exit(130)
