@@ -123,11 +123,11 @@ def identifier_text(name: str, identifier: Any, registry: Registry, is_long: boo
     from armid.identifiers import options_of
 
     lines = [folded(f"{name}: {note_of(identifier)} ({kinds_of(identifier)})")]
-    for option, told in options_of(identifier).items():
-        default = told["default"]
+    for option, declared in options_of(identifier).items():
+        default = declared["default"]
         value = "its own" if default is None or callable(default) else quoted(default).strip("'")
-        unit = f" [{told['unit']}]" if told["unit"] else ""
-        lines.append(folded(f"  --option {option}={value}{unit} {told['meaning']}"))
+        unit = f" [{declared['unit']}]" if declared["unit"] else ""
+        lines.append(folded(f"  --option {option}={value}{unit} {declared['meaning']}"))
     return "\n".join(lines)
 
 
@@ -148,7 +148,7 @@ def form_lines(effect: Effect, is_long: bool) -> list[str]:
     if is_long:
         lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {returned_text(s.rate)}" for s in effect.states]
         lines += [f"  {d.name}: {returned_text(d.of)} at t - {d.by}" for d in effect.delays]
-        lines += [f"  switch {g.name} where {returned_text(g.function)} comes to 0" for g in effect.guards]
+        lines += [f"  switch {g.name} where {returned_text(g.function)} is 0" for g in effect.guards]
     lines += [f"  approximates the form {effect.exact.form}"] if effect.exact is not None else []
     return [*lines, *(f"  {parameter_text(p)}" for p in effect.parameters)]
 
@@ -201,7 +201,7 @@ def sibling_text(plant: Plant, is_long: bool) -> str:
     return "\n".join(map(folded, lines))
 
 
-# What a table of each catalogue shows beside the names, and what is said of a name.
+# Columns of the table of each catalogue, and the cells of one name after the name itself.
 SHORT: dict[str, tuple[tuple[str, ...], Callable[[Any], Sequence[str]]]] = {
     "plants": (("plant", "recorded in", "what it is"), lambda p: (recorded_by(p), note_of(p))),
     "effects": (("effect", "at", "what it is"), lambda e: (", ".join(e.adds), forms_of(e))),

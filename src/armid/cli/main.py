@@ -42,7 +42,7 @@ COMMANDS = {
 }  # fmt: skip
 
 
-# The benchmarks stand beside the source; an installed package has none, and no command for them.
+# The benchmarks lie in the repository; an installed package has neither them nor the command.
 BENCHMARKS = Path(__file__).parents[3] / "studies" / "bench"
 
 

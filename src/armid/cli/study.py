@@ -50,7 +50,7 @@ def study_command(
 
     Finished runs are kept in one SQLite file, whatever ends the program; the same command goes on where it was.
     One process at a time works on a folder; --dask shares the runs among machines. A study whose file has changed keeps
-    the runs whose settings have not. Ends with 0 also where runs have failed, which is told; 130 after Ctrl-C.
+    the runs whose settings have not. Failed runs are reported and leave the exit code 0; Ctrl-C gives 130.
     """
     from armid.study.runner import TIME_LIMIT_S, absolute, progress_bar, run
     from armid.study.tasks import Study, read_study
