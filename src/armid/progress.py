@@ -1,4 +1,4 @@
-"""Tell of work that takes long: through the log `armid`, which the commands print, and by bars."""
+"""Report work that takes long: through the log `armid`, which the commands print, and by bars."""
 
 import logging
 import sys
@@ -68,7 +68,7 @@ def set_log_level(level: str) -> None:
 
 
 def console() -> "Console | None":
-    """Return what bars are drawn on, a terminal or a notebook; None where neither is there."""
+    """Return the console on which bars are drawn, in a terminal or a notebook; None elsewhere."""
     # a kernel is at work where the shell has one: that somebody imported its package says nothing
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     is_notebook = hasattr(shell, "kernel")
@@ -82,9 +82,9 @@ def console() -> "Console | None":
 
 @contextmanager
 def search_bar(is_shown: bool = True) -> Iterator[Callable[[Any], None]]:
-    """Yield what shows the state of a search, a Meter, with rate and time left; nothing where no bar can be drawn.
+    """Yield a function that draws the state of a search, a Meter, with rate and time left, if there is a console.
 
-    What else has `budget`, `used` and a word on `what` is counted gets a bar of its own.
+    A state whose `what` says that it counts something else than simulations gets a bar of its own.
     """
     drawn_on = console() if is_shown else None
     if drawn_on is None:
@@ -111,7 +111,7 @@ def search_bar(is_shown: bool = True) -> Iterator[Callable[[Any], None]]:
 
 @contextmanager
 def status_line(is_shown: bool = True) -> Iterator[Callable[[str], None]]:
-    """Yield what shows a sentence and the time; where no bar can be drawn a line is printed once a minute."""
+    """Yield a function that shows a sentence and the time; where no bar can be drawn it prints one once a minute."""
     drawn_on = console() if is_shown else None
     if drawn_on is None:
         began = last = monotonic()
