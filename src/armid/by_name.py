@@ -134,7 +134,7 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
     tables: list[Any] = list(several)
     if not tables or not all(hasattr(each, "to_csv") for each in tables):
         raise DataError(f"the campaign is a {type(given).__name__}: a folder, a Campaign or pandas DataFrames are "
-                         "expected")  # fmt: skip
+                        "expected")  # fmt: skip
     if plant is None:
         raise DataError("a campaign of tables needs its plant: plant='driven_axis' or another is expected")
     names = [str(n) for n in given] if isinstance(given, Mapping) else [f"table_{i + 1}" for i in range(len(tables))]

@@ -2,7 +2,6 @@
 
 import gc
 import io
-import logging
 import re
 import sys
 import warnings
@@ -16,6 +15,7 @@ import click
 from armid.cli.options import Heard, tell, while_read
 from armid.cli.start import INTERRUPTED, end_on_request
 from armid.errors import ArmidError, on_a_line
+from armid.progress import LOG
 
 BAD_INPUT = 2
 # Places that are named of those that a warning is told of once.
@@ -103,7 +103,7 @@ def main(arguments: list[str] | None = None) -> None:
     warnings.showwarning = partial(show_warning, seen)
     # imports and figures make many objects that stay: looking through them every 700 is a tenth of a short command
     gc.set_threshold(20_000)
-    logging.getLogger("armid").setLevel(logging.INFO)
+    LOG.setLevel("INFO")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # a path that is no UTF-8 is shown, not a reason to fail

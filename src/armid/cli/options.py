@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from armid.errors import ArmidError, nearest, printable
+from armid.progress import LOG
 
 if TYPE_CHECKING:
     from armid.report.document import Document
@@ -58,12 +59,11 @@ class Command(Heard):
 def announcing(told: Callable[[str], None]) -> Iterator[None]:
     handler = logging.Handler()
     handler.emit = lambda record: told(record.getMessage())  # type: ignore[method-assign]
-    log = logging.getLogger("armid")
-    log.addHandler(handler)
+    LOG.addHandler(handler)
     try:
         yield
     finally:
-        log.removeHandler(handler)
+        LOG.removeHandler(handler)
 
 
 class Group(Heard, click.Group):

@@ -120,11 +120,11 @@ def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
     times, position, drive, gain = series
     if gain.size != 1 or not times.size == position.size == drive.size >= 100:
         raise DataError(f"{path.name}: t, qm, vir, gtau hold {times.size}, {position.size}, {drive.size}, {gain.size} "
-                         "numbers, three series of one length from 100 on and one number are expected")  # fmt: skip
+                        "numbers, three series of one length from 100 on and one number are expected")  # fmt: skip
     intervals = np.diff(times)
     if not 0 < np.max(intervals) < min(1.01 * float(np.min(intervals)), 0.4 / CUTOFF_HZ):
         raise DataError(f"{path.name}: the intervals of t run from {np.min(intervals):.6g} to {np.max(intervals):.6g} "
-                         f"s, even ones below {0.4 / CUTOFF_HZ:g} s are expected")  # fmt: skip
+                        f"s, even ones below {0.4 / CUTOFF_HZ:g} s are expected")  # fmt: skip
     velocity = velocity_of(position, float(times[-1] - times[0]) / (times.size - 1))
     return float(gain[0]), {"time_s": times, "velocity_m_s": velocity, "drive_V": drive, "position_m": position}
 
@@ -149,12 +149,12 @@ def downloaded_folder() -> Path:
         package = import_module("nonlinear_benchmarks")
     except ImportError as error:
         raise DataError("the package nonlinear_benchmarks is missing: install armid[measured], or name the folder "
-                         f"with {train}.mat") from error  # fmt: skip
+                        f"with {train}.mat") from error  # fmt: skip
     try:
         files = package.EMPS(data_file_locations=True)
     except (OSError, ValueError, RuntimeError, zlib.error, zipfile.BadZipFile) as error:
         raise DataError(f"the EMPS set could not be downloaded: {quoted(str(error))}; name the folder with "
-                         f"{train}.mat instead") from error  # fmt: skip
+                        f"{train}.mat instead") from error  # fmt: skip
     return Path(files[0]).parent
 
 
@@ -185,7 +185,7 @@ def read_dfki(folder: Path, file: str) -> dict[str, Array]:
     path = folder / file
     if not path.is_file():
         raise DataError(f"{folder}: {file} does not exist there, the folder results/ of the set, or its files in one "
-                         "folder, is expected")  # fmt: skip
+                        "folder, is expected")  # fmt: skip
     columns = read_columns(path, file, DFKI_COLUMNS)
     return {header: columns[name] for name, header in DFKI_COLUMNS.items()}
 

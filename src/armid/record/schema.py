@@ -77,8 +77,9 @@ def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
     """Return a kind of fewer values; schema: how JSON Schema says the test, nothing where it cannot."""
 
     def both(value: object) -> Any:
-        if test(kind(value)):
-            return kind(value)
+        found = kind(value)
+        if test(found):
+            return found
         raise KindError(value)
 
     return Kind(both, {**kind.schema, **schema})
