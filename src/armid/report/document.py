@@ -313,7 +313,7 @@ def error_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]
     """Return a table of errors, of several outputs one below the other; rows end in the stored errors or None."""
     if len({name for *_, error in rows for name in (error or {}).get("outputs", ())}) > 1:
         return output_table(title, first, rows, note)
-    factor, name = shown(1.0, unit)
+    name, factor = scale_of(unit)
     # what decides stands first: what a narrow screen leaves out is the rest
     digits = {"rmse": ".4g", "chi2_per_sample": ".4g", "s": ".4f", "nrmse": ".3%", "s1": ".4f", "s2": ".4f"}
     headers = {"rmse": f"RMSE, {name}", "nrmse": "NRMSE", "chi2_per_sample": "chi2/sample"}
@@ -331,7 +331,7 @@ def error_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]
 
 def output_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...]], note: str) -> Table:
     """Return a table of errors of several outputs, a row for each, with its unit."""
-    cells = [(*texts, name, f"{rmse_text(e, e['unit'])} {shown(0.0, e['unit'])[1]}", e["nrmse"],
+    cells = [(*texts, name, f"{rmse_text(e, e['unit'])} {scale_of(e['unit'])[0]}", e["nrmse"],
               "no noise" if e["chi2_per_sample"] is None else e["chi2_per_sample"], e["s"])
              for *texts, error in rows for name, e in (error or {"outputs": {}})["outputs"].items()]  # fmt: skip
     columns = ["output", "RMSE", Column("nrmse", "NRMSE", ".3%"), Column("chi2", "chi2/sample", ".4g"),
@@ -340,13 +340,13 @@ def output_table(title: str, first: Sequence[str], rows: Sequence[tuple[Any, ...
 
 
 def others_text(*errors: Mapping[str, Any] | None) -> str:
-    """Return the RMSE of the outputs beside the first, on each of some sets of records, "" of one output."""
+    """Return the RMSE of all outputs but the first, on each of some sets of records, "" of one output."""
     said: dict[str, list[str]] = {}
     for error in (e for e in errors if e is not None):
         first = next((e for e in error.get("outputs", {}).values() if e["rmse"] == error["rmse"]), None)
         for name, e in error.get("outputs", {}).items():
             if e is not first:
-                said.setdefault(name, []).append(f"{rmse_text(e, e['unit'])} {shown(0.0, e['unit'])[1]}")
+                said.setdefault(name, []).append(f"{rmse_text(e, e['unit'])} {scale_of(e['unit'])[0]}")
     return "".join(f" {name}: {' and '.join(texts)}." for name, texts in said.items())
 
 
