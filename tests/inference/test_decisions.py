@@ -14,7 +14,16 @@ MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
     "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST"),
-    "convergence of fits and of the engine": ("SETTLED", "NEAR", "FEWEST_SPARED", "FURTHER_ERROR", "WIDE"),
+    "convergence of fits and of the engine": (
+        "SETTLED",
+        "NEAR",
+        "FEWEST_SPARED",
+        "FURTHER_ERROR",
+        "WIDE",
+        "REACH",
+        "LARGEST",
+        "FORETOLD",
+    ),
     "budgets of computing": ("BUNDLE", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "LAGS", "LINE", "MOST_BRIDGED", "STILL", "EVEN"),
     "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),

@@ -335,24 +335,27 @@ def promised_fall(square: Array, slope: Array, z: Array) -> float:
     return float(slope @ (step_in_box(square, slope, z, LEAST) - z))
 
 
-def step_in_box(square: Array, slope: Array, z: Array, damping: float) -> Array:
+def step_in_box(square: Array, slope: Array, z: Array, damping: float, n_boxed: int | None = None) -> Array:
     """Return the candidate to which a damped step leads.
 
-    A parameter that would leave the box stops on it, and the others make up for that.
+    A parameter that would leave the box stops on it, and the others make up for that. n_boxed: so many of the first
+    have bounds, None: all.
     """
     scale = np.diag(square)
     damped = square + np.diag(damping * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
+    boxed = np.arange(len(z)) < (len(z) if n_boxed is None else n_boxed)
+    low, high = np.where(boxed, 0.0, -np.inf), np.where(boxed, 1.0, np.inf)
     step = np.zeros(len(z))
-    free = ~((z <= 0.0) & (slope < 0.0) | (z >= 1.0) & (slope > 0.0))
+    free = ~((z <= low) & (slope < 0.0) | (z >= high) & (slope > 0.0))
     while free.any():
         known = slope[free] - damped[np.ix_(free, ~free)] @ step[~free]
         step[free] = np.linalg.solve(damped[np.ix_(free, free)], known)
-        outside = free & ((z + step < 0.0) | (z + step > 1.0))
+        outside = free & ((z + step < low) | (z + step > high))
         if not outside.any():
             break
-        step[outside] = np.clip(z + step, 0.0, 1.0)[outside] - z[outside]
+        step[outside] = np.clip(z + step, low, high)[outside] - z[outside]
         free &= ~outside
-    return np.clip(z + step, 0.0, 1.0)
+    return np.clip(z + step, low, high)
 
 
 def forward_slopes(records: LeastSquaresProblem, paths: Sequence[Descent]) -> list[Array]:

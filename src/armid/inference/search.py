@@ -29,7 +29,7 @@ from armid.inference.library import EffectKey, Library
 from armid.inference.model import Fit
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
-from armid.inference.unknowns import Unknown, constants_of, freed, moved
+from armid.inference.unknowns import Unknown, constants_of, freed
 from armid.model import Array
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
@@ -142,21 +142,27 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
         if next_model(found) == model:
             expand(found, model)
             finish(found)
-        in_vain = 0 if found.ranked()[0][0] != best or is_near(found) else in_vain + 1
+            in_vain = 0 if found.ranked()[0][0] != best or is_near(found) else in_vain + 1
     add_unknown(found)
     finish_all(found)
     return found
 
 
 def add_unknown(found: Exploration) -> bool:
-    """Fit a signal without a form beside the best models where these leave more than noise; tell whether it was new."""
+    """Fit a signal without a form beside the best models; tell whether there is a new one.
+
+    Where the best model leaves noise alone, beside those with a name less: names that are not the machine's may
+    together explain what has none.
+    """
     ranked = found.ranked()
-    if not is_significant(found.fits[ranked[0][0]]) or any(h.kind == "unknown" for m in found.fits for h in m):
+    if any(h.kind == "unknown" for m in found.fits for h in m):
         return False
     library, scale, before = found.library, found.scale(), len(found.fits)
-    # The last name may stand for what has none, so that a model without it is asked as well.
-    best = [*(m for m, _ in ranked[:N_BESIDE]), *simpler(found, ranked[0][0]), frozenset[Hypothesis]()]
-    for model in dict.fromkeys(best):
+    best = ranked[0][0]
+    models = [*simpler(found, best), *([frozenset[Hypothesis]()] if best else [])]
+    if is_significant(found.fits[best]):
+        models = [*(m for m, _ in ranked[:N_BESIDE]), *models]
+    for model in dict.fromkeys(models):
         fit = found.fits[model]
         about = expansion_of(fit, scale, library)
         ahead = sorted((forecast(about, p) for p in unknown.propose(fit, library)), key=lambda f: -f.posterior)
@@ -373,11 +379,8 @@ def swapped(
     active = tuple(k for k in fit.active if k != key)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     values |= grid[variant].at(float(np.clip(strength, 0.01, library.reach)))
-    is_free = key.free_shape and bool(library.fixed_shapes(new))
-    each = [
-        near(fit, (*active, k), values, library, weight) for k in (new, replace(new, free_shape=True))[: 1 + is_free]
-    ]
-    return min((f for f in each if f is not None), key=lambda f: f.chi2, default=None)
+    new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
+    return near(fit, (*active, new), values, library, weight)
 
 
 def pairs(
@@ -420,13 +423,10 @@ def pairs(
 
 
 def finish(found: Exploration) -> None:
-    """Bring the leading models of the best size to their estimates."""
-    best = found.ranked()[0][0]
-    leading = [m for m, _ in found.ranked() if len(m) == len(best)][:BEAM]
-    todo = [m for m in leading if found.fits[m].rough and found.fits[m].records.data.cover is None]
-    finished_each = [partial(finished, found.fits[m], found.library) for m in todo]
-    for model, again in zip(todo, found.library.each(unless_diverged, finished_each), strict=True):
-        found.fits[model] = replace(again if again is not None else found.fits[model], rough=False)
+    """Bring the leading models of the best size to their estimates: rough fits may stand in the wrong order."""
+    size = len(found.ranked()[0][0])
+    for model in [m for m, _ in found.ranked() if len(m) == size][:BEAM]:
+        complete(found, model)
 
 
 def finish_all(found: Exploration) -> None:
@@ -475,7 +475,7 @@ def complete(found: Exploration, model: Hypotheses) -> None:
         if not (model or found.constants):
             return
         fit = found.fits[model]
-        again = unless_diverged(partial(completed, fit, found.library, found.constants, weight, is_near(found)))
+        again = unless_diverged(partial(completed, fit, found.library, found.constants, weight))
         found.fits[model] = again or replace(found.fits[model], rough=False)
 
 
@@ -484,30 +484,11 @@ def is_near(found: Exploration) -> bool:
     return NEAR * found.scale().weight * len(found.declared.residual) > found.scale().n
 
 
-def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float, afresh: bool) -> Fit:
-    """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls.
-
-    afresh: whether it is begun again from the declared constants and shapes, too.
-    """
+def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:
+    """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls."""
     if fit.records.data.cover is not None:
         return replace(fit, rough=False)
-    # Constants may have made up for a shape that was held: without them it finds its own size.
-    is_freed = any(f.unknown.name.startswith(NAMED) for f in fit.others)
-    is_shaped = any(library.fixed_shapes(key) for key in fit.active)
-    again = begun_again(fit, library, weight) if afresh and is_shaped and is_freed else None
-    starts = [fit] if again is None else [fit, again]
-    each = [with_constants(with_fitted_shapes(finished(start, library), library), constants, weight)
-            for start in starts]  # fmt: skip
-    return min(each, key=lambda done: done.chi2 + sum(f.value**2 for f in done.others) / weight)
-
-
-def begun_again(fit: Fit, library: Library, weight: float) -> Fit | None:
-    """Return a model fitted with its constants and shapes at their declared values, its other unknowns as they are."""
-    assert fit.base is not None
-    kept = tuple(f for f in fit.others if not f.unknown.name.startswith(NAMED))
-    records = moved(fit.base, [f.unknown for f in kept], [f.value for f in kept])
-    plain = replace(fit, records=records, others=kept, constants={}, base=fit.base if kept else None)
-    return near(plain, tuple(replace(k, free_shape=False) for k in fit.active), fit.values, library, weight)
+    return with_constants(with_fitted_shapes(finished(fit, library), library), constants, weight)
 
 
 def with_fitted_shapes(fit: Fit, library: Library) -> Fit:

@@ -13,18 +13,30 @@ import numpy as np
 
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, moved_replays, products
-from armid.estimation.least_squares import LeastSquaresProblem, descend
+from armid.estimation.least_squares import (
+    FIRST,
+    LADDER,
+    LARGEST,
+    LEAST,
+    MOST_STEPS,
+    RAISED,
+    REACH,
+    Descent,
+    LeastSquaresProblem,
+    forward_slopes,
+    step_in_box,
+)
 from armid.inference.kinds.faults import with_shared_starts
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
 from armid.problem.starts import fits_starts, with_starts
 
-# Step of the differences, and the farthest step of a turn, in prior standard deviations.
-STEP, FARTHEST = 1e-2, 3.0
-# Turns at most, those of a rough fit, steps of the parameters in a turn (with 6 three effects were not found), and the
-# fall of the weighted sum of squares at which turns end.
-MOST_TURNS, MOST_ROUGH, MOST_INNER, SETTLED = 8, 3, 12, 0.1
+# Step of the differences, in prior standard deviations.
+STEP = 1e-2
+# Most steps of a rough fit, the fall of the weighted sum of squares at which a fit has arrived, and the share of the
+# fall that was foretold below which columns are taken anew.
+MOST_ROUGH, SETTLED, FORETOLD = 5, 0.1, 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,45 +138,57 @@ def freed(
     """Return a fit with some unknowns freed, from where it stands: min weight |r|^2 + |v|^2.
 
     base: the records of the fit before any of the unknowns was moved. weight: of each square, see `evidence.Scale`.
-    limit: as of `descend`. rough: the columns of the unknowns that the fit holds already stay as they are.
+    limit: as of `descend`. rough: a few steps.
     Raises ArmidError where it diverges.
     """
     known = {f.unknown.name: f.value for f in fit.others}
-    kept = {f.unknown.name: f.column for f in fit.others} if rough else {}
+    kept = {f.unknown.name: f.column for f in fit.others}
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
-    columns = np.empty((len(fit.residual), 0))
-    tolerance = ROUGHLY if rough else 1e-6
-    cost = cost_of(base, unknowns, values, z, weight)
-    for _ in range(MOST_ROUGH if rough else MOST_TURNS):
-        records = moved(base, unknowns, values)
-        columns = columns_about(base.plain, unknowns, values, z, kept)
-        posed = about_known(records, columns, values, weight)
-        new_z = descend(posed, [z], tolerance, limit=limit, most=MOST_INNER) if len(z) else z
-        residual = records.plain.residuals(new_z)[0] + columns @ values
-        best = np.linalg.solve(np.eye(len(unknowns)) / weight + columns.T @ columns, columns.T @ residual)
-        step, best_cost, share = best - values, np.inf, 1.0
-        # Shortened as a whole: parts of a step that nearly cancel mean nothing alone.
-        step *= min(1.0, FARTHEST / max(float(np.abs(step).max(initial=0.0)), 1e-300))
-        while share > 0.05:  # a step of a late record may be too long
-            best_cost = cost_of(base, unknowns, values + share * step, new_z, weight)
-            if best_cost < cost:
-                break
-            share *= 0.5
-        if not best_cost < cost:
+    cost, damping = cost_of(base, unknowns, values, z, weight), FIRST
+    columns, is_new = columns_about(base.plain, unknowns, values, z, kept), not kept
+    for _ in range(MOST_ROUGH if rough else MOST_STEPS):
+        here, square, slope = normal_equations(moved(base, unknowns, values), columns, values, z, weight)
+        if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
             break
-        values, z = values + share * step, new_z
-        if fits_starts(base.replays):
-            base = about_starts(base, unknowns, values, z)
-            best_cost = min(best_cost, cost_of(base, unknowns, values, z, weight))
-        fall, cost = cost - best_cost, best_cost
-        if weight * fall < (1.0 if rough else SETTLED):
+        dampings = [max(factor * damping, LEAST) for factor in LADDER]
+        tried = [step_in_box(square, slope, here, d, len(z)) for d in dampings]
+        costs = [cost_of(base, unknowns, one[len(z) :], one[: len(z)], weight) for one in tried]
+        best = int(np.argmin(costs))
+        fall, step = cost - costs[best], tried[best] - here
+        if fall > 0.0:
+            z, values, cost, damping = tried[best][: len(z)], tried[best][len(z) :], costs[best], dampings[best]
+            if fits_starts(base.replays):
+                base = about_starts(base, unknowns, values, z)
+                cost = min(cost, cost_of(base, unknowns, values, z, weight))
+        elif is_new:
+            damping *= RAISED
+        has_arrived = weight * fall < max(SETTLED, ROUGHLY * weight * cost if rough else 0.0)
+        if is_new and ((has_arrived and fall > 0.0) or damping > LARGEST):
             break
+        # Columns serve on while they foretell what a step does.
+        is_new = has_arrived or fall < FORETOLD * float(2.0 * slope @ step - step @ square @ step)
+        if is_new:
+            columns = columns_about(base.plain, unknowns, values, z, {})
     if not np.isfinite(cost):
         raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
     records = moved(base, unknowns, values)
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
     return replace(fit, records=records, z=z, residual=records.plain.residuals(z)[0], base=base,
                    others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
+
+
+def normal_equations(
+    records: WhiteRecords, columns: Array, values: Array, z: Array, weight: float
+) -> tuple[Array, Array, Array]:
+    """Return all unknowns, parameters first, and half the second and the negative first derivatives of the cost."""
+    residual = records.residuals(z)[0]
+    slopes = np.empty((len(residual), 0))
+    if len(z):
+        slopes = forward_slopes(records, [Descent(z, residual, float(residual @ residual))])[0]
+    every = np.hstack([slopes, records.padded(columns)])
+    prior = np.concatenate([np.zeros(len(z)), np.full(len(values), 1.0 / weight)])
+    here = np.concatenate([z, values])
+    return here, every.T @ every + np.diag(prior), every.T @ residual - prior * here
 
 
 def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array) -> WhiteRecords:

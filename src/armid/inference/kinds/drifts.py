@@ -45,13 +45,6 @@ class OfParameter:
             found = with_measured(found, index, [x - y for x, y in pairs])
         return found
 
-    def column(self, fit: Fit, records: WhiteRecords, z: Array, value: float) -> Array:
-        """Return what the largest plausible drift takes away of the residual."""
-        if self.product is not None:
-            return np.asarray(LARGEST * self.product.slope * order_of(records))
-        place = list(fit.values).index(self.name)
-        return np.asarray(LARGEST * records.plain.residual_and_slopes(z)[1][:, place] * order_of(records))
-
 
 def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
     """Return the drifts of parameters and constants, none where there are few records."""
@@ -82,11 +75,10 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
     """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
     base, what, again, weight = fit.base or fit.records, hypothesis.means, fit, about.scale.weight
-    for _ in range(2):
-        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again.values),
-                          column=partial(what.column, again))  # fmt: skip
+    for is_first in (True, False, False):
+        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again.values))
         others = [f.unknown for f in fit.others if f.unknown.name != unknown.name]
-        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, rough=True))  # noqa: B023
+        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, is_first))  # noqa: B023
         if tried is None:
             return None
         again = tried
