@@ -251,15 +251,6 @@ class Leaving(DE):  # type: ignore[misc]
         Thread(target=sleep, args=(1.0,), daemon=True).start()
 
 
-class Counting(DE):  # type: ignore[misc]
-    """Differential evolution that looks at how much was really simulated."""
-
-    def _infill(self) -> Any:
-        found = super()._infill()
-        found[0].X = self.problem.xl + (self.problem.simulated % 97) / 97.0 * (self.problem.xu - self.problem.xl)
-        return found
-
-
 class Poisoned(DE):  # type: ignore[misc]
     """Differential evolution that stops at the first NaN."""
 
@@ -270,7 +261,7 @@ class Poisoned(DE):  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(("kind", "point"), [
-    (Swallowing, "errors come out"), (Leaving, "errors come out"), (Counting, "resumable"), (Poisoned, "survives NaN"),
+    (Swallowing, "errors come out"), (Leaving, "errors come out"), (Poisoned, "survives NaN"),
 ])  # fmt: skip
 def test_an_identifier_misses_one_point(kind: type[DE], point: str) -> None:
     assert set(failed(check_identifier(as_identifier("own", kind)))) == {point}

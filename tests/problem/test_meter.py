@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from armid.problem.meter import Log, Meter, MeterTermination
+from armid.problem.meter import Meter, MeterTermination
 
 
 def simulate(meter: Meter, fitness: list[float], failed: list[bool] | None = None) -> None:
@@ -119,34 +119,3 @@ def test_a_copied_termination_looks_at_the_same_meter() -> None:
     twin = copy.deepcopy(termination)
     assert twin.meter is termination.meter
     assert (twin.n_max_gen, twin.force_termination) == (7, True)
-
-
-def log_of(x: list[float], f: list[float]) -> Log:
-    """Return the log of a run of candidates with one parameter, NaN where one failed."""
-    values = np.array(f)
-    return Log(np.array(x)[:, np.newaxis], np.where(np.isnan(values), 1e100, values), np.isnan(values))
-
-
-def asked(meter: Meter, x: list[float]) -> list[float]:
-    """Ask the meter what it remembers, and record the rest as 9."""
-    known = meter.recall(np.array(x)[:, np.newaxis])
-    meter.record(np.array(x)[:, np.newaxis], [*known, *[9.0] * (len(x) - len(known))])
-    return known.tolist()
-
-
-def test_remembers_an_earlier_run_while_candidates_agree() -> None:
-    meter = Meter(100, resume_from=log_of([1, 2, 3, 4, 5], [0.1, np.nan, 0.3, 0.4, 0.5]))
-    assert asked(meter, [1, 2]) == [0.1, np.inf]
-    assert asked(meter, [3]) == [0.3]
-    assert asked(meter, [4, 5, 6]) == [0.4, 0.5]
-    assert asked(meter, [7]) == []
-    assert (meter.recalled, meter.used) == (5, 7)
-
-
-def test_what_differs_by_a_bit_ends_the_memory() -> None:
-    meter = Meter(100, resume_from=log_of([1, 2, 3, 4], [0.1, 0.2, 0.3, 0.4]))
-    assert asked(meter, [1, np.nextafter(2.0, 3.0), 3]) == [0.1]
-    assert asked(meter, [4]) == []
-    assert meter.recalled == 1
-    other = Meter(100, resume_from=log_of([1, 2], [0.1, 0.2]))
-    assert other.recall(np.ones((1, 3))).tolist() == []

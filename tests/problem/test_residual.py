@@ -60,17 +60,3 @@ def test_pymoo_s_evaluator_gets_it_when_it_asks(several, arm_space, X):
     plain = Evaluator().eval(IdentificationProblem(arm_space, several, FITNESS["rmse"]), Population.new(X=X))
     assert RESIDUALS not in plain[0].data
     np.testing.assert_array_equal(plain.get("F")[:3], pop.get("F")[:3])
-
-
-def test_a_resumed_run_simulates_only_what_is_new(several, arm_space, X):
-    whole, part = Meter(5), Meter(3)
-    IdentificationProblem(arm_space, several, FITNESS["rmse"], whole).evaluate(X)
-    IdentificationProblem(arm_space, several, FITNESS["rmse"], part).evaluate(X[:3])
-    again = Meter(5, resume_from=part.log())
-    problem = IdentificationProblem(arm_space, several, FITNESS["rmse"], again)
-    simulated = []
-    problem.evaluated = lambda X, wanted: simulated.append(X) or IdentificationProblem.evaluated(problem, X, wanted)
-    problem.evaluate(X)
-    assert again.recalled == 3
-    np.testing.assert_array_equal(np.concatenate(simulated), X[3:])
-    np.testing.assert_array_equal(again.log().F, whole.log().F)

@@ -38,7 +38,7 @@ AGAIN_S = 1.0
 def check_command(thing: str, on: str | None, time_limit: float, plugins: tuple[str, ...]) -> None:
     """Run the contract on your own things.
 
-    A plant, an effect, a fitness, an identifier or an analysis in a Python file, which is run; an effect is tried on
+    A plant, an effect, a fitness or an identifier in a Python file, which is run; an effect is tried on
     every plant that offers its ports, those of --plugin included. A campaign is read, and its model simulated through
     each record. Every point is printed when it is done; where one takes too long, those after it are not tried. Exit
     code 0 when all hold, 1 when one does not, 2 when there is nothing to try.

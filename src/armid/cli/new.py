@@ -31,6 +31,7 @@ CAMPAIGN, STUDY = "campaign", "study"
 KINDS = (*CATALOGUES, CAMPAIGN, STUDY)
 # What the kinds that are no Python file become, and the command that tries them.
 FILES = {CAMPAIGN: ("{}", "armid check {}"), STUDY: ("{}.toml", "armid study {}")}
+TRYING = {"analysis": "armid report out/STUDY --plugin {}"}
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 Array = NDArray[np.float64]
 # The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
@@ -65,9 +66,10 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
     """Write a commented starting file of your own that works as it stands.
 
     An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
-    NAME and passes `armid check`. A study becomes FOLDER/NAME.toml, which `armid study` runs. A campaign becomes the
-    folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and say so; with --from FILE... it
-    has copies of your records, and a comment at each guess. Nothing that exists is overwritten.
+    NAME. `armid check` tries it, `armid report` an analysis. A study becomes FOLDER/NAME.toml, which `armid study`
+    runs. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
+    say so; with --from FILE... it has copies of your records, and a comment at each guess. Nothing that exists is
+    overwritten.
     """
     from armid.record import write_campaign
 
@@ -87,7 +89,7 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
 
         taken |= {a.name for a in ANALYSES}
     check_new_name(kind, name, taken, template)
-    file, trying = FILES.get(kind, ("{}.py", f"armid check {{}}:{name}"))
+    file, trying = FILES.get(kind, ("{}.py", f"{TRYING.get(kind, 'armid check {}')}:{name}"))
     target = out / file.format(name)
     if os.path.lexists(target):
         raise ArmidError(f"{target} exists already: another name, or another folder by --out, is expected")

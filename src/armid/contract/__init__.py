@@ -1,7 +1,7 @@
-"""What a user's own plant, effect, fitness, identifier, analysis or campaign has to keep.
+"""What a user's own plant, effect, fitness, identifier or campaign has to keep.
 
 In reading order:
-check       the entrance to all contracts; those of a campaign, of a fitness and of an analysis
+check       the entrance to all contracts; those of a campaign and of a fitness
 equations   the contracts of plants and of effects
 identifier  the contract of an identifier, and its trial problem
 trials      ContractPoint, candidates and manoeuvres on which equations are tried, and the independent simulation with

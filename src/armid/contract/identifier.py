@@ -12,7 +12,7 @@ from pymoo.optimize import minimize
 from armid.contract.trials import ContractPoint
 from armid.identifiers import Identifier
 from armid.model import Array
-from armid.problem.meter import BudgetIgnoredError, Log, Meter, Metered, MeterTermination
+from armid.problem.meter import BudgetIgnoredError, Meter, Metered, MeterTermination
 
 
 class Trial(Metered):
@@ -28,7 +28,7 @@ class Trial(Metered):
         low, high = np.array([2.0e6, 0.5, -1.0]), np.array([3.0e6, 1.5, 1.0])
         super().__init__(meter, n_var=3, n_obj=1, xl=low, xu=high)
         self.holes, self.bare, self.watch = holes, bare, watch
-        self.outside = self.simulated = 0
+        self.outside = 0
 
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
         """Return the height of the valley, (n_candidates,), and the three terms whose squares it sums."""
@@ -36,7 +36,6 @@ class Trial(Metered):
             self.watch(X)
         z = (X - self.xl) / (self.xu - self.xl)
         self.outside += int(((z < 0.0) | (z > 1.0)).any(axis=1).sum())
-        self.simulated += len(X)
         a, b, c = z.T
         terms = np.column_stack([np.sqrt(10.0) * (b - a**2), a - 0.3, c - 0.8])
         failed = (a > 0.8) & self.holes
@@ -50,13 +49,12 @@ class Trial(Metered):
 
 
 BUDGET = 403
-# Where the trial's simulations begin to raise, and where a run is cut off to be resumed: both inside a generation.
+# Where the trial's simulations begin to raise: inside a generation.
 RAISES_AT = 50
-CUT_AT = 217
 
 
 def check_identifier(identifier: Identifier) -> Iterator[ContractPoint]:
-    """Try an identifier on a trial problem: as it is, with failing simulations, with an error, and resumed."""
+    """Try an identifier on a trial problem: as it is, with failing simulations, and with an error."""
     try:
         meter, problem = run(identifier, 1)
     except BudgetIgnoredError as error:
@@ -80,7 +78,6 @@ def check_identifier(identifier: Identifier) -> Iterator[ContractPoint]:
     yield failing(identifier, meter, "survives failures", bare=False)
     yield failing(identifier, meter, "survives NaN", bare=True)
     yield raising(identifier)
-    yield resumed(identifier, meter)
 
 
 def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -> ContractPoint:
@@ -120,20 +117,6 @@ def raising(identifier: Identifier) -> ContractPoint:
     left = [t.name for t in threading.enumerate() if t not in before]
     text = f"a problem that raises BrokenError: {came} came out, {len(left)} threads are left"
     return ContractPoint("errors come out", (came == BrokenError.__name__ or ended_before) and not left, text)
-
-
-def resumed(identifier: Identifier, meter: Meter) -> ContractPoint:
-    """Tell whether a run that was cut off and resumed from its log ends as the undisturbed one, bit for bit."""
-    known = min(CUT_AT, meter.used // 2)
-    log = meter.log()
-    cut = Log(log.X[:known].copy(), log.F[:known].copy(), log.failed[:known].copy())
-    again, problem = run(identifier, 1, Trial(Meter(BUDGET, resume_from=cut)))
-    saved = again.used - problem.simulated
-    differs = difference(meter, again)
-    text = (f"{saved} of {known} candidates answered from the log, {problem.simulated} simulated, "
-            f"{differs or 'the same in the end'}")  # fmt: skip
-    enough = saved == again.recalled and (saved == known or identifier.needs_residuals)
-    return ContractPoint("resumable", not differs and enough, text)
 
 
 def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: int = 1) -> tuple[Meter, Trial]:

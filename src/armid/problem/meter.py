@@ -49,14 +49,11 @@ class Meter:
     """Count simulations against a budget, whoever searches, and remember the best.
 
     budget: number of simulations; target: fitness at which a search may stop (None: it never may).
-    resume_from: log of an earlier run with the same settings and seed, whole or cut off anywhere. A problem answers
-    from it while the candidates agree with it bit for bit; at the first that differs the rest of it is dropped.
-    `recalled` says how many were answered.
     A failed candidate counts, but neither it nor a NaN is ever the best.
     Raises ArmidError for a budget that is no whole number above 0 and for a target that is NaN.
     """
 
-    def __init__(self, budget: int, target: float | None = None, resume_from: Log | None = None) -> None:
+    def __init__(self, budget: int, target: float | None = None) -> None:
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 1:
             raise ArmidError(f"the budget is {budget!r}, expected a whole number of simulations above 0")
         if budget > LARGEST_BUDGET:
@@ -71,9 +68,7 @@ class Meter:
         self.n_failed = 0
         self.best_x: Array | None = None
         self.best_f = float("inf")
-        self.recalled = 0
         self._largest, self._refused = LEAST_GRACE, 0
-        self._earlier = resume_from
         self._improvements: list[tuple[int, float]] = []
         self._X = np.empty((0, 0))
         self._F = np.empty(0)
@@ -107,21 +102,6 @@ class Meter:
         self._refused += n
         if self._refused > self._largest:
             raise BudgetIgnoredError(f"the search goes on after its budget of {self.budget} simulations: it is stopped")
-
-    def recall(self, X: Array) -> Array:
-        """Return the fitness of the leading candidates that stand next in the log resumed from, (n_known,).
-
-        X: the next candidates, (n, n_parameters). A failed one has +inf.
-        """
-        if self._earlier is None:
-            return np.empty(0)
-        known, values, failed = (part[self.used : self.used + len(X)] for part in self._earlier)
-        agree = (known == X[: len(known)]).all(axis=1) if known.shape[1:] == X.shape[1:] else np.zeros(1, np.bool_)
-        n = len(agree) if agree.all() else int(np.argmin(agree))
-        if n < len(X):
-            self._earlier = None
-        self.recalled += n
-        return np.where(failed[:n], np.inf, values[:n])
 
     def record(self, X: ArrayLike, F: ArrayLike, failed: ArrayLike | None = None) -> None:
         """Append evaluations to the log.
@@ -207,8 +187,7 @@ class Metered(Problem):  # type: ignore[misc]
     """Minimise what `evaluated` returns, within the budget of a meter; without one there is no limit.
 
     A candidate that fails gets PENALTY and is counted; so does one asked for beyond the budget, but it is neither
-    simulated nor counted, and after a generation of these a search is stopped. Candidates that the meter remembers from
-    an earlier run are counted, not simulated.
+    simulated nor counted, and after a generation of these a search is stopped.
     """
 
     def __init__(self, meter: Meter | None, **of_pymoo: Any) -> None:
@@ -237,12 +216,7 @@ class Metered(Problem):  # type: ignore[misc]
                 self.meter.refuse(len(X))
             return np.full(len(X), PENALTY), None
         asked = X[:granted]
-        # residuals are in no log: candidates with them are simulated again
-        known = np.empty(0) if self.meter is None or residuals else self.meter.recall(asked)
-        values, vectors = known, None
-        if len(known) < granted:
-            values, vectors = self.evaluated(asked[len(known) :], residuals)
-            values = np.concatenate([known, values]) if len(known) else values
+        values, vectors = self.evaluated(asked, residuals)
         failed = ~np.isfinite(values)
         if failed.any():
             values = np.where(failed, PENALTY, values)

@@ -270,7 +270,25 @@ def is_swarm(variant: str) -> bool:
 
 
 def wide_runs(evidence: Evidence) -> DataFrame:
-    """Return one row a run with its parameters beside, see `armid.contract.check.synthetic_runs`."""
+    """Return one row a run with its parameters beside: what an analysis of a user is given.
+
+    ==================================  ==========================================================================
+    study, run                          names of the study and of the run
+    case, identifier, fitness           what was identified, who searched, what was minimised
+    noise_deg_s, window, seed           noise that the study added (NaN: records' own), part of the motion
+    variant, setting                    identifier (with its fitness where it ran on several); noise in words
+    status, error, stopped              "done" or "failed" and why; why the search stopped
+    budget, used, n_failed              simulations: allowed, used, diverged
+    value                               best fitness
+    train_rmse, holdout_rmse            errors of the result, SI
+    train_s, train_s1, train_s2         similarity degrees of the result
+    seconds                             duration
+    largest_error                       largest relative error of a parameter; inf: failed, NaN: truth not known
+    NAME                                value of each free parameter, SI
+    NAME_truth, NAME_error              its truth, and abs(value - truth)/abs(truth), NaN where it is not known
+    NAME_deviation, NAME_at_bound       its Cramer-Rao standard deviation; whether it ended on its bound
+    ==================================  ==========================================================================
+    """
     columns = {"value": "", "truth": "_truth", "relative_error": "_error", "deviation": "_deviation",
                "at_bound": "_at_bound"}  # fmt: skip
     wide = evidence.runs.drop(columns=["started_at", "model", "versions"], errors="ignore")

@@ -6,7 +6,7 @@ from typing import Any
 from pandas import DataFrame, RangeIndex
 from pandas.api.types import is_bool_dtype, is_extension_array_dtype, is_integer_dtype, is_numeric_dtype
 
-from armid.contract.check import parts_of
+from armid.errors import ArmidError
 from armid.report.document import Column, Figure, Part, Section, Table, slug, unlike
 from armid.report.style import pyplot
 from armid.study.analyses.convergence import ANYTIME, CONVERGENCE
@@ -27,7 +27,7 @@ ANALYSES = (
 )  # fmt: skip
 # What stands in the report of a suite: no statistic of single parameters, which differ from problem to problem.
 OF_SUITES = (BY_CLASS, ANYTIME, BEST_FITNESS, SUCCESS, RUNNING_TIME, RUNS)
-# name -> function of the runs, see `armid.contract.check`.
+# name -> function of the runs, see `armid.study.analyses.analysis.wide_runs`.
 OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
 
 
@@ -43,6 +43,36 @@ def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:
         if parts:
             sections.append(Section(name.replace("_", " ").capitalize(), tuple(parts)))
     return tuple(sections)
+
+
+def parts_of(name: str, found: Any) -> dict[str, Any]:
+    """Return title -> DataFrame or matplotlib figure of what an analysis returned.
+
+    found: a DataFrame, a figure (or what carries one, such as axes), or a dict, tuple or list of these; None: nothing.
+    """
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+    if found is None:
+        return {}
+    if isinstance(found, Mapping):
+        titled = {str(title): part for title, part in found.items()}
+    elif isinstance(found, tuple | list):
+        titled = {f"{name} {i}": part for i, part in enumerate(found, 1)}
+    else:
+        titled = {name: found}
+    parts = {title: part if isinstance(part, DataFrame) else getattr(part, "figure", part)
+             for title, part in titled.items()}  # fmt: skip
+    for title, part in parts.items():
+        if not isinstance(part, DataFrame | Figure):
+            raise ArmidError(f"analysis '{name}' returns a {type(part).__name__} as '{title}': a pandas DataFrame, a "
+                             "matplotlib figure, or a dict or tuple of these is expected")  # fmt: skip
+        if isinstance(part, DataFrame):
+            names = [str(n) for n in (*(n for n in part.index.names if n is not None), *part.columns)]
+            if twice := [n for n in names if names.count(n) > 1]:
+                raise ArmidError(f"analysis '{name}' returns a table '{title}' with '{twice[0]}' twice as a column or "
+                                 "index: each name once is expected")  # fmt: skip
+    return parts
 
 
 def part(file: str, title: str, found: Any) -> Part:
