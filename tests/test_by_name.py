@@ -18,7 +18,7 @@ from armid.cli.new import INERTIA
 from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS
-from armid.report.result import MANIFEST, Result, Shown
+from armid.report.result import Result, Shown
 from armid.report.style import pyplot
 from armid.units import angles_in, scale_of
 
@@ -131,8 +131,14 @@ def shows(result, folder):
     assert isinstance(result.to_dict(), dict)
     assert result.plot().axes
     if isinstance(result, Result):
+        folder.mkdir()
+        left = [folder / f"{name}.svg" for name in result.kind.figures]
+        for path in left:
+            # of an earlier result, whose figures this one may not have
+            path.write_text("old")
         names = result.save(folder)
-        assert {*names, MANIFEST} == {path.name for path in folder.iterdir()}
+        assert set(names) == {path.name for path in folder.iterdir()}
+        assert "old" not in [path.read_text() for path in left if path.exists()]
         assert {result.kind.file, result.kind.page, result.kind.markdown} <= set(names)
         with pytest.raises(ArmidError, match="there is no figure 'nothing'"):
             result.plot("nothing")

@@ -3,13 +3,10 @@
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 
 import pytest
-
-from armid.report.result import beside
 
 LOOP = ("--candidates", "viscous", "--threads", "1")
 
@@ -81,24 +78,3 @@ def test_a_campaign_for_a_full_disk(refused, disk):
     folder = disk("12k")
     assert "No space left on device" in refused("new", "campaign", "mine", "--out", folder)
     assert list(folder.iterdir()) == []
-
-
-def test_files_of_two_runs_are_no_result(run, refused, small_folder, tmp_path):
-    """As a run leaves them that is killed between two moves; what it had not moved goes with the next."""
-    words = ("identify", small_folder, "--window", "0:0.7", "--budget", "80", "--identifier", "random")
-    for seed in (1, 2):
-        assert run(*words, "--seed", seed, "--out", tmp_path / str(seed)).code == 0
-    assert run("report", tmp_path / "1").code == 0
-    for name, other in (("result.json", "details.json"), ("details.json", "manifest.json")):
-        shutil.copy(tmp_path / "2" / name, tmp_path / "1" / name)
-        assert "1 holds the files of two runs" in refused("report", tmp_path / "1")
-        shutil.copy(tmp_path / "2" / other, tmp_path / "1" / other)
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    left = [tmp_path / "1" / f"{beside()}{pid}-x" for pid in (ended.pid, os.getpid())]
-    for folder in left:
-        folder.mkdir()
-        (folder / "fit.png").write_text("")
-    assert run(*words, "--out", tmp_path / "1").code == 0
-    assert [folder.exists() for folder in left] == [False, True]
-    assert run("report", tmp_path / "1").code == 0

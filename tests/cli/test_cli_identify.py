@@ -55,7 +55,7 @@ def test_writes_result_and_figures_and_the_same_bits_in_another_process(
 ):
     text, result = identified("--seed", "7")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
-        "convergence.png", "convergence.svg", "details.json", "fit.png", "manifest.json", "report.html", "report.md",
+        "convergence.png", "convergence.svg", "details.json", "fit.png", "report.html", "report.md",
         "result.json",
     ]  # fmt: skip
     assert (
@@ -227,7 +227,7 @@ def test_a_whole_run(run, small_folder, tmp_path):
                   "The tolerances of the constants counted, the deviations are: p0 "):  # fmt: skip
         assert words in ran.out
     assert sorted(p.name for p in out.iterdir()) == [
-        "identifiability.html", "identifiability.json", "identifiability.md", "manifest.json", "profiles.png",
+        "identifiability.html", "identifiability.json", "identifiability.md", "profiles.png",
         "profiles.svg", "sensitivities.png", "sensitivities.svg",
     ]  # fmt: skip
     told = json.loads((out / "identifiability.json").read_text())

@@ -52,6 +52,7 @@ def loop_report(name: str = "arm") -> dict[str, Any]:
     return {
         "version": 2, "probabilities": chances,
         "campaign": name, "plant": "shell_transfer_arm", "unit": "rad/s", "noise_rms": 0.004,
+        "noise_rms_holdout": None, "also": [], "next_steps": [], "known_together": [], "taken_as_exact": [],
         "verdict": "cannot_tell_apart", "effects": [f"{name}_x"],
         "error": {"before": {"train": errors(0.02), "holdout": errors(0.03)}, "after": step["error"]},
         "parameters": {"before": before, "after": after}, "steps": [step],
@@ -62,7 +63,7 @@ def loop_report(name: str = "arm") -> dict[str, Any]:
 
 
 def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> dict[str, Any]:
-    record = {"role": "train", "n_samples": n_points, "noise_rms": 0.004,
+    record = {"role": "train", "unit": "rad/s", "n_samples": n_points, "noise_rms": 0.004,
               "error": {"before": errors(0.02), "after": errors(0.005)},
               "curves": {"before": curve(n_points, 0.03), "after": curve(n_points, 0.004)}}  # fmt: skip
     own = {"p0": {"value": 3.0e6, "low": 2.9e6, "high": 3.1e6}}
@@ -72,16 +73,16 @@ def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> 
         "shifts": [f"{name} was bent"], "doubts": [],
         "diagnosis": {"before": {"train": [f"More than noise in {name}."], "holdout": None}, "after": None},
         "missing": [], "equations": {"before": f"{name}\n  torque = 0", "after": f"{name} + x\n  torque = x\n  end"},
-        "records": [{"file": f"{name}_{i}.csv", **record} for i in range(n_records)], "n_records": n_records + 1,
+        "records": [{"file": f"{name}_{i}.csv", "record": f"{name}_{i}.csv", **record} for i in range(n_records)],
+        "n_records": n_records + 1, "n_files": n_records + 1, "suspects": [],
         "models": models, "advice": [f"lower {name}"],
     }  # fmt: skip
 
 
-def write_loop(folder: Path, name: str = "arm", details: bool = True, figures: bool = True) -> Path:
+def write_loop(folder: Path, name: str = "arm", figures: bool = True) -> Path:
     folder.mkdir()
     (folder / "report.json").write_text(json.dumps(loop_report(name)))
-    if details:
-        (folder / "details.json").write_text(json.dumps(loop_details(name)))
+    (folder / "details.json").write_text(json.dumps(loop_details(name)))
     if figures:
         for figure in ("probabilities", "diagnosis"):
             (folder / f"{figure}.svg").write_text(SVG)

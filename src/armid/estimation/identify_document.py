@@ -141,10 +141,6 @@ PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {"convergence": ("The search", "Best so far against the number of simulations.")}
 MOST_KNOWN_FIRST = 3
-OLD = (
-    "details.json is not in this folder: an earlier version of armid wrote it, so the curves, what is to be known, the "
-    "settings and the command are not on this page; the same `armid identify` again writes them."
-)
 # A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
 FAR_FROM_MINIMUM = 4.0
 # An estimate that is biased by more standard deviations has an interval that misses the truth in more than 8 %.
@@ -158,14 +154,14 @@ MOST_NAMED = 6
 def identify_document(
     result: Mapping[str, Any], details: Mapping[str, Any], svgs: Mapping[str, str], again: str
 ) -> Document:
-    """Build the document of an identification from result.json and details.json, empty where there is none.
+    """Build the document of an identification from result.json and details.json.
 
     svgs: name -> SVG of those of `FIGURES` that are stored. again: the command that makes the page again.
     """
     unit = result["unit"]
     parameters, errors = parameter_table(result), train_and_holdout(result)
-    said = [text for text in details.get("remarks", ()) if text not in details["warnings"]]
-    first = [text for text in details.get("known_first", said) if text in said]
+    said = [text for text in details["remarks"] if text not in details["warnings"]]
+    first = [text for text in details["known_first"] if text in said]
     correlated = correlation_tables(result["correlation"])
     remarks = remark_parts(first, [text for text in said if text not in first])
     each = [(file, e["role"], e) for file, e in result["error_by_record"].items()]
@@ -181,7 +177,7 @@ def identify_document(
     figures = stored_figures(FIGURES, svgs).get("convergence", ())
     sections = (
         Section("Parameters", (parameters,)),
-        *([fit_section(details, unit)] if details else []),
+        fit_section(details),
         *(Section(part.title, (part,)) for part in remarks),
         Section("Errors", (errors, error_table("Each record", ["record", "role"], each, unit), *correlated)),
         Section("Search", (table("How it went", ["what", "value"], search), *figures)),
@@ -192,7 +188,7 @@ def identify_document(
     ended = f"{result['used']} of {result['budget']} simulations used, {result['stopped']}; seed {result['seed']}."
     return Document(
         result["campaign"], "Identification", f"Which parameters of {result['plant']}{effects} do these records show?",
-        answer(result, details), sections, warning="" if details else OLD,
+        answer(result, details), sections,
         main=(parameters, errors, *remarks, Text(ended)),
     )  # fmt: skip
 
@@ -205,24 +201,23 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     out = "no record was held out, so that nothing judges the model"
     if holdout is not None:
         out = f"{rmse_text(holdout, result['unit'])} on those held out"
-    outputs = result.get("outputs") or {"": {"noise_rms": np.mean([n["rms"] for n in result["noise"].values()])}}
-    noise, unit = shown(float(next(iter(outputs.values()))["noise_rms"]), result["unit"])
+    noise, unit = shown(next(iter(result["outputs"].values()))["noise_rms"], result["unit"])
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
               f"the noise is {noise:.3g} {unit}.{others_text(train, holdout)}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
     lost = [name for name, p in free.items() if p["low"] is None and "bias" not in p]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
-    doubts += details.get("warnings", ())
+    doubts += details["warnings"]
     if not free:
         return "Nothing was free: the model was judged as it is.", second
-    sure = not any(p.get("interval_doubt") for p in free.values())
+    sure = not any(p["interval_doubt"] for p in free.values())
     trusted = f"No parameter is held by a bound{', and the search has come to the minimum' if sure else ''}."
     return first, second, " ".join(doubts) or trusted
 
 
 def lead(free: Mapping[str, Mapping[str, Any]], judged: bool) -> str:
-    doubts = {p.get("interval_doubt", "") for p in free.values()}
+    doubts = {p["interval_doubt"] for p in free.values()}
     if not any(doubts):
         return f"Found, with 95 % intervals{'' if judged else ' that hold only if the model lacks nothing'}"
     if len(doubts) == 1 and all(p["low"] is None for p in free.values()):
@@ -233,7 +228,7 @@ def lead(free: Mapping[str, Mapping[str, Any]], judged: bool) -> str:
 
 
 def held_text(p: Mapping[str, Any]) -> str:
-    return value_text(p if p.get("interval_holds", True) else {**p, "low": None})
+    return value_text(p if p["interval_holds"] else {**p, "low": None})
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
@@ -246,9 +241,9 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
         absent = "none" if "bias" in p else "not determined"
         interval = absent if p["low"] is None else f"{factor * p['low']:.6g} to {factor * p['high']:.6g}"
         bounds = f"{factor * p['bound_low']:.4g} to {factor * p['bound_high']:.4g}"
-        holds = p.get("interval_holds", True)
-        remark = "AT ITS BOUND" if p["bound_active"] else "" if holds or p["low"] is None else "does not hold"
-        shown_interval = interval if holds or p["low"] is None else Struck(interval)
+        doubted = not p["interval_holds"] and p["low"] is not None
+        remark = "AT ITS BOUND" if p["bound_active"] else "does not hold" if doubted else ""
+        shown_interval = Struck(interval) if doubted else interval
         rows.append((name, factor * p["value"], unit, remark, shown_interval, bounds))
     columns = ["parameter", Column("value", "value", ".6g"), "unit", "remark", "95 % interval", "bounds"]
     kept = [i for i, c in enumerate(columns) if i != 3 or any(row[3] for row in rows)]
@@ -262,9 +257,9 @@ def train_and_holdout(result: Mapping[str, Any]) -> Table:
     return error_table("Errors", ["records"], rows, result["unit"], ERROR_NOTE)
 
 
-def fit_section(details: Mapping[str, Any], unit: str) -> Section:
+def fit_section(details: Mapping[str, Any]) -> Section:
     figures = tuple(
-        Figure(f"r{i}", f"{r['file']} ({r['role']})", "", partial(record_figure, r["curves"], r.get("unit", unit)))
+        Figure(f"r{i}", f"{r['file']} ({r['role']})", "", partial(record_figure, r["curves"], r["unit"]))
         for i, r in enumerate(details["records"])
     )  # fmt: skip
     text = (

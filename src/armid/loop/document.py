@@ -91,10 +91,6 @@ VERDICTS = {
     "does_not_carry_over": "Does not carry over", "record_disagrees": "A record disagrees",
     "implausible_records": "Records look wrong",
 }  # fmt: skip
-OLD = (
-    "details.json is not in this folder: an earlier version of armid wrote it, so residuals, equations, candidates, "
-    "settings and the command are not on this page; the same `armid close-loop` again writes them."
-)
 PROBABILITIES_NOTE = (
     "Share of the posterior. A name counts only in sets without something unknown. In its place: what may stand there."
 )
@@ -116,54 +112,46 @@ def loop_document(
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
     parameters = parameter_table(report)
-    each = [(r.get("record", r["file"]), r["role"], model, r["error"][model]) for r in details.get("records", ())
+    each = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
             for model in ("before", "after")]  # fmt: skip
-    note = records_note(len(each) // 2, details.get("n_records", 0))
-    by_record = (error_table("Errors of each record", ["record", "role", "model"], each, unit, note),) if each else ()
+    note = records_note(len(each) // 2, details["n_records"])
+    by_record = error_table("Errors of each record", ["record", "role", "model"], each, unit, note)
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
-    shifts = (*details.get("suspects", ()), *details.get("shifts", ()))
-    together = tuple(f"{said[0].upper()}{said[1:]}." for said in report.get("known_together", ()))
+    shifts = (*details["suspects"], *details["shifts"])
+    together = tuple(f"{said[0].upper()}{said[1:]}." for said in report["known_together"])
     beside = [Sentences((*shifts, *together))] if shifts or together else []
     widths = [Sentences(width_sentences(report), "What makes the intervals wide")] if width_sentences(report) else []
-    missing = tuple(details.get("missing", ()))
-    words = details.get("advice") or [", ".join(f"{k} = {v}" for k, v in a["manoeuvre"].items())
-                                      for a in report["advice"]]  # fmt: skip
+    missing, words = tuple(details["missing"]), details["advice"]
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
-    advice += tuple(report.get("next_steps", ()))
+    advice += tuple(report["next_steps"])
     drawn_first = tuple(f for name in ("probabilities", "intervals") for f in figures.get(name, ()))
     chances = probability_table(report)
     sections = [
         Section("What is missing", (chances, *drawn_first)),
         Section("Error before and after", (errors,)),
-        *([residual_section(details, unit, by_record)] if details else []),
+        residual_section(details, by_record),
         Section("Steps", steps or (Text("No effect was added."),)),
         Section("Parameters", (parameters, *widths, *beside, *figures.get("parameters", ()))),
     ]
-    if details:
-        if "motion" in figures:
-            sections.insert(2, Section("Motion", figures["motion"]))
-        drawn = tuple(f for name in ("diagnosis", "autocorrelation", "missing") for f in figures.get(name, ()))
-        told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
-                for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
-        tests = [Sentences(tuple(sentences), title) for title, sentences in told if sentences]
-        unnamed = [Sentences(missing, "What is missing, without a name")] if missing else []
-        sections.append(Section("Is what remains noise?", (*tests, *unnamed, *drawn)))
-    elif figures:
-        sections.append(Section("Figures", tuple(f for several in figures.values() for f in several)))
-    if report.get("log"):
-        sections.append(Section("Models that were fitted", (log_table(report["log"]),)))
+    if "motion" in figures:
+        sections.insert(2, Section("Motion", figures["motion"]))
+    drawn = tuple(f for name in ("diagnosis", "autocorrelation", "missing") for f in figures.get(name, ()))
+    told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
+            for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
+    tests = [Sentences(tuple(sentences), title) for title, sentences in told if sentences]
+    unnamed = [Sentences(missing, "What is missing, without a name")] if missing else []
+    sections.append(Section("Is what remains noise?", (*tests, *unnamed, *drawn)))
+    sections.append(Section("Models that were fitted", (log_table(report["log"]),)))
     if advice:
         tables = (advice_table(report["advice"], words),) if report["advice"] else ()
         sections.append(Section("The next record", (Sentences(advice), *tables)))
-    if details:
-        sections.append(equations_section(details["equations"]))
-    sections.append(made_section(details.get("made_by", {}), details.get("versions", {}), again))
+    sections.append(equations_section(details["equations"]))
+    sections.append(made_section(details.get("made_by", {}), details["versions"], again))
     noise, name = shown(report["noise_rms"], unit)
-    records = f", {details.get('n_files', details['n_records'])} records" if details else ""
     return Document(
         report["campaign"], "Closed loop", f"What does the declared model of {report['plant']} lack on these records?",
-        answer(report, details), tuple(sections), warning="" if details else OLD,
-        facts=(f"Plant {report['plant']}{records}; noise {noise:.3g} {name} rms.",),
+        answer(report, details), tuple(sections),
+        facts=(f"Plant {report['plant']}, {details['n_files']} records; noise {noise:.3g} {name} rms.",),
         main=(chances, *steps, parameters, errors, Text(f"verdict: {report['verdict']}"),
               Sentences((*shifts, *missing, *advice))),
     )  # fmt: skip
@@ -171,25 +159,23 @@ def loop_document(
 
 def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what is probable, the verdict, error before and after, and which parameters are to be trusted."""
-    verdict = VERDICTS.get(report["verdict"], report["verdict"])
-    effects = f" ({' + '.join(report['effects'])})" if report["effects"] else ""
-    second = f"{verdict}: {details['conclusion']}" if details else f"{verdict}{effects}."
+    second = f"{VERDICTS[report['verdict']]}: {details['conclusion']}"
     found = report["parameters"]["after"]
     sure = [f"{name} = {value_text(p)}" for name, p in found.items() if p["trusted"]]
-    exact = report.get("taken_as_exact", [])
+    exact = report["taken_as_exact"]
     names = ", ".join(exact[:MOST_EXACT]) + (f" and {len(exact) - MOST_EXACT} more" if exact[MOST_EXACT:] else "")
     given = f", with {names} taken as exact (no tolerance is told)" if exact else ""
     said = [f"To be trusted{given}: {', '.join(sure)}."] if sure else []
-    also = [VERDICTS.get(word, word).lower() for word in report.get("also", ())]
+    also = [VERDICTS[word].lower() for word in report["also"]]
     second += f" Also: {', '.join(also)}." if also else ""
-    said += details.get("doubts") or []
+    said += details["doubts"]
     return (f"{chances_sentence(report)}.", second, error_sentence(report),
             " ".join(said) or "No parameter was identified.")  # fmt: skip
 
 
 def chances_sentence(report: Mapping[str, Any]) -> str:
     """Return the probabilities in one line, and among how many effects they were asked for."""
-    named, known = report["probabilities"].get("among", (0, 0))
+    named, known = report["probabilities"]["among"]
     asked = f" (among {named} of {known} effects)" if named < known else ""
     return sentence_of(report["probabilities"]) + asked
 
@@ -211,7 +197,7 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     before, after = report["error"]["before"], report["error"]["after"]
     which, on = ("holdout", "the records held out") if after["holdout"] else ("train", "the train records")
     was, now = rmse_text(before[which], report["unit"]), rmse_text(after[which], report["unit"])
-    of_those = report.get("noise_rms_holdout") if which == "holdout" else None
+    of_those = report["noise_rms_holdout"] if which == "holdout" else None
     noise, unit = shown(of_those or report["noise_rms"], report["unit"])
     alone = "" if which == "holdout" else "; no record was held out"
     told, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
@@ -223,7 +209,7 @@ def error_sentence(report: Mapping[str, Any]) -> str:
 def step_table(report: Mapping[str, Any]) -> Table:
     unit, rows, last = report["unit"], [], report["error"]["before"]
     for step in report["steps"]:
-        held = {name.partition(".")[2]: p if p.get("interval_holds", True) else {**p, "low": None}
+        held = {name.partition(".")[2]: p if p["interval_holds"] else {**p, "low": None}
                 for name, p in step["parameters"].items()
                 if name.startswith(f"{step['effect']}.") and p["low"] is not None}  # fmt: skip
         own = [f"{name} {value_text(p)}" for name, p in held.items()]
@@ -277,13 +263,13 @@ def noise_text(p: Mapping[str, Any]) -> str:
 
 def held_text(p: Mapping[str, Any]) -> str:
     """Return a stored parameter, struck where it has an interval that does not hold."""
-    return value_text(p) if p["low"] is None or p.get("interval_holds", True) else Struck(value_text(p))
+    return value_text(p) if p["low"] is None or p["interval_holds"] else Struck(value_text(p))
 
 
-def residual_section(details: Mapping[str, Any], unit: str, errors: tuple[Part, ...]) -> Section:
+def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
     figures = []
     for i, record in enumerate(details["records"]):
-        own = record.get("unit", unit)
+        own = record["unit"]
         was, now = (rmse_text(record["error"][model], own) for model in ("before", "after"))
         title = f"{record['file']} ({record['role']}), RMSE {was} to {now} {shown(0.0, own)[1]}"
         figures.append(Figure(f"r{i}", title, "", partial(record_figure, record, own)))
@@ -293,7 +279,7 @@ def residual_section(details: Mapping[str, Any], unit: str, errors: tuple[Part, 
     )
     gallery = Gallery(tuple(figures), "Measured minus simulated", "residuals")
     return Section(
-        "Residual of each record", (gallery, *errors), text + records_note(len(figures), details["n_records"])
+        "Residual of each record", (gallery, errors), text + records_note(len(figures), details["n_records"])
     )
 
 

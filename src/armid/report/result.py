@@ -2,15 +2,13 @@
 
 import json
 import os
-import platform
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from shutil import disk_usage, rmtree
+from shutil import disk_usage
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -22,7 +20,9 @@ if TYPE_CHECKING:
 
     from armid.report.document import Document
 
-DETAILS, MANIFEST = "details.json", "manifest.json"
+DETAILS = "details.json"
+# How the name of a folder begins in which files are made before they are moved in.
+BESIDE = ".armid-"
 # Room on a disk without which no search is begun: results take some MB.
 LEAST_ROOM = 3_000_000
 # How a page tells a path whose name is no UTF-8.
@@ -30,7 +30,7 @@ ODD_NAMES = "backslashreplace"
 # Letters of a result's `repr`.
 MOST_LETTERS = 1_500
 # What making a document of damaged numbers raises.
-UNSHOWABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
+UNSHOWABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError)
 Draw = Callable[[], Any]
 
 
@@ -57,6 +57,7 @@ class Kind:
     markdown: str
     module: str
     function: str
+    details: str = DETAILS
 
     @property
     def figures(self) -> tuple[str, ...]:
@@ -76,7 +77,7 @@ class Kind:
 IDENTIFICATION = Kind("armid identify", "result.json", "report.html", "report.md",
                       "armid.estimation.identify_document", "identify_document")  # fmt: skip
 IDENTIFIABILITY = Kind("armid identifiability", "identifiability.json", "identifiability.html", "identifiability.md",
-                       "armid.estimation.identifiability_document", "identifiability_document")  # fmt: skip
+                       "armid.estimation.identifiability_document", "identifiability_document", "")  # fmt: skip
 LOOP = Kind("armid close-loop", "report.json", "report.html", "report.md", "armid.loop.document", "loop_document")
 
 
@@ -141,7 +142,7 @@ class Result(Shown):
         from armid.report.style import save
 
         kind, (result, details, figures) = self.kind, self.parts
-        with NewFiles(Path(folder), MANIFEST) as files, angles_in(self.campaign.angle):
+        with NewFiles(Path(folder)) as files, angles_in(self.campaign.angle):
             files.path(kind.file).write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
             for name, draw in figures.items():
                 endings = ("png", "svg") if name in kind.figures else ("png",)
@@ -151,6 +152,10 @@ class Result(Shown):
                 files.path(DETAILS).write_text(json.dumps(stored, allow_nan=False) + "\n", encoding="utf-8")
             document = document_of(files.place, kind, str(folder))
             write_pages(document, kind, files)
+        for name in set(kind.figures) - figures.keys():
+            # an earlier result in the folder drew what this one has not
+            for ending in ("png", "svg"):
+                (Path(folder) / f"{name}.{ending}").unlink(missing_ok=True)
         return files.names
 
 
@@ -164,16 +169,11 @@ def write_pages(document: "Document", kind: Kind, files: "NewFiles") -> None:
 
 def document_of(folder: Path, kind: Kind, name: str) -> "Document":
     """Return the document of what a folder holds; name: of it, in the command that makes the page again."""
-    result = read_json(folder / kind.file, kind.command)
-    left_over = refuse_mixed(folder, kind)
-    has_details = (folder / DETAILS).is_file() and kind is not IDENTIFIABILITY
-    details = read_json(folder / DETAILS, kind.command) if has_details else {}
-    files = {figure: folder / f"{figure}.svg" for figure in kind.figures if f"{figure}.svg" not in left_over}
-    try:
-        svgs = {figure: path.read_text(encoding="utf-8") for figure, path in files.items() if path.is_file()}
-    except UnicodeDecodeError as error:
-        raise ArmidError(f"{folder} holds a figure that is no text: the SVG of `{kind.command}` is expected") from error
+    files = {figure: folder / f"{figure}.svg" for figure in kind.figures}
     with refuse_damaged(folder, kind):
+        result, details = (json.loads((folder / file).read_text(encoding="utf-8")) if file else {}
+                           for file in (kind.file, kind.details))  # fmt: skip
+        svgs = {figure: path.read_text(encoding="utf-8") for figure, path in files.items() if path.is_file()}
         return kind.document(result, details, svgs, f"armid report {name}")
 
 
@@ -185,52 +185,18 @@ def refuse_damaged(folder: Path, kind: Kind) -> Iterator[None]:
     except UNSHOWABLE as error:
         if isinstance(error, ArmidError):
             raise
-        raise ArmidError(
-            f"{folder / kind.file}, or details.json beside it, is not what `{kind.command}` writes, it was damaged or "
-            "changed: a folder as that command left it is expected"
-        ) from error
-
-
-def refuse_mixed(folder: Path, kind: Kind) -> set[str]:
-    """Refuse files of which some are of another run than the manifest; an earlier version wrote none.
-
-    Return the figures of an earlier run, which drew what the last one did not.
-    """
-    figures = {f"{figure}.svg" for figure in kind.figures}
-    if not (folder / MANIFEST).is_file():
-        return set()
-    digests = read_json(folder / MANIFEST, kind.command)
-    for name in (kind.file, DETAILS, *figures):
-        if name in digests and (folder / name).is_file() and digest_of(folder / name) != digests[name]:
-            raise ArmidError(f"{folder} holds the files of two runs, as one killed while it wrote leaves them: "
-                             f"{name} is not that of {MANIFEST}; `{kind.command}` once more is expected")  # fmt: skip
-    return figures - digests.keys()
-
-
-def digest_of(path: Path) -> str:
-    return sha256(path.read_bytes()).hexdigest()
-
-
-def read_json(path: Path, command: str) -> dict[str, Any]:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ArmidError(f"{path} is no JSON, it was damaged or changed: what `{command}` wrote is expected") from error
-    if not isinstance(found, dict):
-        raise ArmidError(f"{path} holds no table: what `{command}` wrote is expected")
-    return found
+        raise ArmidError(f"{folder / kind.file}, or a file beside it, is not what `{kind.command}` writes, it was "
+                         "damaged or changed: a folder as that command left it is expected") from error  # fmt: skip
 
 
 class NewFiles:
     """Write files beside a folder and move them in when all are there, so that nothing half-written is found.
 
-    A folder that is made for them goes again when nothing comes into it. manifest: name of a file that tells the digest
-    of each, "" for none; it comes in first, so that who is killed in between leaves files that it does not fit. What a
-    process of this machine left beside them when it was killed goes.
+    A folder that is made for them goes again when nothing comes into it.
     """
 
-    def __init__(self, folder: Path, manifest: str = "") -> None:
-        self.folder, self.manifest = folder, manifest
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self.names: list[str] = []
 
     def __enter__(self) -> "NewFiles":
@@ -238,8 +204,7 @@ class NewFiles:
             raise ArmidError(f"{self.folder} is a file: a folder is expected")
         self._is_new = not self.folder.exists()
         self.folder.mkdir(parents=True, exist_ok=True)
-        sweep(self.folder)
-        self._beside = TemporaryDirectory(dir=self.folder, prefix=f"{beside()}{os.getpid()}-")
+        self._beside = TemporaryDirectory(dir=self.folder, prefix=BESIDE)
         return self
 
     @property
@@ -259,32 +224,13 @@ class NewFiles:
             # a disk that is full does not say which file it had no room for
             error.filename = str(self.folder / self.names[-1])
         if kind is None:
-            if self.manifest:
-                digests = {name: digest_of(self.place / name) for name in self.names}
-                (self.place / self.manifest).write_text(json.dumps(digests, indent=2) + "\n", encoding="utf-8")
-            for name in ([self.manifest] if self.manifest else []) + self.names:
+            for name in self.names:
                 (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
                 os.replace(self.place / name, self.folder / name)
         self._beside.cleanup()
         if self._is_new:
             with suppress(OSError):
                 self.folder.rmdir()
-
-
-def beside() -> str:
-    return f".armid-{sha256(platform.node().encode()).hexdigest()[:8]}-"
-
-
-def sweep(folder: Path) -> None:
-    """Remove what processes of this machine that have ended left on its way into a folder."""
-    for path in folder.glob(f"{beside()}*-*") if os.name == "posix" else ():
-        pid = path.name.removeprefix(beside()).partition("-")[0]
-        try:
-            os.kill(int(pid), 0)
-        except ProcessLookupError:
-            rmtree(path, ignore_errors=True)
-        except (ValueError, OSError):
-            continue
 
 
 def refuse_unwritable(folder: Path | None, file: str = "") -> None:
@@ -294,7 +240,7 @@ def refuse_unwritable(folder: Path | None, file: str = "") -> None:
             with NewFiles(folder):
                 left = disk_usage(folder).free
         except OSError as error:
-            if beside() in str(error.filename):
+            if BESIDE in str(error.filename):
                 error.filename = str(folder / file)
             raise
         if left < LEAST_ROOM:
