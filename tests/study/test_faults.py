@@ -2,14 +2,12 @@
 
 import errno
 import os
-import re
 import resource
 import shutil
 import sqlite3
 import subprocess
 import sys
 import time
-import zlib
 from contextlib import closing
 
 import pytest
@@ -180,50 +178,6 @@ def test_what_a_factory_does_harms_no_runner(write_study, tmp_path, bad_identifi
     with pytest.raises(ArmidError, match=rf"identifier '{name}_when_built': it cannot be built: .*{words}"):
         run_study(file, 1, out=tmp_path / "out", plugins=[f"{bad_identifiers}:{name}_when_built"], time_limit=8.0)
     assert not (tmp_path / "out").exists()
-
-
-# What a store may hold that no armid writes: SQL, and what is said of it.
-CRAFTED = {
-    "UPDATE identified SET value = 'much'": "'value' of its table 'identified' holds text, real is expected",
-    "UPDATE parameters SET at_bound = x'00'": "'at_bound' of its table 'parameters' holds blob",
-    "UPDATE runs SET seconds = 'long'": "'seconds' of its table 'runs' holds text",
-    "UPDATE runs SET status = 'odd'": "a run has the status 'odd', 'done' or 'failed' is expected",
-    "UPDATE texts SET text = '{broken'": "what it says of its study, its runs or their versions cannot be read",
-    "UPDATE texts SET text = '[1]'": "what it says of its study, its runs or their versions cannot be read",
-    'UPDATE study SET value = \'{"name": "small", "cases": 5}\'': "cannot be read",
-    "UPDATE study SET value = 'garbage'": "the description of the study cannot be read",
-    "UPDATE study SET value = '[]'": "the description of the study lacks 'name'",
-    'UPDATE study SET value = \'{"name": "small"}\'': "the description of the study lacks 'cases'",
-    "ALTER TABLE runs DROP COLUMN seconds": "its table 'runs' has no column 'seconds'",
-    "UPDATE traces SET trace = :bomb": "the trace of run",
-    "UPDATE traces SET names = 'p0'": "the trace of run",
-}
-
-
-@pytest.mark.parametrize("sql", CRAFTED)
-def test_a_crafted_store_is_told_in_one_sentence(sql, undisturbed, tmp_path):
-    """Made by another program, so that its tables are not STRICT."""
-    kept = tmp_path / FILE_NAME
-    shutil.copy(undisturbed.path, kept)
-    with closing(sqlite3.connect(kept)) as copy:
-        copy.execute("PRAGMA writable_schema = 1")
-        copy.execute("UPDATE sqlite_schema SET sql = replace(replace(sql, ', STRICT', ''), 'STRICT', '')")
-        copy.commit()
-    with closing(sqlite3.connect(kept)) as copy:
-        copy.execute(sql, {"bomb": zlib.compress(bytes(400_000_000), 9)} if ":bomb" in sql else {})
-        copy.commit()
-    with pytest.raises(ArmidError, match=re.escape(CRAFTED[sql]) if "trace" not in sql else CRAFTED[sql]):
-        list(load_study(tmp_path).iter_traces())
-
-
-def test_a_store_without_what_was_identified_is_told(undisturbed, tmp_path, refused):
-    shutil.copy(undisturbed.path, tmp_path / FILE_NAME)
-    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as copy:
-        copy.execute("DELETE FROM identified")
-        copy.commit()
-    words = f"{FILE_NAME} is damaged: its runs cannot be shown, what armid wrote is expected"
-    assert words in refused("report", tmp_path, "--quiet")
-    assert [path.name for path in tmp_path.iterdir()] == [FILE_NAME]
 
 
 def test_a_damaged_page_is_told(undisturbed, tmp_path):

@@ -109,37 +109,6 @@ def test_a_store_of_another_format_is_told(store, tmp_path):
 
 
 ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT"
-# What makes a store that computes when it is used, and the name under which it is refused.
-COMPUTING = {
-    f"DROP TABLE runs; CREATE VIEW runs AS {ENDLESS} i AS run, i AS status FROM n": "runs",
-    f"CREATE TRIGGER late AFTER INSERT ON runs BEGIN INSERT INTO texts {ENDLESS} i, i FROM n; END": "late",
-    "CREATE INDEX wide ON runs(length(printf('%0200000000d', 1)))": "wide",
-    "CREATE TABLE made (a, b AS (hex(zeroblob(100000000))))": "made",
-    "CREATE VIRTUAL TABLE made USING fts5(a)": "made",
-}
-
-
-@pytest.mark.parametrize("sql", COMPUTING)
-def test_a_store_that_computes_is_refused(store, tmp_path, sql):
-    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
-        try:
-            connection.executescript(sql)
-        except sqlite3.OperationalError as error:
-            pytest.skip(str(error))
-    for use in (Store, load_study):
-        with pytest.raises(ArmidError, match=f"'{COMPUTING[sql]}' in it computes, plain tables are expected"):
-            use(tmp_path)
-
-
-def test_what_a_table_asks_of_its_rows_is_not_computed(store, tmp_path):
-    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection, connection:
-        connection.execute("PRAGMA ignore_check_constraints = ON")
-        connection.execute("CREATE TABLE slow (a CHECK (abs(-9223372036854775807 - a)))")
-        connection.execute("INSERT INTO slow VALUES (1)")
-        connection.execute("PRAGMA ignore_check_constraints = OFF")
-        with pytest.raises(sqlite3.OperationalError, match="overflow"):
-            connection.execute("PRAGMA quick_check")
-    assert load_study(tmp_path).study["name"] == "made"
 
 
 def test_a_signal_ends_a_query(tmp_path):

@@ -3,6 +3,7 @@
 import json
 import shutil
 import sqlite3
+import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
@@ -20,11 +21,8 @@ from armid.study.outcome import DONE, RunTrace, unpacked
 from armid.study.store import (
     FILE_NAME,
     WAIT_S,
-    check_content,
     check_format,
     connected,
-    corruption_guard,
-    description_of,
     translate_errors,
 )
 
@@ -118,14 +116,13 @@ class StudyResults(Shown):
         """One row a campaign that was closed: run, case, verdict, seconds, cpu_seconds, report (a dict)."""
         with _reading(self.path) as connection:
             found = frame_of(connection, LOOPS)
-        with corruption_guard(self.path, "the report of a campaign"):
             return found.assign(report=[json.loads(text) for text in found["report"]])
 
     def settings_of(self, run: str) -> dict[str, Any]:
         """Return all that decided a run."""
-        text = self._one("SELECT settings FROM settings WHERE run = ?", run, f"run '{run}'")
-        with corruption_guard(self.path, f"the settings of run '{run}'"):
-            settings: dict[str, Any] = json.loads(text)
+        settings: dict[str, Any] = json.loads(
+            self._one("SELECT settings FROM settings WHERE run = ?", run, f"run '{run}'")
+        )
         return settings
 
     def text_of(self, digest: str) -> str:
@@ -142,9 +139,7 @@ class StudyResults(Shown):
     def _traces(self, query: str, values: tuple[str, ...]) -> Iterator[RunTrace]:
         with _reading(self.path) as connection:
             for run, names, content in connection.execute(query, values):
-                with corruption_guard(self.path, f"the trace of run '{run}'"):
-                    trace = unpacked(run, content, tuple(json.loads(names)))
-                yield trace
+                yield unpacked(run, content, tuple(json.loads(names)))
 
     def _frame(self, trace: RunTrace | None) -> pd.DataFrame:
         """Return a trace as a table with a column for every parameter of the study, None: one without rows."""
@@ -184,21 +179,19 @@ def load_study(path: str | Path) -> StudyResults:
     with _reading(file) as connection:
         # one transaction: a runner that is at work changes nothing between the tables
         connection.execute("BEGIN")
-        check_content(connection, file)
         row = connection.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
         if row is None:
             raise ArmidError(f"{file} holds no study yet: let `armid study` begin it")
-        study = description_of(file, str(row[0]))
+        study = json.loads(row[0])
         status = "SELECT status, count(*) FROM plan JOIN runs USING (run) GROUP BY status"
         ended = dict(connection.execute(status).fetchall())
         study["n_planned"] = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
         study["n_done"] = ended.get(DONE, 0)
         study["n_failed"] = sum(ended.values()) - study["n_done"]
-        with corruption_guard(file, "what it says of its study, its runs or their versions"):
-            study |= {"versions": _versions(connection), "folder": str(file.parent)}
-            study["parameters"] = list(dict.fromkeys(str(name) for case in study["cases"] for name in case["bounds"]))
-            parameters = _parameters(connection, study)
-            return StudyResults(file, study, _with_parameters(_runs(connection), parameters), parameters)
+        study |= {"versions": _versions(connection), "folder": str(file.parent)}
+        study["parameters"] = list(dict.fromkeys(str(name) for case in study["cases"] for name in case["bounds"]))
+        parameters = _parameters(connection, study)
+        return StudyResults(file, study, _with_parameters(_runs(connection), parameters), parameters)
 
 
 def frame_of(connection: sqlite3.Connection, query: str) -> pd.DataFrame:
@@ -248,7 +241,7 @@ def _versions(connection: sqlite3.Connection) -> dict[str, str]:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Give a connection that cannot write.
+    """Give a connection that cannot write, and tell in one sentence what cannot be read.
 
     A store whose runner was killed has a log beside it, which cannot be read in a read-only folder: it is copied then.
     """
@@ -265,4 +258,11 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
                 shutil.copy(file, beside)
             connection = stack.enter_context(closing(connected(Path(beside) / path.name)))
             check_format(connection, path)
-        yield connection
+        try:
+            yield connection
+        except (ValueError, TypeError, KeyError, AttributeError, zlib.error) as error:
+            if isinstance(error, ArmidError):
+                raise
+            raise ArmidError(
+                f"{path} is damaged: what it holds cannot be read, what armid wrote is expected"
+            ) from error

@@ -5,14 +5,13 @@ import json
 import os
 import sqlite3
 import time
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from armid.errors import ArmidError, quoted
-from armid.study.outcome import DONE, FAILED, MissingRun, Outcome, Planned
+from armid.errors import ArmidError
+from armid.study.outcome import FAILED, MissingRun, Outcome, Planned
 
 FILE_NAME = "study.sqlite"
 # "armd" in ASCII: a file of another program is recognised before anything is written to it.
@@ -20,13 +19,6 @@ APPLICATION, FORMAT = 0x61726D64, 1
 WAIT_S = 60.0
 # Steps of SQLite between two looks for a signal, a few milliseconds.
 PROGRESS_STEPS = 100_000
-# What computes when a store is read or written: views, triggers, virtual tables, indices, and generated columns.
-COMPUTING = """
-SELECT name FROM sqlite_schema WHERE sql NOT LIKE 'CREATE TABLE %'
-UNION ALL SELECT s.name FROM sqlite_schema s, pragma_table_xinfo(s.name) c WHERE c.hidden > 0 LIMIT 1
-"""
-# What the description of a study holds in every version of this format.
-WORDS = ("name", "cases")
 
 # The last four hold what a run gave: one that identifies fills three, one that closes the loop the fourth.
 SCHEMA = """
@@ -56,8 +48,6 @@ CREATE TABLE IF NOT EXISTS loops (
 """
 
 
-# Declared type of a column -> what SQLite calls the types of its values.
-TYPES = {"TEXT": ("text",), "INTEGER": ("integer",), "REAL": ("real", "integer"), "BLOB": ("blob",)}
 # Runs that this runner looks at, and those of them that are not finished.
 CHOSEN = """
 (p."case" = :case OR p."case" GLOB :case) AND (p.identifier = :identifier OR p.identifier GLOB :identifier)
@@ -116,7 +106,7 @@ class Store:
         """Set what the study consists of now; finished runs stay, also those that it no longer asks for."""
         with translate_errors(self.path), transaction(self._connection):
             name, before = str(description["name"]), self._kept("description")
-            other = description_of(self.path, before)["name"] if before else name
+            other = json.loads(before)["name"] if before else name
             if other != name:
                 raise ArmidError(f"{self.path} holds the study '{other}', another folder is expected for '{name}'")
             digest = hashlib.sha256()
@@ -233,12 +223,8 @@ def translate_errors(path: Path) -> Iterator[None]:
 
 
 def connected(database: str | Path, **options: Any) -> sqlite3.Connection:
-    """Return a connection whose queries end by a signal, however long they are: `translate_errors` raises it again.
-
-    Conditions that a table sets on its rows are not computed: armid sets none.
-    """
+    """Return a connection whose queries end by a signal, however long they are: `translate_errors` raises it again."""
     connection: sqlite3.Connection = sqlite3.connect(database, isolation_level=None, **options)
-    connection.execute("PRAGMA ignore_check_constraints = ON")
     # Python looks for signals when it calls this
     connection.set_progress_handler(lambda: 0, PROGRESS_STEPS)
     return connection
@@ -259,7 +245,6 @@ def opened(path: Path) -> sqlite3.Connection:
             with transaction(connection):
                 for statement in filter(str.strip, SCHEMA.split(";")):
                     connection.execute(statement)
-                check_content(connection, path)
                 if not connection.execute("PRAGMA user_version").fetchone()[0]:
                     connection.execute(f"PRAGMA application_id = {APPLICATION}")
                     connection.execute(f"PRAGMA user_version = {FORMAT}")
@@ -291,49 +276,11 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
         if error.sqlite_errorname != "SQLITE_NOTADB":
             raise
         raise ArmidError(f"{path} is no store of a study: another file has its name") from error
-    if found == [APPLICATION, FORMAT]:
-        row = connection.execute(COMPUTING).fetchone()
-        if row is not None:
-            raise ArmidError(f"{path} is damaged: {quoted(row[0])} in it computes, plain tables are expected")
-        return
-    if may_be_new and is_empty:
+    if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
         return
     if found[0] != APPLICATION:
         raise ArmidError(f"{path} is no store of a study: another program's data, or nothing, is in it")
     raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
-
-
-def check_content(connection: sqlite3.Connection, path: Path) -> None:
-    """Refuse a store whose pages are damaged, or whose tables hold what no armid writes into them.
-
-    Tables are STRICT; those of earlier versions, or made by another program, may hold any type anywhere.
-    """
-    found = str(connection.execute("PRAGMA quick_check(1)").fetchone()[0])
-    if found != "ok":
-        raise ArmidError(f"{path} is damaged: {found[:100]}")
-    with closing(sqlite3.connect(":memory:")) as declared:
-        declared.executescript(SCHEMA)
-        tables = declared.execute("SELECT name FROM sqlite_schema WHERE type = 'table'").fetchall()
-        columns = [(table, row) for (table,) in tables for row in declared.execute(f"PRAGMA table_info({table})")]
-    there = {(table, row[1]) for (table,) in tables for row in connection.execute(f"PRAGMA table_info({table})")}
-    for table, (_, column, kind, required, *_) in columns:
-        # an earlier version may lack a whole table
-        if not any(name == table for name, _ in there):
-            continue
-        if (table, column) not in there:
-            raise ArmidError(f"{path} is damaged: its table '{table}' has no column '{column}'")
-        types = [*TYPES[kind], *([] if required else ["null"])]
-        marks = ", ".join("?" * len(types))
-        wrong = f'SELECT typeof("{column}") FROM {table} WHERE typeof("{column}") NOT IN ({marks}) LIMIT 1'
-        row = connection.execute(wrong, types).fetchone()
-        if row is not None:
-            found = f"'{column}' of its table '{table}' holds {row[0]}"
-            raise ArmidError(f"{path} is damaged: {found}, {kind.lower()} is expected")
-    row = connection.execute("SELECT status FROM runs WHERE status NOT IN (?, ?) LIMIT 1", (DONE, FAILED)).fetchone()
-    if row is not None:
-        raise ArmidError(
-            f"{path} is damaged: a run has the status {quoted(row[0])}, '{DONE}' or '{FAILED}' is expected"
-        )
 
 
 @contextmanager
@@ -357,23 +304,3 @@ def closed(connection: sqlite3.Connection) -> None:
         connection.execute("PRAGMA journal_mode = DELETE")
     with suppress(sqlite3.Error):
         connection.close()
-
-
-@contextmanager
-def corruption_guard(file: Path, what: str) -> Iterator[None]:
-    """Turn content that cannot be decoded into one sentence, naming the file and what of it is damaged."""
-    try:
-        yield
-    except ArmidError:
-        raise
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError, zlib.error) as error:
-        raise ArmidError(f"{file} is damaged: {what} cannot be read, what armid wrote is expected") from error
-
-
-def description_of(file: Path, text: str) -> dict[str, Any]:
-    with corruption_guard(file, "the description of the study"):
-        found = json.loads(text)
-    missing = [word for word in WORDS if not isinstance(found, dict) or word not in found]
-    if missing:
-        raise ArmidError(f"{file} is damaged: the description of the study lacks '{missing[0]}'")
-    return dict(found)
