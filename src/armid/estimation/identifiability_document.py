@@ -18,9 +18,9 @@ from armid.report.document import (
     Section,
     Table,
     correlation_tables,
-    finite,
     listed,
     made_section,
+    plain,
     remark_parts,
     stored_figures,
     table,
@@ -173,7 +173,7 @@ def result_of(found: Examination) -> dict[str, Any]:
     """Return everything of an examination that JSON can hold, SI throughout; what is not known is null."""
     names, correlation, fisher = found.space.free_names, found.information.correlation, found.information.fisher
     levels = {r.name: level for r, level in zip(found.replays, found.information.levels, strict=True)}
-    return {
+    return plain({
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
         "effects": [e.name for e in found.model.effects],
@@ -181,38 +181,35 @@ def result_of(found: Examination) -> dict[str, Any]:
         "at": "given" if found.given else "estimate",
         "parameters": {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)},
         "fixed": {n: float(v) for n, v in zip(found.space.names, found.space.fixed, strict=True) if not np.isnan(v)},
-        "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
+        "correlation": {name: dict(zip(names, row, strict=True)) for name, row in zip(names, correlation, strict=True)},
         "collinearity_index": collinearity_index(fisher),
-        "groups": [{"names": list(g.names), "index": g.index, "direction": by_name(g.names, g.direction)}
-                   for g in found.groups],
+        "groups": [plain(g) | {"direction": by_name(g.names, g.direction)} for g in found.groups],
         "directions": directions(fisher, names),
-        "records": {file: {"level": level.rms, "effective_fraction": level.effective_fraction,
-                           "from_residual": level.from_residual, "assumed": level.assumed}
-                    for file, level in levels.items()},
+        "records": {file: {"level": level.rms, **plain(level)} for file, level in levels.items()},
         "ranked_by": found.ranked_by,
         "offers": [
             {"manoeuvre": dict(o.feasible.keys), "words": o.feasible.name, "gain": o.gain, "deviation": {
-                name: {"before": finite(o.before[i]), "after": finite(o.after[i])} for i, name in enumerate(names)
+                name: {"before": o.before[i], "after": o.after[i]} for i, name in enumerate(names)
             }} for o in found.offers
         ],
         "remarks": remarks(found),
         "for_the_record": level_remarks(found),
         "versions": versions_of(PACKAGES),
-    }  # fmt: skip
+    })  # fmt: skip
 
 
 def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
     value, half = float(found.x[i]), float(found.information.half_width[i])
     return {
-        "value": value, "unit": profile.unit, "deviation": finite(found.information.deviation[i]),
-        "deviation_with_tolerances": finite(found.wider[i]),
-        "low": finite(value - half), "high": finite(value + half),
+        "value": value, "unit": profile.unit, "deviation": found.information.deviation[i],
+        "deviation_with_tolerances": found.wider[i],
+        "low": value - half, "high": value + half,
         "bound_low": profile.box[0], "bound_high": profile.box[1], "bound_active": bool(found.at_bound[i]),
         "profile": {
             "minimum": profile.estimate, "low": profile.low, "high": profile.high,
             "bounded_low": profile.bounded[0], "bounded_high": profile.bounded[1],
             "agrees_with_curvature": profile.agrees,
-            "values": profile.values.tolist(), "rise": profile.rise.tolist(),
+            "values": profile.values, "rise": profile.rise,
         },
     }  # fmt: skip
 

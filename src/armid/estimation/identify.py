@@ -5,7 +5,8 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError, quoted
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
-from armid.estimation.information import MISFIT, Information, information_at, level_of
+from armid.estimation.information import MISFIT, Information, collinear, information_at, level_of
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.mends import Suspicion
 from armid.identifiers import Identifier, run
@@ -35,7 +36,6 @@ from armid.problem.problem import (
 from armid.problem.similarity import similarity
 from armid.problem.space import Space
 from armid.record import Campaign
-from armid.report.document import finite
 from armid.report.result import IDENTIFICATION, Kind, Result
 from armid.units import angles_in, scale_of
 
@@ -51,6 +51,10 @@ OUTSIDE = 1e-9
 INTERRUPTED = "interrupted"
 # Two estimates of one model that are more of their standard deviations apart than this are not of the same minimum.
 APART = 5.0
+# A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
+FAR_FROM_MINIMUM = 4.0
+# An estimate that is biased by more standard deviations has an interval that misses the truth in more than 8 %.
+BIASED = 0.5
 # Why there is no interval.
 NOT_ASKED = "none was asked for"
 # Where only noise is left, S2 below the first with S1 above the second: S2 pairs the few intervals between landmarks by
@@ -90,13 +94,29 @@ class JointErrors(Errors):
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """Hold one parameter, SI: value, ends of its 95 % interval, None without one, and why that does not hold, or ""."""
+    """Hold one parameter, SI.
+
+    low, high: ends of its 95 % interval, None without one. bound_low, bound_high: of the search, None if it is fixed.
+    interval_doubt: why the interval does not hold, or "". interval_by: "sensitivities" or "bootstrap", which
+    gives the bias too.
+    """
 
     value: float
-    low: float | None
-    high: float | None
     unit: str
-    doubt: str
+    low: float | None = None
+    high: float | None = None
+    bound_low: float | None = None
+    bound_high: float | None = None
+    bound_active: bool = False
+    interval_holds: bool = True
+    interval_doubt: str = ""
+    interval_by: str = ""
+    bias: float | None = None
+
+    @property
+    def doubt(self) -> str:
+        """Why the interval does not hold, or ""."""
+        return self.interval_doubt
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,11 +152,53 @@ class Identification(Result):
     suspicions: tuple[Suspicion, ...] = ()
     scatter: Scatter | None = None
 
-    @property
-    def parameters(self) -> dict[str, "ParameterEstimate"]:
+    @cached_property
+    def parameters(self) -> dict[str, ParameterEstimate]:
         """Name -> value, 95 % interval and what stands against it, SI: `found.parameters["p0"].low`."""
-        return {name: ParameterEstimate(p["value"], p["low"], p["high"], p["unit"], p.get("interval_doubt", ""))
-                for name, p in self.to_dict()["parameters"].items()}  # fmt: skip
+        return {name: self._estimate(i) for i, name in enumerate(self.space.names)}
+
+    def _estimate(self, i: int) -> ParameterEstimate:
+        name, value, space = self.space.names[i], float(self.candidate[i]), self.space
+        if not space.free[i]:
+            return ParameterEstimate(value, space.units[i])
+        k, doubt, scatter = self.information.names.index(name), self.interval_doubts[name], self.scatter
+        half = self.information.half_width[k]
+        low, high = (value - half, value + half) if scatter is None else (scatter.low[k], scatter.high[k])
+        known = bool(np.isfinite([low, high]).all())
+        return ParameterEstimate(
+            value, space.units[i], float(low) if known else None, float(high) if known else None, float(space.low[i]),
+            float(space.high[i]), bool(self.at_bound[i]), not doubt, doubt,
+            "sensitivities" if scatter is None else "bootstrap", None if scatter is None else float(scatter.bias[k]),
+        )  # fmt: skip
+
+    @cached_property
+    def interval_doubts(self) -> dict[str, str]:
+        """Free parameter -> why its interval does not hold, "" where it does."""
+        information, held = self.information, [self.space.names[i] for i in np.flatnonzero(self.at_bound)]
+        if self.scatter is not None and self.scatter.doubt:
+            return dict.fromkeys(information.names, self.scatter.doubt)
+        if self.is_far_from_minimum:
+            return dict.fromkeys(information.names, "the search has not come to the minimum")
+        if any(level.from_residual for level in information.levels):
+            return dict.fromkeys(information.names, "what the model leaves is more than the noise")
+        doubts = dict.fromkeys(information.names, "")
+        if self.scatter is not None:
+            shares = zip(information.names, self.scatter.bias / information.deviation, strict=True)
+            doubts |= {name: f"its estimate is biased by {share:.2g} standard deviations"
+                       for name, share in shares if abs(share) > BIASED}  # fmt: skip
+        doubts |= dict.fromkeys(held, "its bound holds it")
+        for pair in (pair[:2] for pair in collinear(information)):
+            for name, other in (pair, pair[::-1]):
+                if other in held and not doubts[name]:
+                    doubts[name] = f"it is correlated with {other}, which its bound holds"
+        return doubts
+
+    @property
+    def is_far_from_minimum(self) -> bool:
+        """Whether a step from the estimate would move some parameter by many standard deviations."""
+        if self.scatter is not None:
+            return self.scatter.is_far
+        return bool(np.nan_to_num(np.abs(self.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
 
     @property
     def table(self) -> "DataFrame":
@@ -354,15 +416,6 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
         unit=each[0].unit,
         span=float(np.ptp(np.concatenate([r.measured for r in replays]))),
     )
-
-
-def errors_entry(errors: Errors | None) -> dict[str, Any] | None:
-    def without_nan(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {k: without_nan(v) for k, v in value.items()}
-        return value if isinstance(value, str) else finite(value)
-
-    return None if errors is None else without_nan(asdict(errors))
 
 
 def outputs_entry(replays: Sequence[Replay]) -> dict[str, dict[str, Any]]:

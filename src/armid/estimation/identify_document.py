@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armid.engine.calibrate import NOISE_HIDES
-from armid.estimation.identify import Identification, errors_by_file, errors_entry, outputs_entry, versions_of
+from armid.estimation.identify import Identification, errors_by_file, outputs_entry, versions_of
 from armid.estimation.information import collinear
 from armid.model import Array
 from armid.problem.fitness import SIMILARITIES
@@ -27,10 +27,10 @@ from armid.report.document import (
     correlation_tables,
     curve_entry,
     error_table,
-    finite,
     listing,
     made_section,
     others_text,
+    plain,
     points,
     record_axes,
     records_note,
@@ -141,10 +141,6 @@ PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {"convergence": ("The search", "Best so far against the number of simulations.")}
 MOST_KNOWN_FIRST = 3
-# A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
-FAR_FROM_MINIMUM = 4.0
-# An estimate that is biased by more standard deviations has an interval that misses the truth in more than 8 %.
-BIASED = 0.5
 # A mean square on held-out records of more times that on the fitted ones than this.
 CARRIES_OVER = 1.5
 # Of more records than this one sentence tells.
@@ -196,7 +192,7 @@ def identify_document(
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
     begins = lead(free, result["error"]["holdout"] is not None)
-    first = f"{begins}: {'; '.join(f'{name} = {held_text(p)}' for name, p in free.items())}."
+    first = f"{begins}: {'; '.join(f'{name} = {value_text(p)}' for name, p in free.items())}."
     train, holdout = result["error"]["train"], result["error"]["holdout"]
     out = "no record was held out, so that nothing judges the model"
     if holdout is not None:
@@ -205,7 +201,7 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
               f"the noise is {noise:.3g} {unit}.{others_text(train, holdout)}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
-    lost = [name for name, p in free.items() if p["low"] is None and "bias" not in p]
+    lost = [name for name, p in free.items() if p["low"] is None and p.get("interval_by") != "bootstrap"]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
     doubts += details["warnings"]
@@ -227,10 +223,6 @@ def lead(free: Mapping[str, Mapping[str, Any]], judged: bool) -> str:
     return "Found, with 95 % intervals where they hold"
 
 
-def held_text(p: Mapping[str, Any]) -> str:
-    return value_text(p if p["interval_holds"] else {**p, "low": None})
-
-
 def parameter_table(result: Mapping[str, Any]) -> Table:
     rows = []
     for name, p in result["parameters"].items():
@@ -238,7 +230,7 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
         if p["bound_low"] is None:
             rows.append((name, factor * p["value"], unit, "fixed", "", ""))
             continue
-        absent = "none" if "bias" in p else "not determined"
+        absent = "none" if p.get("interval_by") == "bootstrap" else "not determined"
         interval = absent if p["low"] is None else f"{factor * p['low']:.6g} to {factor * p['high']:.6g}"
         bounds = f"{factor * p['bound_low']:.4g} to {factor * p['bound_high']:.4g}"
         doubted = not p["interval_holds"] and p["low"] is not None
@@ -277,25 +269,24 @@ def parts_of(found: Identification) -> Parts:
 def result_of(found: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
     names, correlation = found.information.names, found.information.correlation
-    replays, doubts = (*found.train_replays, *found.holdout_replays), interval_doubts(found)
+    replays = (*found.train_replays, *found.holdout_replays)
     roles = {r.record.file: r.record.role for r in replays}
-    by_file = {file: errors_entry(e) for file, e in errors_by_file(replays, found.candidate).items()}
-    by_record = {file: {"role": roles[file], **(e or {})} for file, e in by_file.items()}
+    by_file = errors_by_file(replays, found.candidate)
     noises: dict[str, dict[str, Any]] = {}
     for noise, r in ((r.record.noise, r) for r in replays):
         told = {"rms": noise.rms, "mean": noise.mean, "source": noise.source}
         noises.setdefault(r.record.file, dict(told, outputs={}))["outputs"][r.record.output] = told
-    return {
+    return plain({
         "campaign": found.campaign.name,
         "plant": found.model.plant.name,
         "effects": [e.name for e in found.model.effects],
-        "parameters": {name: entry(found, i, doubts) for i, name in enumerate(found.space.names)},
-        "error": {"train": errors_entry(found.train), "holdout": errors_entry(found.holdout)},
-        "error_by_record": by_record,
-        "correlation": {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
+        "parameters": found.parameters,
+        "error": {"train": found.train, "holdout": found.holdout},
+        "error_by_record": {file: {"role": roles[file], **plain(e)} for file, e in by_file.items()},
+        "correlation": {name: dict(zip(names, row, strict=True)) for name, row in zip(names, correlation, strict=True)},
         "unit": found.campaign.unit,
         "fitness": found.fitness.name,
-        "fitness_value": finite(found.value),
+        "fitness_value": found.value,
         "identifier": found.identifier,
         "budget": found.budget,
         "used": found.used,
@@ -304,53 +295,10 @@ def result_of(found: Identification) -> dict[str, Any]:
         "seed": found.seed,
         "noise": noises,
         "outputs": outputs_entry(replays),
-        "engine_error": finite(max(r.engine_error_at(found.candidate) for r in found.train_replays)),
+        "engine_error": max(r.engine_error_at(found.candidate) for r in found.train_replays),
         "model": str(found.model),
         "versions": versions_of(PACKAGES),
-    }
-
-
-def entry(found: Identification, i: int, doubts: Mapping[str, str]) -> dict[str, Any]:
-    """Return value, interval, bounds and flags of one parameter; a fixed one has neither interval nor bounds."""
-    space, value = found.space, float(found.candidate[i])
-    ends: dict[str, Any] = dict.fromkeys(("low", "high", "bound_low", "bound_high"))
-    if space.free[i]:
-        k, doubt = found.information.names.index(space.names[i]), doubts[space.names[i]]
-        half, scatter = found.information.half_width[k], found.scatter
-        low, high = (value - half, value + half) if scatter is None else (scatter.low[k], scatter.high[k])
-        ends = {"low": finite(low), "high": finite(high),
-                "bound_low": float(space.low[i]), "bound_high": float(space.high[i]),
-                "interval_holds": not doubt, "interval_doubt": doubt}  # fmt: skip
-        ends |= {} if scatter is None else {"bias": finite(scatter.bias[k])}
-    return {"value": value, "unit": space.units[i], **ends, "bound_active": bool(found.at_bound[i])}
-
-
-def interval_doubts(found: Identification) -> dict[str, str]:
-    """Return, for each free parameter, why its interval does not hold, "" where it does."""
-    information, held = found.information, [found.space.names[i] for i in np.flatnonzero(found.at_bound)]
-    if found.scatter is not None and found.scatter.doubt:
-        return dict.fromkeys(information.names, found.scatter.doubt)
-    if far_from_minimum(found):
-        return dict.fromkeys(information.names, "the search has not come to the minimum")
-    if any(level.from_residual for level in information.levels):
-        return dict.fromkeys(information.names, "what the model leaves is more than the noise")
-    doubts = dict.fromkeys(information.names, "")
-    if found.scatter is not None:
-        shares = found.scatter.bias / information.deviation
-        doubts |= {name: f"its estimate is biased by {share:.2g} standard deviations"
-                   for name, share in zip(information.names, shares, strict=True) if abs(share) > BIASED}  # fmt: skip
-    doubts |= dict.fromkeys(held, "its bound holds it")
-    for pair in (pair[:2] for pair in collinear(information)):
-        for name, other in (pair, pair[::-1]):
-            if other in held and not doubts[name]:
-                doubts[name] = f"it is correlated with {other}, which its bound holds"
-    return doubts
-
-
-def far_from_minimum(found: Identification) -> bool:
-    if found.scatter is not None:
-        return found.scatter.is_far
-    return bool(np.nan_to_num(np.abs(found.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
+    })  # fmt: skip
 
 
 def details_of(found: Identification) -> dict[str, Any]:
@@ -428,7 +376,7 @@ def bound_remark(found: Identification, i: int) -> str:
 
 def convergence_remarks(found: Identification) -> list[str]:
     said = []
-    if far_from_minimum(found):
+    if found.is_far_from_minimum:
         steps = np.abs(np.nan_to_num(found.information.step))
         name = found.information.names[int(np.argmax(steps))]
         of, better = "least-squares minimum", "Identifier least_squares on fitness rmse, a"

@@ -43,7 +43,6 @@ from armid.report.document import (
     Part,
     Section,
     Sentences,
-    Struck,
     Table,
     Text,
     changed,
@@ -51,6 +50,7 @@ from armid.report.document import (
     listing,
     made_section,
     others_text,
+    plain,
     records_note,
     rmse_text,
     stored_figures,
@@ -209,10 +209,8 @@ def error_sentence(report: Mapping[str, Any]) -> str:
 def step_table(report: Mapping[str, Any]) -> Table:
     unit, rows, last = report["unit"], [], report["error"]["before"]
     for step in report["steps"]:
-        held = {name.partition(".")[2]: p if p["interval_holds"] else {**p, "low": None}
-                for name, p in step["parameters"].items()
-                if name.startswith(f"{step['effect']}.") and p["low"] is not None}  # fmt: skip
-        own = [f"{name} {value_text(p)}" for name, p in held.items()]
+        own = [f"{name.partition('.')[2]} {value_text(p)}" for name, p in step["parameters"].items()
+               if name.startswith(f"{step['effect']}.") and p["low"] is not None]  # fmt: skip
         errors = ["none" if step["error"][which] is None else
                   f"{rmse_text(last[which], unit)} -> {rmse_text(step['error'][which], unit)}"
                   for which in ("holdout", "train")]  # fmt: skip
@@ -235,8 +233,8 @@ def log_table(log: list[Mapping[str, Any]]) -> Table:
 
 def parameter_table(report: Mapping[str, Any]) -> Table:
     before, after = report["parameters"]["before"], report["parameters"]["after"]
-    rows = [(name, held_text(p), noise_text(p), trust_text(p), held_text(before[name]) if name in before else "")
-            for name, p in after.items()]  # fmt: skip
+    rows = [(name, value_text(p, struck=True), noise_text(p), trust_text(p),
+             value_text(before[name], struck=True) if name in before else "") for name, p in after.items()]  # fmt: skip
     note = (
         "Values with 95 % intervals over all models; of noise alone: were the model in force true. Struck (~ ~) where "
         "the interval does not hold: a bound holds the value."
@@ -259,11 +257,6 @@ def noise_text(p: Mapping[str, Any]) -> str:
         return ""
     low, high = (shown(p[end], p["unit"])[0] for end in ("noise_low", "noise_high"))
     return f"{low:.5g} to {high:.5g}"
-
-
-def held_text(p: Mapping[str, Any]) -> str:
-    """Return a stored parameter, struck where it has an interval that does not hold."""
-    return value_text(p) if p["low"] is None or p["interval_holds"] else Struck(value_text(p))
 
 
 def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
@@ -324,7 +317,7 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
                for role, seen in (("train", judged.train), ("holdout", judged.holdout))}
         for name, judged in (("before", before), ("after", after))
     }  # fmt: skip
-    return {
+    return plain({
         "versions": versions_of(PACKAGES),
         "conclusion": conclusion(found),
         "shifts": shift_sentences(before, after) if found.steps else [],
@@ -338,7 +331,7 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
         "n_files": len(found.campaign.records),
         "models": models_of(found.inference),
         "advice": [a.words for a in found.advice],
-    }
+    })  # fmt: skip
 
 
 def models_of(found: Inference) -> list[dict[str, Any]]:
@@ -499,8 +492,8 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
         # A bias is told of what is trusted alone: the other may be as wrong as the one before.
         if new.trusted and old.low is not None and abs(old.value - new.value) > SHIFTED * abs(new.value):
             share = (old.value - new.value) / abs(new.value) if new.value else np.inf
-            said.append(f"{old.name} was biased by {share:+.2%}: {value_text(vars(old))} before, "
-                        f"{value_text(vars(new))} after.")  # fmt: skip
+            said.append(f"{old.name} was biased by {share:+.2%}: {value_text(old.entry)} before, "
+                        f"{value_text(new.entry)} after.")  # fmt: skip
     return said
 
 

@@ -1,14 +1,14 @@
 """What the closed loop found, for programs: the result, its parameters with their doubts, and report.json."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from armid.estimation.advice import Advice
-from armid.estimation.identify import JointErrors, errors_by_file, errors_entry, record_errors
+from armid.estimation.identify import JointErrors, errors_by_file, record_errors
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, missed_records
 from armid.inference.checks import Diagnosis, Residuals
@@ -22,7 +22,7 @@ from armid.loop.suspects import Suspect
 from armid.model import Array, Model
 from armid.problem.problem import Replay
 from armid.record import Campaign
-from armid.report.document import curve_entry, finite
+from armid.report.document import curve_entry, plain
 from armid.report.result import LOOP, Kind, Result
 
 IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
@@ -62,6 +62,16 @@ class Estimate:
         """Whether nothing speaks against the value and its interval."""
         return not self.doubts
 
+    @property
+    def interval_holds(self) -> bool:
+        """Whether there is an interval, and nothing speaks against it."""
+        return self.low is not None and not {REMAINS, HELD} & set(self.doubts)
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """The parameter as report.json holds it."""
+        return {**plain(self), "trusted": self.trusted, "interval_holds": self.interval_holds}
+
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
@@ -84,6 +94,11 @@ class Judgement:
     @property
     def diagnosis(self) -> Diagnosis:
         return self.train.diagnosis
+
+    @property
+    def entries(self) -> dict[str, dict[str, Any]]:
+        """Name -> parameter, as report.json holds them."""
+        return {e.name: e.entry for e in self.estimates}
 
     @property
     def significant(self) -> bool:
@@ -249,44 +264,38 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
     dict
         What report.json holds.
     """
-    return {
+    return plain({
         "version": VERSION,
         "campaign": found.campaign.name,
         "plant": found.campaign.plant.name,
         "unit": found.campaign.unit,
         "noise_rms": found.noise_rms,
-        "noise_rms_holdout": finite(found.before.holdout.noise_rms) if found.before.holdout is not None else None,
+        "noise_rms_holdout": None if found.before.holdout is None else found.before.holdout.noise_rms,
         "outputs": found.outputs,
         "verdict": found.verdict,
-        "also": list(found.also),
+        "also": found.also,
         "probabilities": found.inference.probabilities | {"among": among(found.inference.found.library)},
-        "effects": list(found.effects),
+        "effects": found.effects,
         "error": {"before": errors_of(found.before), "after": errors_of(found.after)},
         "error_all_records": {
-            when: dict(zip(("train", "holdout"), map(errors_entry, told), strict=True))
+            when: dict(zip(("train", "holdout"), told, strict=True))
             for when, told in found.error_all_records.items()
         },
-        "suspects": [asdict(s) for s in found.suspects],
-        "parameters": {"before": entries(found.before), "after": entries(found.after)},
+        "suspects": found.suspects,
+        "parameters": {"before": found.before.entries, "after": found.after.entries},
         "steps": [step_entry(s) for s in found.steps],
         "withdrawn": None if found.withdrawn is None else {
             "effects": [s.effect for s in found.withdrawn.steps],
             "error": {"before": errors_of(found.before), "after": errors_of(found.withdrawn.judged)},
-            "parameters": entries(found.withdrawn.judged),
+            "parameters": found.withdrawn.judged.entries,
             "steps": [step_entry(s) for s in found.withdrawn.steps],
         },
-        "advice": [
-            {
-                "manoeuvre": {k: v.item() if isinstance(v, np.generic) else v for k, v in a.manoeuvre.items()},
-                "separates": list(a.separates), "power": a.power,
-            }
-            for a in found.advice
-        ],
-        "next_steps": list(found.next_steps),
-        "known_together": list(found.known_together),
-        "taken_as_exact": list(found.campaign.taken_as_exact),
+        "advice": found.advice,
+        "next_steps": found.next_steps,
+        "known_together": found.known_together,
+        "taken_as_exact": found.campaign.taken_as_exact,
         "log": log_of(found.inference),
-    }  # fmt: skip
+    })  # fmt: skip
 
 
 def among(library: Library) -> list[int]:
@@ -296,35 +305,17 @@ def among(library: Library) -> list[int]:
 
 def step_entry(step: Step) -> dict[str, Any]:
     return {
-        "effect": step.effect, "port": step.port, "alternatives": list(step.alternatives), "empirical": step.empirical,
+        "effect": step.effect, "port": step.port, "alternatives": step.alternatives, "empirical": step.empirical,
         "claimed": step.claimed, "probability": step.probability, "error": errors_of(step.after),
-        "parameters": entries(step.after),
+        "parameters": step.after.entries,
     }  # fmt: skip
 
 
 def errors_of(judged: Judgement) -> dict[str, Any]:
     """Return the errors on train, on holdout (None where there is none) and on each record."""
     replays = (*judged.train.judged, *(judged.holdout.judged if judged.holdout is not None else ()))
-    records = {file: errors_entry(e) for file, e in errors_by_file(replays, judged.train.candidate).items()}
-    return {"train": errors_entry(judged.train_error), "holdout": errors_entry(judged.holdout_error),
-            "records": records}  # fmt: skip
-
-
-def entries(judged: Judgement) -> dict[str, dict[str, Any]]:
-    return {
-        e.name: {
-            "value": e.value,
-            "unit": e.unit,
-            "low": finite(e.low),
-            "high": finite(e.high),
-            "trusted": e.trusted,
-            "interval_holds": e.low is not None and not {REMAINS, HELD} & set(e.doubts),
-            "noise_low": finite(e.noise_low),
-            "noise_high": finite(e.noise_high),
-            "causes": list(e.causes),
-        }
-        for e in judged.estimates
-    }
+    return {"train": judged.train_error, "holdout": judged.holdout_error,
+            "records": errors_by_file(replays, judged.train.candidate)}  # fmt: skip
 
 
 def record_entries(before: Residuals | None, after: Residuals | None) -> list[dict[str, Any]]:
@@ -333,7 +324,7 @@ def record_entries(before: Residuals | None, after: Residuals | None) -> list[di
     return [
         {
             "file": old.name, "record": old.record.file, "role": old.record.role, "n_samples": len(was),
-            "noise_rms": finite(old.record.noise.rms), "unit": old.record.unit,
+            "noise_rms": old.record.noise.rms, "unit": old.record.unit,
             "error": {"before": of_output(old, before.candidate), "after": of_output(new, after.candidate)},
             "curves": {"before": curve_entry(old.times, was), "after": curve_entry(new.times, now)},
         }
@@ -341,10 +332,10 @@ def record_entries(before: Residuals | None, after: Residuals | None) -> list[di
     ]  # fmt: skip
 
 
-def of_output(replay: Replay, candidate: Array) -> dict[str, Any]:
+def of_output(replay: Replay, candidate: Array) -> JointErrors:
     errors = record_errors(replay, candidate)
     outputs = {replay.record.output: errors}
-    return errors_entry(JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)) or {}
+    return JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)
 
 
 def log_of(found: Inference) -> list[dict[str, Any]]:

@@ -7,10 +7,10 @@ word nothing themselves; each escapes what comes from files.
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from difflib import SequenceMatcher
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Union, overload
 
 import numpy as np
 
@@ -272,20 +272,34 @@ ERROR_NOTE = (
 )
 
 
-def finite(value: float | None) -> float | None:
-    """Return a float that JSON can hold, None for NaN and infinity."""
-    return None if value is None or not np.isfinite(value) else float(value)
+@overload
+def plain(value: Mapping[str, Any]) -> dict[str, Any]: ...
+@overload
+def plain(value: object) -> Any: ...
+def plain(value: Any) -> Any:
+    """Return a value as JSON holds it: a data class by the names of its fields, None for NaN and infinity."""
+    if is_dataclass(value):
+        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+    if isinstance(value, Mapping):
+        return {name: plain(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(inner) for inner in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
-def value_text(entry: Mapping[str, Any]) -> str:
-    """Return a stored parameter (value, unit, low, high) with its 95 % interval in units that people read."""
+def value_text(entry: Mapping[str, Any], struck: bool = False) -> str:
+    """Return a stored parameter (value, unit, low, high) with its 95 % interval in units that people read.
+
+    struck: whether an interval that does not hold is shown struck through; else it is left out.
+    """
     name, factor = scale_of(entry["unit"], entry["value"])
-    value = factor * entry["value"]
-    unit = "" if name == "1" else f" {name}"
-    if entry["low"] is None or entry["high"] is None:
-        return f"{value:.5g}{unit}"
-    low, high = (factor * entry[end] for end in ("low", "high"))
-    return f"{value:.5g}{unit} ({low:.5g} to {high:.5g})"
+    text = f"{factor * entry['value']:.5g}{'' if name == '1' else f' {name}'}"
+    if entry["low"] is None or entry["high"] is None or not (entry["interval_holds"] or struck):
+        return text
+    text += f" ({factor * entry['low']:.5g} to {factor * entry['high']:.5g})"
+    return text if entry["interval_holds"] else Struck(text)
 
 
 def stored_figures(titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str]) -> dict[str, tuple[Figure, ...]]:
