@@ -22,11 +22,11 @@ FIRST_STEP, LONGEST_STEP = 0.5, 0.1
 SHOWN_TO = 1.7
 # Wanted change of sqrt(rise) from point to point; steps grow and shrink by at most these factors.
 WANTED, GROWTH, SHRINKAGE = 0.45, 2.0, 0.4
-MOST_POINTS, MOST_SECANTS = 60, 12
+MOST_POINTS = 60
 # So many points at least stand between the minimum and the crossing, so that the curve is not guessed.
 FEWEST = 4
-# How closely the rise is brought to the threshold.
-CLOSE = 0.01
+# How closely a crossing is found, as a share of the step in which it lies.
+CLOSE = 1e-3
 # Relative change of chi2 at which a fit along a profile stops: far below what the threshold could see.
 TOLERANCE = 1e-7
 
@@ -178,25 +178,23 @@ def start_at(points: list[Point], place: float) -> Array:
 def crossing(held: HeldFit, side: list[Point]) -> tuple[float | None, list[Point]]:
     """Return where a side comes to the threshold (None: nowhere inside the box), and the points tried to find it.
 
-    A secant on the square root of the rise, halved where the simulation diverges.
+    Brent's method on the square root of the rise, which is next to straight; where the simulation diverges it is large.
     """
+    from scipy.optimize import brentq
+
     above = next((k for k, p in enumerate(side) if p.rise >= THRESHOLD), None)
     if above is None:
         return None, []
-    low, high, tried = side[above - 1], side[above], []
-    for _ in range(MOST_SECANTS):
-        tried.append(held(secant(low, high), low.z))
-        if abs(tried[-1].rise - THRESHOLD) < CLOSE:
-            break
-        low, high = (tried[-1], high) if tried[-1].rise < THRESHOLD else (low, tried[-1])
-    return secant(low, high), tried
+    ends, tried, height = side[above - 1 : above + 1], [], float(np.sqrt(THRESHOLD))
 
+    def beyond(place: float) -> float:
+        point = next((p for p in ends if p.place == place), None)
+        if point is None:
+            tried.append(point := held(place, ends[0].z))
+        return min(point.height, 2.0 * height) - height
 
-def secant(low: Point, high: Point) -> float:
-    if not np.isfinite(high.rise):
-        return 0.5 * (low.place + high.place)
-    share = (float(np.sqrt(THRESHOLD)) - low.height) / (high.height - low.height)
-    return low.place + float(np.clip(share, 0.05, 0.95)) * (high.place - low.place)
+    low, high = (p.place for p in ends)
+    return float(brentq(beyond, low, high, xtol=CLOSE * abs(high - low))), tried
 
 
 def between_points(held: HeldFit, points: list[Point], end: float) -> list[Point]:
