@@ -8,8 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from searches import Bowl, identifier, ran
 
-from armid.identifiers.least_squares import CENTRAL, FORWARD, slopes, stencil
-from armid.identifiers.nlopt import ALGORITHMS, optimised
+from armid.identifiers.local import ALGORITHMS, CENTRAL, FORWARD, optimised, slopes, stencil
 from armid.identifiers.search import Calls
 
 Array = NDArray[np.float64]

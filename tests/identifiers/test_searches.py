@@ -19,7 +19,7 @@ from armid.contract.identifier import Trial, run
 from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, as_identifier
 from armid.identifiers.identifier import declared
-from armid.identifiers.nlopt import ByValues
+from armid.identifiers.local import ByValues
 from armid.identifiers.pymoo_adapter import SearchAlgorithm
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter

@@ -89,7 +89,7 @@ def n_runs(out):
 
 def test_a_cluster_that_is_not_there(write_study, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("armid.study.workers.dask_pool.CONNECT_S", 0.5)
+    monkeypatch.setattr("armid.study.pool.CONNECT_S", 0.5)
     with pytest.raises(ArmidError, match=r"the Dask cluster at tcp://127\.0\.0\.1:1 does not answer"):
         run_study(write_study(), dask="tcp://127.0.0.1:1", out=tmp_path / "out")
 
@@ -113,6 +113,6 @@ class Gone:
 
 
 def test_a_cluster_that_goes_while_runs_are_made(write_study, tmp_path, monkeypatch):
-    monkeypatch.setattr("armid.study.workers.dask_pool._connected", lambda address: Gone())
+    monkeypatch.setattr("armid.study.pool._connected", lambda address: Gone())
     with pytest.raises(ArmidError, match="the Dask cluster at tcp://x:1 has gone: start again to go on"):
         run_study(write_study(), dask="tcp://x:1", out=tmp_path / "out")

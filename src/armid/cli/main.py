@@ -35,7 +35,7 @@ Completion by the shell, for good with this line in ~/.bashrc (zsh: ~/.zshrc, an
 COMMANDS = {
     "simulate": "campaign:simulate_command", "identify": "campaign:identify_command",
     "close-loop": "campaign:close_loop_command", "identifiability": "campaign:identifiability_command",
-    "list": "listing:list_command", "check": "check:check_command", "doctor": "doctor:doctor_command",
+    "list": "listing:list_command", "check": "check:check_command", "doctor": "check:doctor_command",
     "bench": "check:bench_command", "study": "study:study_command", "tune": "study:tune_command",
     "report": "report:report_command", "import": "transfer:import_group", "export": "transfer:export_group",
     "new": "new:new_command", "schema": "new:schema_command",

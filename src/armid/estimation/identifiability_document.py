@@ -77,7 +77,7 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
     bounded, unbounded = [], []
     for name, p in result["parameters"].items():
         if p["profile"]["bounded_low"] and p["profile"]["bounded_high"]:
-            bounded.append(f"{name} ({deviation_of(result, name, p['deviation'])})")
+            bounded.append(f"{name} ({deviation_text(name, p, p['deviation'])})")
         else:
             unbounded.append(name)
     said = [f"Bounded on both sides at 95 %, with this standard deviation: {', '.join(bounded)}."] if bounded else []
@@ -85,12 +85,6 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
     n = len(result["groups"])
     *others, best = result["remarks"][n:]
     return (" ".join(said) or "No parameter is free.", *result["remarks"][:n], best), tuple(others)
-
-
-def deviation_of(result: Mapping[str, Any], name: str, deviation: float | None) -> str:
-    p = result["parameters"][name]
-    value = np.inf if deviation is None else deviation
-    return scaled_text(name, p["unit"], p["bound_high"] - p["bound_low"], value, p["value"])
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
@@ -104,7 +98,7 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
         flag = "AT ITS BOUND" if p["bound_active"] else "" if profile["agrees_with_curvature"] else "THEY DIFFER"
         rows.append((name, factor * p["value"], unit, profile_text(profile, factor),
                      ", ".join(word for word in (flag, bounded) if word),
-                     deviation_of(result, name, p["deviation"]), curved))  # fmt: skip
+                     deviation_text(name, p, p["deviation"]), curved))  # fmt: skip
     columns = ["parameter", Column("value", "value", ".6g"), "unit", "95 % by profile", "remark", "deviation",
                "95 % by curvature"]  # fmt: skip
     note = "Remark: not above, not below: no bound on that side." if any(row[4] for row in rows) else ""
@@ -122,20 +116,13 @@ def profile_text(profile: Mapping[str, Any], factor: float) -> str:
     return f"{low if profile['bounded_low'] else f'box {low}'} to {high if profile['bounded_high'] else f'box {high}'}"
 
 
-def deviation_text(found: Examination, i: int, deviation: float) -> str:
-    space, place = found.space, int(np.flatnonzero(found.space.free)[i])
-    span = float(space.high[place] - space.low[place])
-    return scaled_text(space.names[place], space.units[place], span, deviation, float(found.x[i]))
-
-
-def scaled_text(name: str, unit: str, span: float, deviation: float, value: float) -> str:
-    """Return a standard deviation: in percent of a value that is no addition, else in its unit. span: of the box."""
-    if not np.isfinite(deviation):
+def deviation_text(name: str, p: Mapping[str, Any], deviation: float | None) -> str:
+    """Return a standard deviation: in percent of a value that is no addition, else in its unit; p: stored parameter."""
+    if deviation is None or not np.isfinite(deviation):
         return "not determined"
-    if "." not in name and abs(value) > 1e-3 * span:
-        return f"{100 * deviation / abs(value):.2g} %"
-    scaled, shown_unit = shown(deviation, unit)
-    return f"{scaled:.2g} {shown_unit}".removesuffix(" 1")
+    if "." not in name and abs(p["value"]) > 1e-3 * (p["bound_high"] - p["bound_low"]):
+        return f"{100 * deviation / abs(p['value']):.2g} %"
+    return "{:.2g} {}".format(*shown(deviation, p["unit"])).removesuffix(" 1")
 
 
 def offer_table(result: Mapping[str, Any], most: int = MOST_OFFERS) -> Table:
@@ -146,9 +133,10 @@ def offer_table(result: Mapping[str, Any], most: int = MOST_OFFERS) -> Table:
     n_all = len(result["parameters"])
     some = "" if len(names) == n_all else f", {len(names)} of {n_all} parameters"
     repeats = [offer for offer in offers[most:] if " once more" in offer["words"]][:1]
-    rows = [("none", *(deviation_of(result, name, result["parameters"][name]["deviation"]) for name in names), 1.0)]
+    told = {name: result["parameters"][name] for name in names}
+    rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in told.items()), 1.0)]
     for offer in (*offers[:most], *repeats):
-        cells = [deviation_of(result, name, offer["deviation"][name]["after"]) for name in names]
+        cells = [deviation_text(name, p, offer["deviation"][name]["after"]) for name, p in told.items()]
         rows.append((offer["words"], *cells, offer["gain"]))
     columns = ["one more record of", *names, Column("gain", "gain", ".3g")]
     return table(f"What one more manoeuvre would buy (deviations{some})", columns, rows)
@@ -179,7 +167,7 @@ def result_of(found: Examination) -> dict[str, Any]:
         "effects": [e.name for e in found.model.effects],
         "unit": found.campaign.unit,
         "at": "given" if found.given else "estimate",
-        "parameters": {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)},
+        "parameters": entries_of(found),
         "fixed": {n: float(v) for n, v in zip(found.space.names, found.space.fixed, strict=True) if not np.isnan(v)},
         "correlation": {name: dict(zip(names, row, strict=True)) for name, row in zip(names, correlation, strict=True)},
         "collinearity_index": collinearity_index(fisher),
@@ -196,6 +184,10 @@ def result_of(found: Examination) -> dict[str, Any]:
         "for_the_record": level_remarks(found),
         "versions": versions_of(PACKAGES),
     })  # fmt: skip
+
+
+def entries_of(found: Examination) -> dict[str, dict[str, Any]]:
+    return {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)}
 
 
 def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
@@ -228,14 +220,14 @@ def by_name(names: Sequence[str], values: Array) -> dict[str, float]:
 
 def remarks(found: Examination) -> list[str]:
     """Return what a reader must know, one sentence each: groups first, the best offer last."""
-    names, fisher = found.space.free_names, found.information.fisher
+    names, fisher, told = found.space.free_names, found.information.fisher, entries_of(found)
     said = [group_remark(found, group) for group in found.groups]
     said += [f"{p.name} is not seen at all in these records: any value in the box leaves them as they are."
              for p in found.profiles if not fisher[names.index(p.name), names.index(p.name)] > 0.0]  # fmt: skip
     said += [text for p in found.profiles if (text := profile_remark(found, p))]
     said += [f"With the constants within their tolerances, {text}." for text in found.combinations]
     if (found.wider > found.information.deviation).any():
-        each = (f"{n} {deviation_text(found, i, float(found.wider[i]))}" for i, n in enumerate(names))
+        each = (f"{n} {deviation_text(n, told[n], wide)}" for n, wide in zip(names, found.wider, strict=True))
         said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(each)}.")
     said += point_remarks(found) + level_remarks(found)
     if found.offers:
@@ -246,11 +238,10 @@ def remarks(found: Examination) -> list[str]:
 def group_remark(found: Examination, group: Group) -> str:
     span = (found.space.high - found.space.low)[found.space.free]
     leader = int(np.argmax(np.abs(group.direction)))
-    moves = []
+    moves, told = [], entries_of(found)
     for name, share in zip(group.names, group.direction, strict=True):
-        i = found.space.free_names.index(name)
-        change = 0.01 * float(share) * float(span[i])
-        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(found, i, abs(change))} of {name}")
+        change = 0.01 * float(share) * float(span[found.space.free_names.index(name)])
+        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(name, told[name], abs(change))} of {name}")
     followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
             f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
@@ -319,8 +310,9 @@ def level_text(level: Level, unit: str, noise: float) -> str:
 
 def offer_text(found: Examination, offer: Offer) -> str:
     i = offer.best
-    before, after = (deviation_text(found, i, float(d[i])) for d in (offer.before, offer.after))
-    return f"{offer.feasible.name}: {found.space.free_names[i]} from {before} to {after}"
+    name, p = found.space.free_names[i], entry(found, i, found.profiles[i])
+    before, after = (deviation_text(name, p, float(d[i])) for d in (offer.before, offer.after))
+    return f"{offer.feasible.name}: {name} from {before} to {after}"
 
 
 CURVE, QUADRATIC, LIMIT = OKABE_ITO["blue"], OKABE_ITO["vermilion"], OKABE_ITO["black"]

@@ -5,8 +5,7 @@ identifier         what an identifier is, and what an option of it is: a typed f
 search             what a search is: a function that asks for the fitness of candidates until the budget ends it
 pso                the paper's swarm
 evolutionary       pymoo's own swarm, genetic algorithm and differential evolution; CMA-ES (IPOP, BIPOP); random search
-nlopt              the local searches of NLopt
-least_squares      the trust region of scipy on the residual vector, and derivatives by differences
+local              local searches: the trust region of scipy on the residual vector, and those of NLopt
 foreign            algorithms of other libraries
 chain              identifiers one after another, and multistart
 own                how a user's own becomes an identifier

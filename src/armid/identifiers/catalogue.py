@@ -9,8 +9,7 @@ from armid.identifiers.chain import PREFIX, chain_of, multistart_of
 from armid.identifiers.evolutionary import EVOLUTIONARY
 from armid.identifiers.foreign import FOREIGN
 from armid.identifiers.identifier import Identifier, options_in
-from armid.identifiers.least_squares import LEAST_SQUARES
-from armid.identifiers.nlopt import NLOPT
+from armid.identifiers.local import LEAST_SQUARES, NLOPT
 from armid.identifiers.pso import PSO
 from armid.model import Catalogue
 

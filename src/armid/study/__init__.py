@@ -7,7 +7,7 @@ Where a run goes, in reading order:
 - inputs: what drives the machine in a manoeuvre
 - tasks: builds the list of runs of a study of either kind, and executes a single run
 - runner: run what is missing of a study
-- workers: processes on this machine that perform runs, or a cluster
+- pool, worker: processes on this machine that perform runs, or a cluster; the program of such a process
 - store: one SQLite file: the planned runs and all finished ones
 
 The other files: outcome (the values that are handed on), run_cache (what runs of one process share), loops (the kind

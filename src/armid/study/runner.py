@@ -17,13 +17,12 @@ from armid.estimation.identify import ctrl_c_waits
 from armid.progress import announced, console
 from armid.report.result import refuse_unwritable
 from armid.study.outcome import Outcome
+from armid.study.pool import DaskPool, LocalPool, WorkerSetup, performed_apart
 from armid.study.store import FILE_NAME, Counts, Store
 from armid.study.tasks import Task, read_study
-from armid.study.workers.pool import LocalPool, WorkerSetup, performed_apart
 
 if TYPE_CHECKING:
     from armid.study.results import StudyResults
-    from armid.study.workers.dask_pool import DaskPool
 
 
 TIME_LIMIT_S = 600.0
@@ -190,8 +189,6 @@ def _performed(store: Store, pool: "LocalPool | DaskPool", interrupted: Callable
 
 def _pool(jobs: int | None, dask: str | None, setup: WorkerSetup, n_runs: int) -> "LocalPool | DaskPool":
     if dask is not None:
-        from armid.study.workers.dask_pool import DaskPool
-
         return DaskPool(dask, setup)
     from joblib import cpu_count
 

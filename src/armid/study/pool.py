@@ -1,18 +1,21 @@
-"""Worker processes that perform runs, each with a time limit.
+"""Who performs the runs of a study: worker processes on this machine, each run with a time limit, or a Dask cluster.
 
 A run that takes too long is stopped, and a worker that dies is replaced; both lose no other run. A worker is a program
 of its own and no child of multiprocessing: a script needs no main guard, and workers of Dask may have workers.
 """
 
+import logging
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib import import_module
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -22,7 +25,7 @@ from typing import Any
 
 from armid.errors import ArmidError
 from armid.study.outcome import FAILED, MissingRun, Outcome
-from armid.study.workers.worker import FINISHED, READY, REFUSED
+from armid.study.worker import FINISHED, READY, REFUSED
 
 # How often a run may take its worker with it: the first time it may have been someone else's kill.
 MOST_DEATHS = 2
@@ -86,7 +89,7 @@ class Worker:
     def _start(self) -> None:
         for _ in range(MOST_STARTS):
             ours, theirs = Pipe()
-            command = [sys.executable, "-P", "-m", "armid.study.workers.worker", str(theirs.fileno()), str(os.getpid())]
+            command = [sys.executable, "-P", "-m", "armid.study.worker", str(theirs.fileno()), str(os.getpid())]
             nothing = subprocess.DEVNULL
             with self._lock, theirs, sigint_blocked():
                 if self._is_stopped:
@@ -199,3 +202,65 @@ def _cause(code: int) -> str:
         return f"by {signal.Signals(-code).name}"
     except ValueError:
         return f"by signal {-code}"
+
+
+# Time in which a cluster has to answer [s].
+CONNECT_S = 20.0
+OF_THREAD = threading.local()
+
+
+def perform_on_cluster(run: MissingRun, setup: WorkerSetup) -> Outcome:
+    """Perform a run on a worker of the cluster, in a process of its own that can be stopped."""
+    worker = getattr(OF_THREAD, "worker", None)
+    if worker is None or worker.setup != setup:
+        if worker is not None:
+            worker.stop()
+        worker = OF_THREAD.worker = Worker(setup)
+    return worker.perform(run)
+
+
+class DaskPool:
+    """Perform runs on a Dask cluster, as `LocalPool` does on this machine; runs of a lost worker are made again."""
+
+    def __init__(self, address: str, setup: WorkerSetup) -> None:
+        self.setup, self.address = setup, address
+        self._client = _connected(address)
+        self._executor = self._client.get_executor(pure=False)
+
+    @property
+    def width(self) -> int:
+        """How many runs are performed at a time; ArmidError when the cluster has gone."""
+        try:
+            if self._client.status != "running":
+                raise ConnectionError
+            return max(1, sum(map(int, self._client.nthreads().values())))
+        except OSError as error:
+            raise ArmidError(f"the Dask cluster at {self.address} has gone: start again to go on") from error
+
+    def submit(self, run: MissingRun) -> "Future[Outcome]":
+        """Perform a run as soon as a worker is idle."""
+        future: Future[Outcome] = self._executor.submit(perform_on_cluster, run, self.setup)
+        return future
+
+    def close(self) -> None:
+        """End at once; what is not finished is lost."""
+        # a scheduler that has gone has nothing to cancel
+        with suppress(OSError):
+            self._executor.shutdown(wait=False)
+        self._client.close()
+
+
+def _connected(address: str) -> Any:
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError as error:
+        raise ArmidError("a Dask cluster needs the package distributed: pip install 'armid[cluster]'") from error
+    # a lost connection ends in one sentence; each task of the library would log a traceback first
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    try:
+        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+        client.wait_for_workers(1, timeout=CONNECT_S)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise ArmidError(f"the Dask cluster at {address} does not answer, tcp://HOST:PORT of a scheduler with a worker "
+                         "is expected") from error  # fmt: skip
+    return client

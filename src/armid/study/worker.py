@@ -1,4 +1,4 @@
-"""A process that performs runs for another one: `python -m armid.study.workers.worker FILE_DESCRIPTOR PARENT`."""
+"""A process that performs runs for another one: `python -m armid.study.worker FILE_DESCRIPTOR PARENT`."""
 
 import os
 import signal
