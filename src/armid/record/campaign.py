@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,7 @@ from armid.record.record import Record, RecordWarning
 from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, load_toml, unknown_name, validated
 from armid.record.table import write_table
-from armid.report.result import Shown
+from armid.report.result import NewFiles, Shown
 from armid.units import DEG, DEGREE, angle_of
 
 if TYPE_CHECKING:
@@ -221,7 +220,7 @@ def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Map
     Parameters
     ----------
     out : str or Path
-        The new folder; it is made beside its place and then renamed, so that nothing half-written is ever there.
+        The new folder, in which nothing half-written is ever found.
     campaign_toml : str
         The text.
     tables : Mapping
@@ -241,16 +240,10 @@ def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Map
     if os.path.lexists(folder) and not (folder.is_dir() and not any(folder.iterdir())):
         raise ArmidError(f"{quoted(str(out))} exists already, a new or empty folder is expected")
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=folder.parent, prefix=".armid-") as beside:
-            made = Path(beside) / "campaign"
-            made.mkdir()
-            (made / NAME).write_text(campaign_toml, encoding="utf-8")
+        with NewFiles(folder) as files:
+            files.path(NAME).write_text(campaign_toml, encoding="utf-8")
             for file, columns in tables.items():
-                write_table(made / file, columns)
-            if folder.is_dir():
-                folder.rmdir()
-            made.rename(folder)
+                write_table(files.path(file), columns)
     except OSError as error:
         raise ArmidError(f"{quoted(str(out))} cannot be written: {error.strerror or error}") from error
     return folder

@@ -109,31 +109,20 @@ class Store:
             other = json.loads(before)["name"] if before else name
             if other != name:
                 raise ArmidError(f"{self.path} holds the study '{other}', another folder is expected for '{name}'")
-            digest = hashlib.sha256()
-            self._connection.execute("CREATE TEMP TABLE IF NOT EXISTS wanted AS SELECT * FROM plan LIMIT 0")
-            self._connection.executemany(
-                "INSERT INTO wanted VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", self._rows(planned, digest)
-            )
-            plan = digest.hexdigest()
             # an earlier version kept runs that were cut off
             cut = "SELECT run FROM identified WHERE stopped = 'interrupted'"
             self._connection.execute(f"DELETE FROM runs WHERE run IN ({cut})")
-            if plan != self._kept("plan"):
-                self._connection.execute("DELETE FROM plan")
-                self._connection.execute("INSERT INTO plan SELECT * FROM wanted")
-                kept = "SELECT run FROM plan UNION SELECT run FROM runs"
-                self._connection.execute(f"DELETE FROM settings WHERE run NOT IN ({kept})")
-            self._connection.execute("DROP TABLE wanted")
-            self._keep("plan", plan)
+            self._connection.execute("DELETE FROM plan")
+            self._connection.executemany("INSERT INTO plan VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", self._rows(planned))
+            kept = "SELECT run FROM plan UNION SELECT run FROM runs"
+            self._connection.execute(f"DELETE FROM settings WHERE run NOT IN ({kept})")
             self._keep("description", json.dumps(description, ensure_ascii=False))
 
-    def _rows(self, planned: Iterable[Planned], digest: Any) -> Iterable[tuple[Any, ...]]:
+    def _rows(self, planned: Iterable[Planned]) -> Iterable[tuple[Any, ...]]:
         """Yield rows of the plan one by one, so that a large study needs no memory, and keep their settings."""
         for place, each in enumerate(planned):
             self._connection.execute("INSERT OR IGNORE INTO settings VALUES (?, ?)", (each.run, each.settings))
-            row = (each.run, each.case, each.identifier, each.fitness, each.noise_deg_s, each.window, each.seed)
-            digest.update(repr((place, row)).encode())
-            yield (place, *row, each.budget)
+            yield (place, each.run, *each[2:])
 
     def _kept(self, key: str) -> str:
         row = self._connection.execute("SELECT value FROM study WHERE key = ?", (key,)).fetchone()
