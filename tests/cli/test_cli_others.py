@@ -101,7 +101,7 @@ def test_the_shell_completes_values(words, begun, found):
 
 def test_an_installed_package_has_no_benchmarks(monkeypatch, tmp_path):
     assert "bench" in Commands("armid").list_commands(None)
-    monkeypatch.setattr("armid.cli.main.BENCHMARKS", tmp_path / "bench")
+    monkeypatch.setattr("armid.cli.main.STUDIES", tmp_path / "studies")
     installed = Commands("armid")
     assert "bench" not in installed.list_commands(None)
     assert installed.get_command(None, "bench") is None

@@ -4,7 +4,6 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from importlib.metadata import requires, version
 from itertools import chain, count
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from armid.cli.options import command, completes, examples, give, plugin_option, say
+from armid.cli.options import command, completes, examples, give, of_studies, plugin_option, say
 from armid.errors import ArmidError, nearest
 from armid.model import PLANTS, Manoeuvre, Model
 from armid.registry import Registry, load_plugin, load_registry
@@ -130,10 +129,9 @@ def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
     The engine against scipy and a plain loop, in one run, every ratio in one table: times in microseconds a
     simulation, errors in rad/s, memory in MB beside what the results themselves take.
     """
-    sys.path.insert(0, str(Path(__file__).parents[3] / "studies"))
     load_registry(plugins)
-    rows = import_module("bench.run").run_bench(quick=quick)
-    say(*import_module("bench.measure").bench_table(rows).splitlines())
+    rows = of_studies("bench.run").run_bench(quick=quick)
+    say(*of_studies("bench.measure").bench_table(rows).splitlines())
     give(rows=[vars(row) for row in rows])
 
 

@@ -7,12 +7,11 @@ import sys
 import warnings
 from functools import partial
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import click
 
-from armid.cli.options import Heard, tell, while_read
+from armid.cli.options import STUDIES, Heard, tell, while_read
 from armid.cli.start import INTERRUPTED, end_on_request
 from armid.errors import ArmidError, on_a_line
 from armid.progress import LOG
@@ -42,15 +41,17 @@ COMMANDS = {
 }  # fmt: skip
 
 
-# The benchmarks lie in the repository; an installed package has neither them nor the command.
-BENCHMARKS = Path(__file__).parents[3] / "studies" / "bench"
+# Commands whose programs lie in the repository; an installed package has neither programs nor commands.
+BESIDE_SOURCE = ("bench", "import")
 
 
 class Commands(Heard, click.Group):
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         # click looks for the nearest name there
-        self.commands: dict[str, Any] = {name: None for name in COMMANDS if name != "bench" or BENCHMARKS.is_dir()}
+        self.commands: dict[str, Any] = {
+            name: None for name in COMMANDS if name not in BESIDE_SOURCE or STUDIES.is_dir()
+        }
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)

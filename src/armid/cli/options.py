@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -17,6 +18,16 @@ from armid.progress import LOG
 
 if TYPE_CHECKING:
     from armid.report.document import Document
+
+
+# Programs of the repository, beside the package.
+STUDIES = Path(__file__).parents[3] / "studies"
+
+
+def of_studies(module: str) -> Any:
+    """Return a module of the repository's `studies`, such as "bench.run"."""
+    sys.path.insert(0, str(STUDIES))
+    return import_module(module)
 
 
 def kept(context: click.Context, option: click.Parameter, value: bool) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from armid.cli.options import Group, examples, give, out_option, plugin_option, say
+from armid.cli.options import Group, examples, give, of_studies, out_option, plugin_option, say
 from armid.errors import ArmidError
 from armid.registry import load_registry
 from armid.report.result import NewFiles, refuse_unwritable
@@ -12,7 +12,7 @@ from armid.report.result import NewFiles, refuse_unwritable
 
 @click.group("import", cls=Group)
 def import_group() -> None:
-    """Make a campaign from public measured data.
+    """Make a campaign from public measured data, with the programs in studies/measured of the repository.
 
     The data themselves are not part of this package.
     """
@@ -34,10 +34,8 @@ def emps(folder: Path | None, out: Path, plugins: tuple[str, ...]) -> None:
     nonlinear_benchmarks (extra `measured`, needs the internet). Velocity is the encoder position through a zero-phase
     low-pass and central differences. Cite the authors.
     """
-    from armid.record.importers import import_emps
-
     load_registry(plugins)
-    told(import_emps(folder, out))
+    told(of_studies("measured.importers").import_emps(folder, out))
 
 
 @import_group.command("dfki", short_help="Import DFKI's torque-limited simple pendulum: a rotary axis that swings up.",
@@ -52,10 +50,8 @@ def dfki(folder: Path, out: Path, holdout: str | None, plugins: tuple[str, ...])
     FOLDER holds ddp_measured.csv and direct_collocation_measured.csv of the set (its licence: BSD-3-Clause). Gravity
     and inertia are estimates from CAD and nothing is free, so that what the records show beyond them is an effect.
     """
-    from armid.record.importers import import_dfki
-
     load_registry(plugins)
-    told(import_dfki(folder, out, holdout))
+    told(of_studies("measured.importers").import_dfki(folder, out, holdout))
 
 
 @click.group("export", cls=Group, short_help="Write stored results for other programs.")

@@ -13,7 +13,6 @@ sensor    step and hold of a sensor, from the values as they were read
 signal    one measured column: which rows are data, its noise, its turns
 broken    samples that are no data: clipped and repeated ones, wild ones
 record    Record (one output of one file), Piece, Noise, Irregularity: what all of that is put into
-importers public measured sets as campaigns: EMPS, and DFKI's pendulum
 """
 
 from armid.record.campaign import Campaign, read_campaign, write_campaign

@@ -10,8 +10,7 @@ import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common import main, written
-
-from armid.record.importers import read_columns
+from importers import read_columns
 
 CUT_S, PIECE_S = 12.0, 4.0
 COLUMNS = ["time_s", "current_A", "hub_angle_deg", "deflection_deg"]

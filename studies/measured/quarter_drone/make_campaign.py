@@ -16,8 +16,7 @@ from scipy.signal import savgol_filter
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common import main, written
-
-from armid.record.importers import read_columns
+from importers import read_columns
 
 FILES = {
     "multisine": "sinal4_multiseno_malha_fechada.csv",

@@ -12,8 +12,8 @@ from scipy.io import savemat
 
 from armid.errors import ArmidError
 from armid.record import read_campaign
-from armid.record.importers import import_dfki, import_emps, velocity_of
 from commands import ended
+from measured.importers import import_dfki, import_emps, velocity_of
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 NOT_AT_HAND = "the measured files are no part of the repository: ARMID_MEASURED names the folder that holds them"

@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
+from scipy.signal import butter, sosfiltfilt
 
 from armid.errors import DataError, nearest, quoted
 from armid.model import Array
@@ -96,10 +99,6 @@ def import_emps(folder: str | Path | None, out: str | Path) -> Path:
 
 def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
     """Return gain [N/V], and header -> values of a record's CSV file, from one file of the set."""
-    # half a second to load, which only this import is worth
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
     if not path.is_file():
         raise DataError(f"{quoted(str(path))} does not exist, the file {path.name} of the EMPS set is expected")
     damaged = (ValueError, TypeError, KeyError, IndexError, EOFError, OverflowError, NotImplementedError, OSError,
@@ -136,8 +135,6 @@ def velocity_of(position: Array, interval: float) -> Array:
     then differences are central. On EMPS the best fit of a free-running model is within 0.01 mm/s of the one to
     unfiltered differences; at 40 Hz it is not.
     """
-    from scipy.signal import butter, sosfiltfilt
-
     sections = butter(FILTER_ORDER, CUTOFF_HZ, fs=1 / interval, output="sos")
     return np.asarray(np.gradient(sosfiltfilt(sections, position), interval, edge_order=2), dtype=np.float64)
 
