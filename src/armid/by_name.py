@@ -23,6 +23,7 @@ from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.progress import announced, search_bar, status_line
 from armid.record import Campaign, read_campaign
+from armid.record.campaign import warned_once
 from armid.record.schema import Known, toml
 from armid.registry import Registry, load_registry, name_of
 from armid.units import ANGLES, angles_in
@@ -268,8 +269,9 @@ def identify(
     space = space or there.space()
     with angles_in(there.campaign.angle):
         suspicions = screen(there.campaign, there.model, space)
-    for suspicion in suspicions:
-        warnings.warn(suspicion.sentence, stacklevel=2)
+    with warned_once(UserWarning):
+        for suspicion in suspicions:
+            warnings.warn(suspicion.sentence, stacklevel=2)
     with search_bar(progress is True) as shown:
         followed = progress if callable(progress) else shown
         found = run(
@@ -487,7 +489,8 @@ def simulate(
     whole = replace(there.model, plant=there.campaign.declared)
     asked = {**values, **(parameters or {})}
     candidate = candidate_of(whole, there.campaign, asked)
-    tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
+    with warned_once(UserWarning):
+        tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
     for name, value in asked.items():
         warn_if_far(whole.parameters[name], [value], f"{name} = {value:g}")
     return SimulatedCampaign(there.campaign, whole, candidate, tables)

@@ -2,14 +2,17 @@
 
 import json
 import logging
+import warnings
+from functools import partial
 from shutil import copytree
 from threading import Event, Thread
 
 import pytest
 
-from armid.cli.main import show_warning, tell_more
+from armid.cli.main import show_warning
 from armid.cli.options import command
 from armid.progress import announced
+from armid.record.campaign import warned_once
 from armid.report import files, html, style
 from armid.report.document import Column, Struck, Table, table
 from armid.report.terminal import print_table
@@ -179,11 +182,15 @@ def test_options_of_every_identifier_have_a_meaning(run):
 
 
 def test_a_warning_of_no_record_is_told_once_and_not_as_that_of_a_file(capsys):
-    seen = {}
-    for message in ("tables are in pieces", "tables are in pieces", "c/a.csv: late by 1 ms", "c/b.csv: late by 2 ms"):
-        show_warning(seen, message)
-    tell_more(seen)
+    seen: set[str] = set()
+    told = ("tables are in pieces", "tables are in pieces", "c/a.csv: late by 1 ms", "c/b.csv: late by 2 ms")
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.showwarning = partial(show_warning, seen)
+        with warned_once(UserWarning):
+            for message in told:
+                warnings.warn(message, stacklevel=1)
     assert capsys.readouterr().err.splitlines() == [
-        "armid: warning: tables are in pieces", "armid: warning: c/a.csv: late by 1 ms",
-        "armid: warning: what holds for c/a.csv holds for c/b.csv too",
-    ]  # fmt: skip
+        "armid: warning: tables are in pieces",
+        "armid: warning: c/a.csv: late by 1 ms; the same with other numbers: b.csv",
+    ]

@@ -2,7 +2,6 @@
 
 import gc
 import io
-import re
 import sys
 import warnings
 from functools import partial
@@ -17,8 +16,6 @@ from armid.errors import ArmidError, on_a_line
 from armid.progress import LOG
 
 BAD_INPUT = 2
-# Places that are named of those that a warning is told of once.
-MOST_MORE = 3
 EPILOG = """\b
 Examples:
   armid new campaign my_axis                          a folder to put your own records into
@@ -81,27 +78,16 @@ def app() -> None:
     """
 
 
-def show_warning(seen: dict[str, list[str]], message: Warning | str, *_: Any, **__: Any) -> None:
-    """Tell a warning; of those that differ in the record and in numbers alone the first, and the others at the end."""
-    file, is_of_file, what = str(message).partition(".csv: ")
-    alike = seen.setdefault(re.sub(r"\d[\d.e+-]*", "", what) if is_of_file else str(message), [])
-    if not alike:
+def show_warning(seen: set[str], message: Warning | str, *_: Any, **__: Any) -> None:
+    """Tell a warning, each once."""
+    if str(message) not in seen:
+        seen.add(str(message))
         tell(f"armid: warning: {message}")
-    if is_of_file or not alike:
-        alike.append(f"{file}.csv")
-
-
-def tell_more(seen: dict[str, list[str]]) -> None:
-    for first, *others in seen.values():
-        if others:
-            more = f", and {len(others) - MOST_MORE} more" if len(others) > MOST_MORE else ""
-            tell(f"armid: warning: what holds for {first} holds for {', '.join(others[:MOST_MORE])}{more} too")
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run a command; bad input gives one sentence and exit code 2."""
-    seen: dict[str, list[str]] = {}
-    warnings.showwarning = partial(show_warning, seen)
+    warnings.showwarning = partial(show_warning, set())
     # imports and figures make many objects that stay: looking through them every 700 is a tenth of a short command
     gc.set_threshold(20_000)
     LOG.setLevel("INFO")
@@ -136,8 +122,6 @@ def main(arguments: list[str] | None = None) -> None:
         if place is None:
             raise
         stop(f"plug-in {place}, fails: {type(error).__name__}: {error}", BAD_INPUT)
-    finally:
-        tell_more(seen)
     sys.exit(code if isinstance(code, int) else 0)
 
 

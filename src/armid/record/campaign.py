@@ -250,20 +250,22 @@ def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Map
 
 
 @contextmanager
-def warned_once() -> Iterator[None]:
+def warned_once(kind: type[Warning] = RecordWarning) -> Iterator[None]:
     """Warn of what holds for several records once, with their names; numbers are those of the first."""
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RecordWarning)
+        warnings.simplefilter("always", kind)
         yield
     alike: dict[str, list[tuple[str, str, type[Warning]]]] = {}
     for warning in caught:
-        file, _, said = str(warning.message).partition(f"{SUFFIX}: ")
-        key = re.sub(r"\d[\d.e+-]*", "", said)
-        alike.setdefault(key, []).append((f"{file}{SUFFIX}", said, warning.category))
+        file, dot, said = str(warning.message).partition(f"{SUFFIX}: ")
+        key = re.sub(r"\d[\d.e+-]*", "", said) if dot else file
+        alike.setdefault(key, []).append((f"{file}{dot.removesuffix(': ')}", said, warning.category))
     for (first, said, category), *others in alike.values():
         names = [file.rpartition("/")[2] for file, _, _ in others]
         more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-        if all(also == said for _, also, _ in others):
+        if not said:
+            sentence = first
+        elif all(also == said for _, also, _ in others):
             sentence = f"{', '.join([first, *names[:MOST_NAMED]])}{more}: {said}"
         else:
             sentence = f"{first}: {said}; the same with other numbers: {', '.join(names[:MOST_NAMED])}{more}"
