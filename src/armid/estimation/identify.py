@@ -108,7 +108,7 @@ class ParameterEstimate:
     bound_low: float | None = None
     bound_high: float | None = None
     bound_active: bool = False
-    interval_holds: bool = True
+    interval_holds: bool = False
     interval_doubt: str = ""
     interval_by: str = ""
     bias: float | None = None
