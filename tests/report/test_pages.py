@@ -228,6 +228,14 @@ def test_a_damaged_result_is_one_sentence(tmp_path):
         assert not re.search(r"\n|Error|Expecting|line 1|codec", str(caught.value))
 
 
+def test_a_result_without_its_details_is_one_sentence(tmp_path):
+    """As `armid export reports` writes it."""
+    folder = write_loop(tmp_path / "loop")
+    (folder / "details.json").unlink()
+    with pytest.raises(ArmidError, match=r"or a file beside it, is not what `armid close-loop` writes"):
+        document_of(folder, LOOP, "x")
+
+
 def test_a_number_that_no_float_holds_is_damage_too(tmp_path):
     with pytest.raises(ArmidError, match="damaged or changed"), refuse_damaged(tmp_path, LOOP):
         float(10**400)

@@ -30,7 +30,8 @@ ODD_NAMES = "backslashreplace"
 # Letters of a result's `repr`.
 MOST_LETTERS = 1_500
 # What making a document of damaged numbers raises.
-UNSHOWABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError)
+UNSHOWABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError,
+              FileNotFoundError)  # fmt: skip
 Draw = Callable[[], Any]
 
 
