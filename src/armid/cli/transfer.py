@@ -10,7 +10,7 @@ from armid.registry import load_registry
 from armid.report.result import NewFiles, refuse_unwritable
 
 
-@click.group("import", cls=Group)
+@click.group("import", cls=Group, short_help="Make a campaign from public measured data.")
 def import_group() -> None:
     """Make a campaign from public measured data, with the programs in studies/measured of the repository.
 
