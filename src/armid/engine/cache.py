@@ -95,7 +95,7 @@ class KeptCode:
 
 @cache
 def stamp_of(of: str) -> str:
-    """Return the digest of a file, a name that is none as it is."""
+    """Return the digest of a file; a name without a file stays as it is."""
     return hashlib.sha256(Path(of).read_bytes()).hexdigest() if os.path.isfile(of) else of
 
 
@@ -152,7 +152,7 @@ def cache_folder() -> Path:
 
 
 def kept_in() -> Path | None:
-    """Return the folder of compiled code, None where none can be used, which is told once."""
+    """Return the folder of compiled code, None where none can be used, with one warning."""
     folder = cache_folder()
     why = unusable(folder)
     if why:

@@ -39,7 +39,7 @@ LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 SMALLEST, LARGEST = 2.2250738585072014e-308, 1.7976931348623157e308
 # Angles beyond are reduced one by one.
 FAR = 1e5
-# pi in three parts: k PI_A is taken off x with one rounding, which is none, and PI_B and PI_C are what PI_A lacks.
+# pi in three parts: subtracting k PI_A from x is exact, and PI_B and PI_C are what PI_A lacks.
 PI_A, PI_B, PI_C = 3.141592653589793, 1.2246467991473532e-16, -2.9947698097183397e-33
 
 
@@ -179,7 +179,7 @@ def define_unary(names: tuple[Any, ...], implementation: Callable[..., Any]) -> 
 
 
 def define_binary(names: tuple[Any, ...], implementation: Callable[..., Any]) -> None:
-    """Give numba functions of two arguments of which at least one is lanes."""
+    """Give numba functions of two arguments, at least one of them lanes."""
     LANE_FUNCTIONS.update(names)
     for name in names:
 

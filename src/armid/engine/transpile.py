@@ -66,7 +66,7 @@ def plain_function(function: Callable[..., Any]) -> Any:
 
 
 def with_values(definition: ast.FunctionDef, function: FunctionType) -> ast.FunctionDef:
-    """Put values in the place of defaults, and make every argument one that can be named."""
+    """Replace defaults by values, and make every argument one that can be named."""
     values = function.__defaults__ or ()
     for value in values:
         if not isinstance(value, NUMBERS):

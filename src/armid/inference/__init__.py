@@ -5,7 +5,7 @@ In reading order:
 infer         the whole way: campaign -> probabilities and intervals
 whitening     train records with their noise -> residuals whose noise is white
 library       the candidate effects, compiled together and ready to be tried
-hypothesis    what may be true of the machine or its records beside the declared model
+hypothesis    what the declared model of the machine and its records may lack
 decisions     prior beliefs, from calibration.toml, and all other numbers that decide
 kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form
 model         a model at its estimate; `unknowns`: constants, faults and drifts, fitted with their priors

@@ -98,7 +98,7 @@ def outside(train: Residuals, holdout: Residuals, inside: slice) -> dict[str, tu
 
 
 def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
-    """Return the parameters of which a change would explain the error of a record, the likeliest first."""
+    """Return the parameters whose change would explain the error of a record, the likeliest first."""
     if not fit.n_free:
         return {}
     records = WhiteRecords(holdout.replays, fit.records.space, holdout.data)

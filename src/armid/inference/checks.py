@@ -26,8 +26,8 @@ LAGS, N_BINS = 40, 12
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
 # Neighbouring ordinates of a tapered periodogram tell partly the same; a band needs so many of the rest.
 INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
-# Mains and their harmonics are looked for; a line of a rest has so many times the power beside it, which is so many
-# widths 1/T of the rest away.
+# Frequencies of mains and number of their harmonics. LINE: power of a line of a rest over that of its neighbours;
+# BESIDE: distance of these, in widths 1/T of the rest.
 MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
 # Products of columns whose share of the largest is below this are rounding.
 DEPENDENT = 1e-11
@@ -67,7 +67,7 @@ class Residuals:
 
     @cached_property
     def diagnosis(self) -> "Diagnosis":
-        """Tests of size, time, dependence and frequency; what diverges is no noise, whatever they would make of it."""
+        """Tests of size, time, dependence and frequency; a simulation that diverges fails without them."""
         if not np.isfinite(self.residual).all():
             return Diagnosis((Finding("size", "all records", np.inf, 0.0),), self.data.known)
         tests = (size_tests, repeat_tests, time_tests, dependence_tests, band_tests)
@@ -104,20 +104,20 @@ class Residuals:
 
     @cached_property
     def renewed(self) -> list[Array]:
-        """What each sample of the residual brings beyond what its neighbour told, by record: e_t - rho e_(t-1)."""
+        """What each sample of the residual adds to its neighbour, by record: e_t - rho e_(t-1)."""
         pairs = [(x, self.memory.get(r.place, 0.0)) for x, r in
                  zip(self.data.by_record(self.residual), self.replays, strict=True)]  # fmt: skip
         return [x if rho == 0.0 else np.append(x[:1], x[1:] - rho * x[:-1]) for x, rho in pairs]
 
     @cached_property
     def raw(self) -> list[Array]:
-        """What is left of each record, not whitened, 0 where a sample is no data."""
+        """What is left of each record, not whitened, 0 where a sample is invalid."""
         pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
         return [(r.measured - r.signal(self.candidate[np.newaxis])[0]) * sound for r, sound in pairs]
 
     @property
     def judged(self) -> tuple[Replay, ...]:
-        """The replays whose errors count: where a sample is no data, the simulated one stands for it."""
+        """The replays whose errors count: invalid samples are replaced by simulated ones."""
         pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
         return tuple(r if sound.all() else
                      with_samples(r, np.where(sound > 0.0, r.measured, r.signal(self.candidate[np.newaxis])[0]))

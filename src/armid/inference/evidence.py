@@ -29,9 +29,9 @@ from armid.model import Array
 
 # Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude.
 SCALES = np.array([0.03, 0.1, 0.3, 1.0])
-# Fewest independent samples of a residual that is no noise.
+# Fewest independent samples of a residual that is more than noise.
 FEWEST = 10.0
-# Beyond this an exponential is no number of use.
+# Largest exponent: exp(500) is still far from overflow.
 LARGEST_EXPONENT = 500.0
 LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))
 
@@ -197,7 +197,7 @@ class Forecast:
 
     @property
     def posterior(self) -> float:
-        """Log odds that it holds beside the fit."""
+        """Log odds of the model with it against the model without."""
         return self.total + self.proposal.hypothesis.log_prior
 
     def best(self, n: int) -> list[tuple[int, float]]:
@@ -208,7 +208,7 @@ class Forecast:
 
 
 def forecast(about: Expansion, proposal: Proposal) -> Forecast:
-    """Return the log Bayes factor of a proposal beside a fit, to first order."""
+    """Return the log Bayes factor of a fit with a proposal against the fit alone, to first order."""
     if proposal.joint:
         return joint_forecast(about, proposal)
     square, slope, answer = about.squares(proposal.columns)
@@ -259,7 +259,7 @@ def log_evidence(about: Expansion) -> float:
     found += float(np.sum(np.log(density)))
     _, means, deviations = fit.records.rows
     found -= 0.5 * float(np.sum(((fit.x[fit.records.rows[0]] - means) / deviations) ** 2))
-    # Of what samples lose, as of what they tell, only the independent ones count.
+    # Samples that are left out count as all others do: only independent ones.
     share = scale.n / len(fit.residual)
     found -= 0.5 * float(sum(f.value**2 + share * f.unknown.lost(f.value) for f in fit.others))
     found -= 0.5 * fit.records.data.log_cover

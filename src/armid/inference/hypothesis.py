@@ -12,7 +12,7 @@ from armid.model import Array
 
 @dataclass(frozen=True, order=True)
 class Hypothesis:
-    """Name one thing that may be true beside the declared model.
+    """Name one thing that the declared model may lack.
 
     kind: "effect" (an effect of the library), "record" (a fault of one record), "drift" (a parameter or constant that
     changes from record to record) or "unknown" (a signal without a form). name: the public name. form: which published
@@ -38,7 +38,7 @@ Hypotheses = frozenset[Hypothesis]
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Hold one hypothesis beside a fit, to first order.
+    """Hold what one hypothesis changes in a fit, to first order.
 
     columns: change of the whitened signal per full strength, (n_variants, n_samples). joint: whether all columns act
     together, each with a strength of its own; otherwise exactly one of them holds. one_sided: whether strengths are

@@ -67,7 +67,7 @@ class Inference:
 
     @cached_property
     def in_force(self) -> Hypotheses:
-        """The most probable model of which every part has a name; where none is right, the one that predicts best."""
+        """The most probable model whose parts all have names; where no model is right, the one that predicts best."""
         named = [m for m, _ in self.found.ranked() if not any(h.kind == "unknown" for h in m)]
         if self.posterior.probability("unknown") < MENTIONED:
             return named[0]
@@ -91,7 +91,7 @@ class Inference:
         }  # fmt: skip
 
     def partners(self, model: Hypotheses, hypothesis: Hypothesis) -> dict[str, float]:
-        """Return the effects that may stand in the place of one of a model, with the probability of such sets."""
+        """Return the effects that may replace one of a model, with the probability of such sets."""
         rest, found = {h.public for h in model} - {hypothesis.public}, dict[str, float]()
         for names, p in self.posterior.sets.items():
             named = {n for n in names if n[0] != "unknown"}
@@ -146,7 +146,7 @@ def sentence_of(chances: Mapping[str, Any]) -> str:
 
 
 def listed(probabilities: Mapping[str, float]) -> dict[str, float]:
-    """Return the probabilities that are told, the largest first."""
+    """Return the probabilities that are listed, the largest first."""
     told = {name: p for name, p in probabilities.items() if p >= LISTED}
     return dict(sorted(told.items(), key=lambda pair: -pair[1]))
 
@@ -251,8 +251,8 @@ def declared_fit(library: Library) -> Fit:
 def with_scales(library: Library) -> tuple[Library, Fit]:
     """Return the library with the sizes that the declared fit shows, and that fit.
 
-    The drive's column is no effort where it is in volts or a duty and the gain is a free parameter: the scale of effort
-    is the largest one of the drive at the declared fit. A strength of the declared model that sits at the end of its
+    The drive's column is in volts or a duty where the gain is a free parameter: the scale of effort is the largest
+    effort of the drive at the declared fit. A strength of the declared model that sits at the end of its
     declared range, which is a multiple of the machine's scales, gets a wider one; a range that the user gave stays.
     """
     fit = declared_fit(library)

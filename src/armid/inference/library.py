@@ -389,8 +389,8 @@ def calibrated_replays(
     """Make records ready to be simulated, on the engine's standard accuracy or one that a decision cannot tell from it.
 
     near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
-    each sampling interval, which stands for the others. noise: of each record [its unit]; hidden: mean square of the
-    engine's error, in units of it, that may be.
+    each sampling interval, for all others of that interval. noise: of each record [its unit]; hidden: largest mean
+    square of the engine's error, in units of the noise.
     """
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
     for i, name in enumerate(space.free_names):

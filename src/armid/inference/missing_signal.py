@@ -222,7 +222,7 @@ class Probe:
 
 
 STRENGTHS = 10.0 ** np.arange(-8.0, 6.0, 0.5)
-# Beside the squared second differences (up to 16): keeps straight lines from being free.
+# Added to the squared second differences (up to 16): keeps straight lines from being free.
 LITTLE = 1e-6
 # Smaller eigenvalues of the normal equations, relative to the largest, are rounding.
 ROUNDING = 1e-13
@@ -355,7 +355,7 @@ def dependence(segments: Sequence[Segment], port: str, variable: str, factor: st
 
 
 def hats(values: Array, first: float, last: float, n_knots: int = N_HEIGHTS) -> Array:
-    """Return triangles over a range: at each value the weights of the two knots beside it, (n, n_knots)."""
+    """Return triangles over a range: at each value the weights of its two neighbouring knots, (n, n_knots)."""
     place = np.clip((values - first) / (last - first), 0.0, 1.0) * (n_knots - 1)
     return np.maximum(0.0, 1.0 - np.abs(place[:, np.newaxis] - np.arange(n_knots)))
 

@@ -1,6 +1,6 @@
 """The posterior over models: probabilities of hypotheses and sets, and intervals that count what may be missing.
 
-Every fitted model has its posterior weight; beside each model that was expanded, what was not fitted counts to first
+Every fitted model has its posterior weight; hypotheses that were not fitted with an expanded model count to first
 order. A parameter's interval holds 95 % of the mixture of all (Hoeting and others 1999, doi:10.1214/ss/1009212519).
 """
 
@@ -101,7 +101,7 @@ class Posterior:
     def causes(self, parameter: str, noise: float, beside: str = CONSTANTS) -> list[tuple[str, float]]:
         """Return what makes the interval of a parameter wide, with shares of the variance, the largest first.
 
-        noise: deviation by noise alone, SI. beside: what else the most probable model has as unknowns.
+        noise: deviation by noise alone, SI. beside: name of the other unknowns of the most probable model.
         """
         i = self.parameters.index(parameter)
         best = self.atoms[int(np.argmax(self.weights))]
@@ -115,7 +115,7 @@ class Posterior:
             more = weight * ((atom.mean[i] - best.mean[i]) ** 2 + atom.deviation[i] ** 2 - own)
             for name in names:
                 away[name] = away.get(name, 0.0) + float(more) / len(names)
-        # What narrows it is no cause; what other models add to the variance is theirs in these proportions.
+        # Only what widens an interval is a cause; other models share their part of the variance in these proportions.
         away = {name: size for name, size in away.items() if size > 0.0}
         scale = max(whole - own, 0.0) / max(sum(away.values()), 1e-300)
         found = {"noise": min(noise**2, own), beside: max(own - noise**2, 0.0)}
@@ -125,7 +125,7 @@ class Posterior:
 
 
 def posterior(found: Exploration) -> Posterior:
-    """Return the mixture of all models that were fitted, and of what may stand beside those that were expanded."""
+    """Return the mixture of all fitted models, and of the hypotheses that were forecast with the expanded ones."""
     library, scale = found.library, found.scale()
     own = tuple(n for n in found.declared.values if library.owner(n) is None)
     ranked, atoms = found.ranked(), []
@@ -156,7 +156,7 @@ def beside(
     found: Exploration, model: Hypotheses, value: float, about: Expansion, own: Sequence[str], mean: Array,
     covariance: Array, top: float, left: frozenset[tuple[str, str]],
 ) -> list[Atom]:  # fmt: skip
-    """Return the atoms of what was not fitted beside a model that was expanded, to first order."""
+    """Return the atoms of an expanded model with one hypothesis that was forecast and not fitted, to first order."""
     fit = about.fit
     places = [list(fit.values).index(n) for n in own]
     span, atoms = fit.records.span[places], []
@@ -183,7 +183,7 @@ def beside(
 
 
 def truncated(mean: float, deviation: float) -> tuple[float, float]:
-    """Return mean and deviation of a normal distribution of which only the positive part holds."""
+    """Return mean and deviation of the positive part of a normal distribution."""
     if mean < -5.0 * deviation:
         size = deviation**2 / max(-mean, 1e-300)
         return size, size

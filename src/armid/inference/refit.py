@@ -47,14 +47,14 @@ def accurate(fit: Fit, library: Library) -> Fit:
 
 
 # Shares of their range from which all shapes begin; then each alone from the best of so many places along its range:
-# the best period of a sampled control is a narrow one; of what is no time an eighth of them will do.
+# the best period of a sampled control is narrow; for shapes that are not times an eighth of the places is enough.
 STARTS, N_PLACES = (0.03, 0.5), 384
 # Values at which a shape is held in turn where a fit only crept, and the fall of chi2 in a step that leads on from one.
 N_HELD, LEADING = 8, 1e-2
 
 
 def continued(fit: Fit, shapes: Set[str]) -> list[Array]:
-    """Return for each shape that is no time the best estimate with it held in turn from its largest value to its least.
+    """Return for each shape but times the best estimate with it held in turn from its largest value to its least.
 
     Each begins where the last one ended, the other shapes held as they are: over a wide sign chi2 is smooth, and leads
     to where steps over a narrow one would only creep (continuation).

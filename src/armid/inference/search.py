@@ -35,7 +35,7 @@ from armid.model import Array
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
 # Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
 N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 8, 3, 3, 3, 2
-# Best models beside which a signal without a form is fitted.
+# Best models to which a signal without a form is added.
 N_BESIDE = 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 16, 8
@@ -149,10 +149,10 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
 
 
 def add_unknown(found: Exploration) -> bool:
-    """Fit a signal without a form beside the best models; tell whether there is a new one.
+    """Add a signal without a form to the best models; tell whether there is a new one.
 
-    Where the best model leaves noise alone, beside those with a name less: names that are not the machine's may
-    together explain what has none.
+    Where the best model leaves noise alone, to those with a name less: several wrong names together can explain an
+    effect that the library does not hold.
     """
     ranked = found.ranked()
     if any(h.kind == "unknown" for m in found.fits for h in m):
@@ -189,7 +189,7 @@ def next_model(found: Exploration) -> Hypotheses | None:
 
 
 def is_outdone(model: Hypotheses, value: float, ranked: Sequence[tuple[Hypotheses, float]]) -> bool:
-    """Tell whether a model with fewer of its hypotheses is more probable: then nothing is looked for beside it."""
+    """Tell whether a model with fewer of its hypotheses is more probable: such a model is not expanded."""
     return any(less < model and more > value for less, more in ranked)
 
 
@@ -203,7 +203,7 @@ def with_constants(fit: Fit, constants: Sequence[Unknown], weight: float) -> Fit
 
 
 def expand(found: Exploration, model: Hypotheses) -> None:
-    """Fit what leads beside a model: additions of every kind, pairs, swaps, drops, free shapes."""
+    """Fit the most promising changes of a model: additions of every kind, pairs, swaps, drops, free shapes."""
     fit, library, scale = found.fits[model], found.library, found.scale()
     library = library.about(fit.records.replays, fit.misfit) if fit.base is None else library
     library.say(f"expanding {words(model)}")
@@ -255,7 +255,7 @@ def best_begun(
 def exchanges(found: Exploration, model: Hypotheses, fit: Fit, limit: float) -> list[Trial]:
     """Return the fits in which another effect takes the place of one of several, by its first steps there.
 
-    The effect that explains most alone may be the wrong one beside the others.
+    The effect that explains most alone may be wrong together with the others.
     """
     scale, trials = found.scale(), []
     several = [h for h in sorted(model) if h.kind == "effect"]
@@ -373,7 +373,7 @@ def likest(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, 
 def swapped(
     fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library, weight: float
 ) -> Fit | None:
-    """Return the model with one effect in the place of another, its shapes free where those of the other are."""
+    """Return the model with one effect replaced by another, its shapes free where those of the old one are."""
     new: EffectKey = proposal.hypothesis.means
     grid = proposal.grid
     active = tuple(k for k in fit.active if k != key)

@@ -1,4 +1,4 @@
-"""Unknowns of a fit beside the parameters of the engine: constants within tolerances, sizes of faults, drifts.
+"""Unknowns of a fit that are not parameters of the engine: constants within tolerances, sizes of faults, drifts.
 
 Each has a normal prior with a standard deviation of 1 in its own unit: min |r(z, v)|^2 + |v|^2. About known values v0
 the signals answer to v along columns C, so that the best v of each candidate z is had by a projection (Golub, Pereyra
@@ -45,7 +45,7 @@ class Unknown:
 
     moved: the records as they are with a value of it. lost: samples that a value leaves out. column: of records, a
     candidate and a value, how much of the residual a unit of it takes away; None: by differences. product: which
-    constants it is, None for what is no constant.
+    constants it is, None for other unknowns.
     """
 
     name: str
@@ -138,7 +138,7 @@ def freed(
     """Return a fit with some unknowns freed, from where it stands: min weight |r|^2 + |v|^2.
 
     base: the records of the fit before any of the unknowns was moved. weight: of each square, see `evidence.Scale`.
-    limit: as of `descend`. rough: a few steps.
+    limit: see `descend`. rough: a few steps.
     Raises ArmidError where it diverges.
     """
     known = {f.unknown.name: f.value for f in fit.others}

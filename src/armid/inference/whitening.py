@@ -166,7 +166,7 @@ class Cover:
 class WhitenedData:
     """Hold records with their noise, the outputs of one file as a record each.
 
-    levels: noise of each record. sound: 0 where a sample is no data, else 1, (n_samples,). estimates: where those of
+    levels: noise of each record. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of
     fits are kept, None: nowhere. cover: of a signal without a form; None for none.
     """
 
@@ -206,7 +206,7 @@ class WhitenedData:
         """Return signals of all records, each (n_candidates, n_samples of the record), whitened and end to end."""
         triples = zip(self.levels, signals, self.lengths, strict=True)
         white = np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
-        # What is no data weighs nothing, whoever asks.
+        # Invalid samples have weight 0.
         white = white if self.sound.all() else white * self.sound
         return white if self.cover is None else self.cover.white(white)
 
@@ -222,8 +222,7 @@ class WhitenedData:
     def trust(self, residual: Array) -> Array:
         """Return the weight of each sample in intervals: 1, or n_eff/chi2 in records whose residual tells of more.
 
-        In those whose residual is no noise the residual itself, with its correlation in time, is what scatters (as in
-        `information.level_of`).
+        Where the residual is more than noise its own size and correlation in time count (as in `information.level_of`).
         """
         found = []
         for level, part in zip(self.levels, self.by_record(residual), strict=True):
@@ -252,7 +251,7 @@ def soundness(record: Record, reach: int) -> Array:
     sound = []
     for piece in record.pieces:
         apart = np.diff(np.arange(piece.measured.size)[piece.samples])
-        # of a sensor that holds its value, or comes rarely, the usual distance is no gap
+        # of a sensor that holds its value, or comes rarely, the usual distance is not a gap
         near = np.append(True, apart <= 1.5 * np.median(apart)) if apart.size else np.ones(piece.n_samples, np.bool_)
         unsound = ~near
         for _ in range(reach - 1):

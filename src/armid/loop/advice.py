@@ -10,7 +10,7 @@ from armid.inference.hypothesis import words
 from armid.inference.infer import Inference
 from armid.model import Array
 
-# Manoeuvres that are told, and models between which one is to decide.
+# Manoeuvres that are listed, and models that one has to tell apart.
 MOST_ADVICE, MOST_RIVALS = 5, 4
 
 

@@ -70,7 +70,7 @@ def close_loop(
     """Find what a declared model lacks on the train records of a campaign, and judge it on those held out.
 
     Infer how probable each missing effect, each fault of a record and something without a name is; take the most
-    probable model of which every part has a name; simulate the records held out, and withdraw the last steps that they
+    probable model whose parts all have names; simulate the records held out, and withdraw the last steps that they
     deny.
 
     Parameters
@@ -145,7 +145,7 @@ def close_loop(
     in_force = found.found.fits[path[kept]]
     missing = missing_of(in_force, found.found.library, told) if curve and not implausible else None
     advice = advice_on(found, campaign.gyro_range, threads, told) if TOO_ALIKE in verdicts else ()
-    # Other suspicions rest on the declared model: they are told where nothing better was found.
+    # Other suspicions rest on the declared model: they are reported where nothing better was found.
     at_a_loss = not {UNEXPLAINED, CARRIES_NOT, PARTLY}.isdisjoint(verdicts) and not any(s.claimed for s in steps)
     screened = (*screened, *given_twice(campaign.records))
     told_first = dict.fromkeys(s.sentence for s in screened if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
@@ -231,7 +231,7 @@ def verdicts_of(
     found: Inference, accused: Sequence[Hypothesis], after: Judgement, steps: Sequence[Step],
     withdrawn: Withdrawn | None,
 ) -> tuple[str, ...]:  # fmt: skip
-    """Return the verdicts that hold, each in one word, the one to be told first before the others."""
+    """Return the verdicts that hold, each in one word, the most important first."""
     post = found.posterior
     unknown = post.probability("unknown") >= MENTIONED
     verdicts = [CARRIES_NOT] if withdrawn is not None or after.fails_to_carry_over else []

@@ -183,7 +183,7 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
 
 
 def ends_of(p: Mapping[str, Any], factor: float) -> list[list[float]]:
-    """Return how far an interval reaches below and above its value, [[below], [above]]; 0 where there is none.
+    """Return how far an interval reaches below and above its value, [[below], [above]]; 0 without an interval.
 
     The interval counts all models, and the value is that of one: it need not lie in the middle, nor inside.
     """

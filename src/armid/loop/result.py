@@ -32,7 +32,7 @@ IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAI
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
-# Causes of the width of an interval that are told; models that are listed.
+# Causes of the width of an interval that are listed; models that are listed.
 MOST_CAUSES, MOST_LISTED = 2, 30
 # Of the keys of report.json: 2 came with probabilities.
 VERSION = 2
@@ -155,7 +155,7 @@ class ClosedLoop(Result):
     verdict: "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
     "partly_explained", "unexplained" or "cannot_tell_apart"; also: the others that hold. before, after: the declared
     model, and the model in force, with the effects that earned their place. withdrawn: what the held-out records
-    denied, None where nothing. next_steps: what to do beside the record that is advised, in words. known_together:
+    denied, None where nothing. next_steps: what to do as well as the advised record, in words. known_together:
     which parameters and constants the train records give only together, in words. suspects: records that differ, and
     samples that are no data; error_all_records: "before" and "after" -> errors on train and holdout with nothing left
     out. inference: all models that were fitted, and how probable each is. missing: the signal that the model in force

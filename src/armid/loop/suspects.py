@@ -25,7 +25,7 @@ class Suspect:
     """Say how one record differs.
 
     kind: "late", "clock" (fast by a share), "offset", "drift", "gain", "start", "label" (another load or key than
-    told), "trend" (of all records: by how much the parameter is larger in this one, the last, than in the
+    declared), "trend" (of all records: by how much the parameter is larger in this one, the last, than in the
     first), or of samples "gap", "clipped", "stuck", "spikes". value, low, high: size with its 95 % interval
     [unit]; from_s, to_s: where it is [s]; None where there is no such thing. action: "freed" (undone) or "left_out" (of
     samples). output: whose sensor it is, "" where the plant has but one, and of the whole file. parameter: what has
@@ -108,13 +108,14 @@ def suspect_sentence(s: Suspect) -> str:
         size = f"{factor * abs(s.value):.3g}{unit} ({factor * low:.3g} to {factor * high:.3g})"
         names = " or ".join(s.parameter.split(", "))
         return (f"{names} is {size} {grew} in {s.record}, the last record, than in the first, and changes from each to "
-                "the next, as of a machine that warms up, wears or runs in; so it is taken.")  # fmt: skip
+                "the next, as in a machine that warms up, wears or runs in; corrected.")  # fmt: skip
     if s.kind == "late":
         word = "late" if s.value > 0.0 else "early"
         low, high = sorted((1e3 * abs(s.low), 1e3 * abs(s.high)))
-        return f"{s.record}: starts {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}); so it is taken."
-    words = {"start": "starts elsewhere than told, by", "offset": "its sensor is off by", "gain": "its gain is off by",
-             "drift": "its sensor drifts by", "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
+        return f"{s.record}: starts {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}); corrected."
+    words = {"start": "starts elsewhere than declared, by", "offset": "its sensor is off by",
+             "gain": "its gain is off by", "drift": "its sensor drifts by",
+             "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
     where = f"{s.record}, {s.output}" if s.output else s.record
     size = f"{factor * s.value:.3g}{unit} ({factor * s.low:.3g} to {factor * s.high:.3g})"
-    return f"{where}: {words} {size}; so it is taken."
+    return f"{where}: {words} {size}; corrected."

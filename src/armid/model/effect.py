@@ -8,7 +8,7 @@ from armid.errors import ModelError, nearest
 from armid.model.parameter import Parameter, check_name
 
 Equation = Callable[..., Any]
-# How the nodes of a composed model begin: an effect of this name could not be told from them.
+# How the nodes of a composed model begin: an effect of this name would look like them.
 RESERVED = ("rate", "initial", "guard")
 SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
 SIZE_WIDTH = replace(SIGN_WIDTH, note="speed over which the size of speed is smoothed")
@@ -76,7 +76,7 @@ class Effect:
     """Declare an addition: plain scalar functions whose argument names are the binding.
 
     Own parameters and states are looked up first, then the plant's names. `adds` maps a port to the function whose
-    value is added there. `binds` maps an argument to the name that it stands for, for an effect that is written once
+    value is added there. `binds` maps an argument to the name that it means, for an effect that is written once
     for several variables. At the null values the model equals the model without the effect.
 
     form, forms: where one effect has several published forms, `form` says in a word which one this is and `forms` holds

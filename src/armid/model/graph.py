@@ -317,7 +317,7 @@ def equations_text(plant: Plant, effects: tuple[Effect, ...], graph: Graph) -> s
 def returned_text(function: Equation, names: Mapping[str, str] | None = None) -> str:
     """Return the expression that a function returns, or its call when it has several lines.
 
-    names: argument -> what stands for it, those that are bound; None: every argument for itself.
+    names: argument -> the name that replaces it, for bound ones; None: every argument keeps its name.
     """
     names = {a: a for a in inspect.signature(function).parameters} if names is None else names
     expression = returned_expression(function, names)
@@ -325,7 +325,7 @@ def returned_text(function: Equation, names: Mapping[str, str] | None = None) ->
 
 
 class Insert(ast.NodeTransformer):
-    """Put expressions in the place of names, and drop the prefix of numpy."""
+    """Replace names by expressions, and drop the prefix of numpy."""
 
     def __init__(self, known: Mapping[str, ast.expr]) -> None:
         self.known = known

@@ -145,9 +145,9 @@ def own_equations(effect: Effect, plant: Plant) -> object:
 
 
 def applicable(effects: Mapping[str, Effect], plant: Plant) -> dict[str, Effect]:
-    """Return the effects of which a plant offers the ports and names; nothing is compiled.
+    """Return the effects whose ports and names a plant offers; nothing is compiled.
 
-    effects: name -> effect. An effect of which only another form fits comes in that form.
+    effects: name -> effect. An effect comes in another form where only that fits.
     """
     fitting = {name: [e for e in effect.every_form if not refusal_of(e, plant)] for name, effect in effects.items()}
     return {name: forms[0] for name, forms in fitting.items() if forms}
@@ -156,7 +156,7 @@ def applicable(effects: Mapping[str, Effect], plant: Plant) -> dict[str, Effect]
 def is_late_as_a_whole(plant: Plant) -> bool:
     """Tell whether an effect can only delay the drive with the part of it that follows the motion, as a back-EMF does.
 
-    A late voltage then moves the machine as a late torque and another inertia do, and cannot be told from them. Where
+    A late voltage then moves the machine as a late torque and another inertia do, and no record separates them. Where
     the plant offers the quantity or input `voltage` and the port `winding`, the voltage can be late alone.
     """
     drive, voltage, *motion = (plant.aliases.get(a, a) for a in ("drive_effort", "voltage", "omega", "theta"))

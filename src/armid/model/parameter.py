@@ -29,7 +29,7 @@ class Parameter:
     low, high: bounds of the search, SI (or multiples of the scale).
     null: the value at which an effect vanishes (None for a parameter of a plant or of an effect's shape).
     fixed: the value at which it stays unless someone frees it (None: it is free).
-    nominal: the value a simulation takes when nobody says another (None: `null`, then `fixed`, then there is none).
+    nominal: the value of a simulation without another one (None: `null`, then `fixed`, else it has to be given).
     note: what it is, in words.
     """
 
@@ -48,7 +48,7 @@ class Parameter:
             raise ModelError(f"parameter '{self.name}' has low {self.low} and high {self.high}: low < high is expected")
 
 
-# By such a factor a value misses its declared range that was told in another unit: degrees, percent, MPa.
+# By such a factor a value misses its declared range that was given in another unit: degrees, percent, MPa.
 FAR = 20.0
 
 

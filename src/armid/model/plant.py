@@ -1,4 +1,4 @@
-"""What the machine was told to do, on the time grid of its record."""
+"""What the machine was made to do, on the time grid of its record."""
 
 import math
 from collections.abc import Collection, Iterable, Mapping
@@ -77,7 +77,7 @@ class Manoeuvre:
 class Constant:
     """Declare a known quantity with its default value, SI.
 
-    tolerance: relative half-range within which the value is known: 0 for an exact one, None where that is not said,
+    tolerance: relative half-range within which the value is known: 0 for an exact one, None where it is not declared,
     which counts as exact until a campaign says otherwise. low, high: what is physically possible, ends included.
     """
 
@@ -104,7 +104,7 @@ class Input:
         as the campaign says.
     typical: smallest and largest usual value, between which `armid check` moves it; None: half the effort scale.
 
-    Raises ModelError for another hold, and for a typical range that is none.
+    Raises ModelError for another hold, and for an empty typical range.
     """
 
     name: str
@@ -129,7 +129,7 @@ class ManoeuvreKey:
     """Declare a key of a campaign's record that sets a constant: constant = factor x value.
 
     low, high: allowed range in the key's own unit; boolean: true and false stand for 1 and 0.
-    unlike: a constant whose value this one must not have, "" for none: a target that is no start.
+    unlike: a constant whose value this one must not have, "" for none: a target must differ from the start.
     """
 
     key: str

@@ -17,7 +17,7 @@ from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-# A drift is asked of so many files.
+# Fewest record files for a drift to be considered: with fewer a drift is a fault of one record.
 FEWEST = 4
 # Its largest plausible size, as a share of the range or of the constant; prior deviations as shares of that.
 LARGEST, SCALES = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])

@@ -16,7 +16,7 @@ from armid.inference.unknowns import freed, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-# Shares of the range over which a strength is tried: a slope, and two secants where the answer is no straight line.
+# Shares of the range over which a strength is tried: a slope, and two secants where the response is not linear.
 SLOPE = 1e-3
 SHARES = (SLOPE, 0.05, 0.4)
 # Variants of a forecast from which a fit may start.

@@ -131,7 +131,7 @@ def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array]:
 
 
 def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
-    """Yield what may be wrong in a record; what is of its whole file is told of the first of its outputs."""
+    """Yield what may be wrong in a record; faults of a whole file belong to its first output."""
     model, record = base.model, base.data.records[index]
     yield from (Fault(kind) for kind in OF_SENSOR)
     if index != of_file(base, index)[0]:
@@ -175,7 +175,7 @@ def with_measured(base: WhiteRecords, index: int, changes: Sequence[Array]) -> W
 
 
 def with_shared_starts(replays: Sequence[Replay], inside: Sequence[int]) -> tuple[Replay, ...]:
-    """Return replays of which some are outputs of one file: these share manoeuvres, and starts fitted to all of them.
+    """Return replays; outputs of one file share their manoeuvre and a start fitted to all of them.
 
     A simulation is shared by its manoeuvres, and a start is corrected by what all outputs show.
     """

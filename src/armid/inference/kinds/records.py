@@ -22,7 +22,7 @@ SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
 
 @dataclass(frozen=True)
 class OfRecord:
-    """Say which fault of which record."""
+    """Name a fault and its record."""
 
     index: int
     fault: Fault
@@ -47,7 +47,7 @@ class OfRecord:
 
 
 def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
-    """Return what may be wrong in one of several records; of a single one nothing can be said."""
+    """Return what may be wrong in one of several records; a single record has nothing to compare it with."""
     if len({r.file for r in records.data.records}) < 2:
         return []
     found = []

@@ -119,7 +119,7 @@ def propose(fit: Fit, library: Library) -> list[Proposal]:
 def refit(
     library: Library, which: tuple[str, str], fit: Fit, about: Expansion, ahead: Forecast, limit: float
 ) -> Fit | None:
-    """Return the model beside a signal without a form: fitted with its covariance, taken about its own estimate."""
+    """Return the model with a signal without a form: fitted with its covariance, taken about its own estimate."""
     again, scale = fit, ahead.best(1)[0][1]
     for _ in range(2):
         columns = signals_without_form(again, library).columns.get(which)

@@ -187,7 +187,7 @@ late_feedback_of_plant = Effect(
     ),
     note="the control switches and commands late", source=DEAD_TIME,
 )  # fmt: skip
-# Behind a motor that induces a voltage of its own a late voltage is no late torque: taken for one it bends the inertia.
+# With a back EMF a late voltage is not a late torque: taken for one it bends the inertia.
 # Where the plant holds the control itself, with a port for its command, that is what is late.
 late_command_of_record = replace(
     torque_delay, name="controller_delay", form="command", note="the command acts a dead time late"

@@ -41,7 +41,7 @@ actuator_lag = Effect(
     note="the actuator follows late, first order, up to half a second",
     source="Mahony, Kumar, Corke 2012, doi:10.1109/MRA.2012.2206474 (rotors)",
 )  # fmt: skip
-# Behind a motor that induces a voltage of its own a lagging voltage is no lagging torque: taken for one it bends the
+# Behind a motor that induces a voltage of its own a lagging voltage is not a lagging torque: taken for one it bends the
 # inertia. Where the plant computes its own command, the port of that command takes the lag.
 voltage_lag = replace(
     actuator_lag, form="voltage", unless="command", adds={"winding": drive_lag_effort},

@@ -220,8 +220,8 @@ torque_offset = Effect(
 def ripple_torque(theta, sine, cosine, waves):
     """Effort of one harmonic, sine sin(waves theta) + cosine cos(waves theta).
 
-    Cogging, pole pairs, teeth, an eccentric wheel, the pitch of a screw. A wave as long as the motion is no ripple, and
-    could stand for anything that depends on position: hence `waves` from 20.
+    Cogging, pole pairs, teeth, an eccentric wheel, the pitch of a screw. A wave as long as the motion could
+    be anything that depends on position: hence `waves` from 20.
     """
     return sine * np.sin(waves * theta) + cosine * np.cos(waves * theta)
 
@@ -241,7 +241,7 @@ torque_ripple = Effect(
 def cogging_torque(theta, sine, cosine, waves, second):
     """Effort of the magnets, wave(waves theta) + second wave(2 waves theta), wave(a) = sine sin a + cosine cos a.
 
-    `waves` from 20, as of `torque_ripple`: a wave as long as the motion could stand for gravity.
+    `waves` from 20, as in `torque_ripple`: a wave as long as the motion could stand for gravity.
     """
     a = waves * theta
     return sine * (np.sin(a) + second * np.sin(2 * a)) + cosine * (np.cos(a) + second * np.cos(2 * a))
@@ -268,7 +268,7 @@ def spring_torque(theta, stiffness):
 position_spring = Effect(
     name="position_spring", adds={"torque": spring_torque},
     parameters=(Parameter("stiffness", "effort/speed/s", -0.5, 0.5, null=0.0, note="negative: it drives outwards"),),
-    note="effort in proportion to position, as of cables", source="doi:10.1007/978-3-319-32552-1",
+    note="effort in proportion to position, such as cables", source="doi:10.1007/978-3-319-32552-1",
 )  # fmt: skip
 
 EFFECTS = (

@@ -8,7 +8,7 @@ from armid.model.effect import Delay, Effect, State, slope_itself, start_speed, 
 from armid.model.parameter import Parameter
 from armid.model.plant import Output, Plant
 
-# Unit of an output -> unit of its bias; another unit stands for itself.
+# Unit of an output -> unit of its bias; other units stay as they are.
 SCALES = {"rad/s": "speed", "m/s": "speed", "rad": "speed*s", "m": "speed*s", "N": "effort", "N m": "effort"}
 
 
