@@ -1,8 +1,9 @@
 """Unknowns of a fit that are not parameters of the engine: constants within tolerances, sizes of faults, drifts.
 
-Each has a normal prior with a standard deviation of 1 in its own unit: min |r(z, v)|^2 + |v|^2. About known values v0
-the signals answer to v along columns C, so that the best v of each candidate z is had by a projection (Golub, Pereyra
-1973, doi:10.1137/0710036): min over z of (r + C v0)' (1 + C C')^-1 (r + C v0). The columns are taken anew at each turn.
+Each has a normal prior with a standard deviation of 1 in its own unit: min weight |r(z, v)|^2 + |v|^2 over parameters z
+and unknowns v. Both take their steps together (Levenberg, Marquardt). A column of v costs a simulation, so that columns
+serve until a step falls short of what they foretell. Where candidates z are only ranked, v takes its best values about
+known ones v0 by a projection (Golub, Pereyra 1973, doi:10.1137/0710036): (r + C v0)' (1 + C C')^-1 (r + C v0).
 """
 
 from collections.abc import Callable, Mapping, Sequence
