@@ -29,7 +29,7 @@ from armid.inference.library import EffectKey, Library
 from armid.inference.model import Fit
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
-from armid.inference.unknowns import Unknown, constants_of, freed
+from armid.inference.unknowns import Unknown, constants_of, freed, projected
 from armid.model import Array
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
@@ -50,6 +50,8 @@ MOST_COMPLETED = 4
 NEAR = 2.0
 # Rivals that differ from the best model in one name and are brought to their estimates.
 N_TWINS = 3
+# Strengths at which a swapped effect is tried, as multiples of the linear guess.
+STRENGTHS = 2.0 ** np.arange(-4, 5)
 # Models of each size that are expanded outside the window where more than noise is left.
 BEAM = 3
 
@@ -375,12 +377,14 @@ def swapped(
 ) -> Fit | None:
     """Return the model with one effect replaced by another, its shapes free where those of the old one are."""
     new: EffectKey = proposal.hypothesis.means
-    grid = proposal.grid
-    active = tuple(k for k in fit.active if k != key)
-    values = {n: v for n, v in fit.values.items() if not key.owns(n)}
-    values |= grid[variant].at(float(np.clip(strength, 0.01, library.reach)))
     new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
-    return near(fit, (*active, new), values, library, weight)
+    active = (*(k for k in fit.active if k != key), new)
+    posed = effects.beside(fit, active, library)
+    values = {n: v for n, v in fit.values.items() if not key.owns(n)}
+    shares = np.clip(strength * STRENGTHS, 0.01, library.reach)
+    starts = np.array([start_of(posed, values | proposal.grid[variant].at(float(share))) for share in shares])
+    best = int(np.argmin(projected(fit, posed, weight).chi2(starts)))
+    return effects.fitted(fit, posed, active, [starts[best]], library, weight)
 
 
 def pairs(

@@ -37,7 +37,7 @@ from armid.problem.starts import fits_starts, with_starts
 STEP = 1e-2
 # Most steps of a rough fit, the fall of the weighted sum of squares at which a fit has arrived, and the share of the
 # fall that was foretold below which columns are taken anew.
-MOST_ROUGH, SETTLED, FORETOLD = 5, 0.1, 0.7
+MOST_ROUGH, SETTLED, FORETOLD = 8, 0.1, 0.7
 
 
 @dataclass(frozen=True, eq=False)
