@@ -73,7 +73,7 @@ RECIPES = {
     )),
     "benchmark": study("benchmark", "ecdf", "critical_difference_0_3_deg_s"), "best_chain": study("best_chain"),
     "coverage": Recipe(("python studies/interval_coverage.py --out out/coverage --noises 52",)),
-    "blind": scored("blind", "confusion", "held_out", before=((BLIND, f"{STAND} blind {BLIND} --seed 179"),)),
+    "blind": scored("blind", "held_out", before=((BLIND, f"{STAND} blind {BLIND} --seed 179"),)),
     "cramer_rao": study("cramer_rao", "cramer_rao"), "fitness": study("fitness", "fitness"),
     "dfki_pendulum": loop("dfki_pendulum", "residuals", campaign="out/campaigns/dfki"),
     "emps": loop("emps", "residuals", campaign="out/campaigns/emps", more=(

@@ -1,4 +1,4 @@
-"""Figures of a blind suite: what was answered on which effect, errors on records held out, advice."""
+"""Figures of a blind suite: errors on records held out, advice."""
 
 import math
 from collections.abc import Mapping
@@ -25,28 +25,6 @@ def new(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[F
 
 def legend_below(figure: Figure, axis: Any, columns: int = 3) -> None:
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=columns, frameon=False)
-
-
-def counts_figure(counts: Mapping[str, DataFrame]) -> Figure:
-    """Draw numbers of campaigns as heat maps side by side, true effects down; the colour is the share of the row.
-
-    counts: title -> numbers, all with the same rows.
-    """
-    rows, columns = next(iter(counts.values())).shape
-    figure, axes = new(2.6 + 0.5 * columns * len(counts), 2.6 + 0.30 * rows, 1, len(counts))
-    for axis, (title, numbers) in zip(axes, counts.items(), strict=True):
-        shares = numbers.div(numbers.sum(axis=1).replace(0, np.nan), axis=0).fillna(0.0).to_numpy(float)
-        axis.pcolormesh(shares, vmin=0.0, vmax=1.0, cmap="Blues", edgecolors="0.9", linewidth=0.5)
-        for i, j in np.argwhere(numbers.to_numpy(int) > 0):
-            ink = "white" if shares[i, j] > 0.55 else "0.1"
-            axis.text(j + 0.5, i + 0.5, f"{numbers.iat[i, j]}", ha="center", va="center", fontsize=10, color=ink)
-        axis.set_title(title, fontsize="medium")
-        axis.set(ylim=(rows, 0))
-        axis.set_yticks(np.arange(rows) + 0.5, numbers.index if axis is axes[0] else [""] * rows)
-        axis.set_xticks(np.arange(columns) + 0.5, numbers.columns, rotation=50, ha="right", rotation_mode="anchor")
-        axis.tick_params(length=0)
-    axes[0].set_ylabel("true effect")
-    return figure
 
 
 def held_out_figure(parts: Mapping[str, DataFrame], limit: float) -> Figure:

@@ -21,10 +21,10 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from matplotlib.figure import Figure
-from pandas import DataFrame, crosstab
+from pandas import DataFrame
 
 from blind import advice, families, tables
-from blind.figures import advice_figure, counts_figure, held_out_figure
+from blind.figures import advice_figure, held_out_figure
 from stand import RefusalError
 from stand.command import Parser, carry_out
 from stand.score.judge import judge_all, read_json
@@ -41,12 +41,6 @@ TWO = (
 )
 UNLISTED = "The arm has an effect that no library holds: a name may explain a part, but not be said to explain all."
 ONE_STROKE = "One lowering stroke, with one effect at its middle size or none: what can be known there is little."
-CONFUSION = (
-    "Single effects, a row each: campaigns by what was answered; the colour is the share of the row. Left: campaigns "
-    "in which the effect moves the held-out error of the best declared model by more than 20 % of its noise; right: "
-    "the others, on which the best answer may be silence. Named first of a group: the truth is named, with others that "
-    "cannot be told from it. Held by a group: another is named, and the truth among those that cannot be told from it."
-)
 HELD_OUT = (
     "RMSE on the records held out over the noise that is really in them, before and after the loop, one pair of marks "
     "a campaign; the dashed line is what is aimed at."
@@ -151,18 +145,8 @@ def suite_parts(
         every[name] = [times[c][i] if c in times else None for c in every["campaign"]]
     rows = every[every["judgement"] != tables.MISSING]
     sections["Answers"] = [tables.answers_by_class(every)]
-    single = tables.of_class(rows, "single")
-    if len(single):
-        held, effects = single["matters"].astype(bool), sorted(set(single["truth"]))
-        halves = {"moves the held-out error by more than 20 %": single[held], "moves it less": single[~held]}
-        counts = {
-            title: crosstab(part["truth"], part["answer"]).reindex(index=effects, columns=tables.ANSWERS, fill_value=0)
-            for title, part in halves.items() if len(part)
-        }  # fmt: skip
-        sections["Answers"] += [
-            tables.answers_by_effect(rows),
-            drawn(out, "confusion", "True effect and answer", CONFUSION, counts_figure(counts)),
-        ]
+    if len(tables.of_class(rows, "single")):
+        sections["Answers"] += [tables.answers_by_effect(rows), tables.answers_given(rows)]
     sections["False alarms"] = [tables.false_alarms(rows)]
     for label, title, words in (("two", "Two effects at once", TWO), ("unlisted", "Unlisted effects", UNLISTED),
                                 ("one_stroke", "One stroke only", ONE_STROKE)):  # fmt: skip

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from pandas import DataFrame, Series
+from pandas import DataFrame, Series, crosstab
 from scipy.stats import binomtest
 
 from stand.arm import PARAMETERS
@@ -165,6 +165,22 @@ def answers_by_effect(rows: DataFrame) -> Table:
             "n_held": ("move > 20 %", ".0f"), "right": ("right of these", ".0f"), "wrong": ("wrong alone", ".0f"),
             "before": ("error/noise before", ".3g"), "after": ("after", ".3g"), "said": "what was said"}  # fmt: skip
     return Table("effects", "Answers by true effect", words, DataFrame(lines), show)
+
+
+def answers_given(rows: DataFrame) -> Table:
+    """Return a row for each true effect of single ones, and the number of campaigns with each answer."""
+    single = of_class(rows, "single")
+    moves = single["matters"].astype(bool).map({True: "more than 20 %", False: "20 % or less"}).rename("moves")
+    counts = crosstab([moves, single["truth"]], single["answer"]).reindex(columns=ANSWERS, fill_value=0)
+    counts = counts.sort_index(level="moves", ascending=False, sort_remaining=False).astype(object)
+    frame = counts.where(counts > 0, None).reset_index()
+    words = (
+        "Single effects: numbers of campaigns with each answer, from the best answer to the worst; empty: none. moves "
+        "the error: how far the effect moves the held-out error of the best declared model, in units of its noise. "
+        "Named first of a group: the group holds effects that cannot be told apart. Held by a group: another is first."
+    )
+    show = {"moves": "moves the error", "truth": "true effect"} | {a: (a, ".0f") for a in ANSWERS}
+    return Table("confusion", "True effect and answer", words, frame, show)
 
 
 def false_alarms(rows: DataFrame) -> Table:
