@@ -56,7 +56,7 @@ def test_too_few_realisations_and_bounds_that_do_not_exist_say_nothing():
 def test_summary_over_cases():
     rows = pd.concat([estimates(50, s).assign(case=f"row {i}") for i, s in enumerate([0.01, 0.03])])
     found = efficiencies(rows)
-    pyplot().close(cramer_rao_figure(found))
+    pyplot().close(cramer_rao_figure(found, dict.fromkeys(found["variant"], 0)))
     line = summary(found).frame.iloc[0]
     ratios = found["ratio"].to_numpy()
     assert (line["n_cases"], line["n"]) == (2, 100)

@@ -5,8 +5,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_results import MadeResults
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_rgba
 
+from armid.report.document import Figure
+from armid.report.style import line_look
 from armid.study.analyses.analysis import Evidence
+from armid.study.analyses.cramer_rao import CRAMER_RAO, LEAST_REALISATIONS
 from armid.study.analyses.errors import (
     MOST_POINTS,
     brief,
@@ -21,8 +26,9 @@ from armid.study.analyses.errors import (
 from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
 from armid.study.analyses.loops import loop_runs
 from armid.study.analyses.overview import main_table, reasons, runs_table
-from armid.study.analyses.success import parts as success_parts
-from armid.study.analyses.success import success, success_figure, success_rates, wilson
+from armid.study.analyses.success import SUCCESS, success, success_figure, success_rates, wilson
+from armid.study.analyses.table1 import TABLE1
+from armid.study.analyses.table2 import TABLE2
 from armid.study.document import report_of, summary_of
 
 
@@ -84,9 +90,31 @@ def test_success_rates_show_their_interval_in_percent():
 
 def test_the_figure_of_success_has_the_best_on_top():
     frame = pd.concat([outcomes_with([1.0, 1e-5]), outcomes_with([1e-6, 1e-6]).assign(variant="de")])
-    figure = success_figure(success_rates(frame))
+    figure = success_figure(success_rates(frame), {"pso": 0, "de": 1})
     assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == ["de", "pso"]
     plt.close(figure)
+
+
+@pytest.mark.parametrize("report", ["table1", "table2"])
+def test_an_identifier_has_one_colour_in_every_figure(made, report):
+    results = made(seeds=LEAST_REALISATIONS, report=report)
+    results.study["plugins"] = ["mine.py:cmaes"]
+    evidence = Evidence(results)
+    assert next(iter(evidence.colours)) == "cmaes"
+    expected = {v: to_rgba(line_look(i)["color"]) for v, i in evidence.colours.items()}
+    analyses = (SUCCESS, CRAMER_RAO, {"table1": TABLE1, "table2": TABLE2}[report])
+    for figure in (p for a in analyses for p in a.parts(evidence) if isinstance(p, Figure)):
+        drawn = figure.draw()
+        axis, found = drawn.axes[0], {}
+        names = [t.get_text().splitlines()[0] for t in axis.get_yticklabels()]
+        clouds = [m for m in axis.collections if isinstance(m, PathCollection)]
+        marks = [(y, to_rgba(c)) for m in clouds for (_, y), c in zip(m.get_offsets(), m.get_facecolors(), strict=True)]
+        marks += [(np.mean(line.get_ydata()), to_rgba(line.get_color())) for line in axis.lines]
+        for y, colour in marks:
+            found.setdefault(names[min(max(round(y), 0), len(names) - 1)], set()).add(colour)
+        assert all(expected[v] in found[v] for v in expected), figure.name
+        assert not any(expected[v] in found[w] for v in expected for w in expected if v != w), figure.name
+        plt.close(drawn)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +125,7 @@ def evidence(made):
 def test_success_rates_come_in_the_order_of_the_settings_not_as_the_runs_do(made):
     evidence = Evidence(made(seeds=2))
     evidence.runs = evidence.runs.iloc[::-1]
-    table, _ = success_parts(evidence)
+    table, _ = SUCCESS.parts(evidence)
     assert list(dict.fromkeys(table.frame["setting"])) == evidence.settings
 
 

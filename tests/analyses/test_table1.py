@@ -130,7 +130,8 @@ def test_the_papers_line_comes_first_with_its_own_bound_flagged():
 
 
 def test_figure_shows_every_run_and_the_paper():
-    figure = table2_figure(two_records(), published(2.0, 4.0))
+    runs = two_records()
+    figure = table2_figure(runs, published(2.0, 4.0), dict.fromkeys(runs["variant"], 0))
     marks = sum(len(line.get_xdata()) for line in figure.axes[0].lines if line.get_ls() == "None")
     assert marks == 2 + 4
     plt.close(figure)

@@ -1,7 +1,7 @@
 """The style of every figure, and how figures are written."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextvars import ContextVar
 from io import StringIO
 from pathlib import Path
@@ -276,10 +276,29 @@ def line_look(i: int) -> dict[str, Any]:
 
 def variant_handles(colours: Mapping[str, int]) -> list[Any]:
     """Return what a legend shows of marks in the colours of identifiers, in their order."""
+    return [mark_handle(name, "o", line_look(i)["color"]) for name, i in legend_rows(colours)]
+
+
+def mark_handles(labels: Iterable[str]) -> list[Any]:
+    """Return what a legend shows of marks of different shapes, whose colour says something else."""
+    return [mark_handle(label, marker_of(k), INK) for k, label in enumerate(labels)]
+
+
+def mark_handle(label: str, marker: str, colour: str) -> Any:
     from matplotlib.lines import Line2D
 
-    return [Line2D([], [], ls="", marker="o", mfc="none", mec=line_look(i)["color"], label=name)
-            for name, i in legend_rows(colours)]  # fmt: skip
+    return Line2D([], [], ls="", marker=marker, mfc="none", mec=colour, label=label)
+
+
+def marker_of(k: int) -> str:
+    return MARKERS[k % len(MARKERS)]
+
+
+def draw_intervals(axis: Any, x: Array, y: Array, low: Array, high: Array, k: int, numbers: Iterable[int]) -> None:
+    """Draw marks of one shape, k, with their intervals along x; numbers: of the colour of each mark."""
+    colours = [line_look(i)["color"] for i in numbers]
+    axis.errorbar(x, y, xerr=np.array([x - low, high - x]).clip(min=0.0), fmt="none", ecolor=colours, elinewidth=1.4)
+    axis.scatter(x, y, c=colours, marker=marker_of(k), s=26, zorder=3)
 
 
 def write_name(axis: Any, name: str, place: float, number: int) -> None:

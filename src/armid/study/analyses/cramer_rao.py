@@ -1,6 +1,6 @@
 """Scatter of the estimates over noise realisations against its Cramer-Rao bound."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import COLOURS, MARKERS, legend_below, panels, row_names
+from armid.report.style import draw_intervals, legend_below, mark_handles, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence
 
 # A standard deviation within these, in units of the bound, is what an efficient estimate has.
@@ -44,8 +44,8 @@ TABLE_CAPTION = (
 )
 FIGURE_CAPTION = (
     "Standard deviation over the noise realisations divided by the Cramer-Rao bound, with its 95 % interval, a mark "
-    "and colour a case. The band spans 0.9 to 1.1; left of 1 by more than chance would be too good to be true, unless "
-    "a bound of the box holds runs back."
+    "a case and a colour an identifier. The band spans 0.9 to 1.1; left of 1 by more than chance would be too good to "
+    "be true, unless a bound of the box holds runs back."
 )
 TITLE = "Scatter against the Cramer-Rao bound"
 
@@ -56,7 +56,8 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     if rows.empty:
         return ()
     table = Table("cramer_rao", TITLE, TABLE_CAPTION, rows, COLUMNS)
-    return summary(rows), table, Figure("cramer_rao", TITLE, FIGURE_CAPTION, lambda: cramer_rao_figure(rows))
+    return summary(rows), table, Figure("cramer_rao", TITLE, FIGURE_CAPTION,
+                                         lambda: cramer_rao_figure(rows, evidence.colours))  # fmt: skip
 
 
 CRAMER_RAO = Analysis("cramer_rao", TITLE, parts, "standard deviation and bias over the Cramer-Rao bound")
@@ -110,7 +111,7 @@ def summary(rows: DataFrame) -> Table:
     return Table("cramer_rao_summary", "Scatter against the bound, in short", SUMMARY_CAPTION, frame, SUMMARY_COLUMNS)
 
 
-def cramer_rao_figure(rows: DataFrame) -> Any:
+def cramer_rao_figure(rows: DataFrame, colours: Mapping[str, int]) -> Any:
     names, cases = (list(dict.fromkeys(rows[key])) for key in ("parameter", "case"))
     places = {group: i for i, group in enumerate(dict.fromkeys(zip(rows["variant"], rows["setting"], strict=True)))}
     figure, axes = panels(len(names), 2, 6.8, 1.6 + 0.5 * len(places))
@@ -123,13 +124,12 @@ def cramer_rao_figure(rows: DataFrame) -> Any:
             aside = 0.7 * ((k + 0.5) / len(cases) - 0.5)
             y = [places[group] + aside for group in zip(own["variant"], own["setting"], strict=True)]
             ratio, low, high = (own[key].to_numpy() for key in ("ratio", "low", "high"))
-            axis.errorbar(ratio, y, xerr=np.array([ratio - low, high - ratio]), fmt=MARKERS[k % 7], ms=4.5, lw=1.3,
-                          color=COLOURS[k % 7], label=case if len(own) else None)  # fmt: skip
+            draw_intervals(axis, ratio, np.array(y), low, high, k, own["variant"].map(colours))
         row_names(axis, i, [f"{v}\n{s}" for v, s in places])
         axis.set(ylim=(len(places) - 0.5, -0.5), xlabel=f"{name}: standard deviation / bound")
         if rows["high"].max() > LARGEST_LINEAR:
             log_with_plain_ticks(axis)
-    legend_below(figure, min(8, len(cases)))
+    legend_below(figure, min(8, len(cases)), mark_handles(cases))
     return figure
 
 

@@ -1,6 +1,6 @@
 """Table I of the paper beside ours: where a published error falls among the errors of our runs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table, Text, slug, unlike
-from armid.report.style import COLOURS, legend_below, panels, row_names
+from armid.report.style import DASHES, INK, legend_below, line_look, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence, is_swarm
 from armid.units import shown
 
@@ -36,7 +36,8 @@ TABLE_CAPTION = (
 FIGURE_CAPTION = (
     "Relative error [%] on a logarithmic axis, all rows and seeds together: the box spans the quartiles, the thick "
     "line is the median, the whiskers reach from the 5th to the 95th percentile, dots are the runs beyond. Diamonds "
-    "are the paper's errors on its rows, the dashed line is their mean. Errors below 1e-9 % are drawn there."
+    "are the paper's errors on its rows, the vertical line is their mean. The colour is that of the identifier in all "
+    "figures, the dashes say the noise. Errors below 1e-9 % are drawn there."
 )
 LAYOUT_CAPTION = (
     "True value, identified value and relative error of each parameter. The values of the paper belong to its own arm, "
@@ -59,7 +60,6 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         return ()
     wanted = [(s, v) for v in evidence.interesting for s in evidence.settings if v in evidence.groups[s]]
     names = unlike([slug("table1", v, s) for s, v in wanted])
-    order = [v for v in evidence.best_first if v in set(evidence.estimates["variant"])]
     return (
         paper_layout(evidence, "Table I", with_truth=True),
         Text(f"Shown for {', '.join(evidence.interesting)}: the swarm in every form that was run, then the best of the "
@@ -70,7 +70,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         Table("table1", "Table I beside ours: all identifiers", TABLE_CAPTION, rows, (SETTING, VARIANT, *COLUMNS),
               most=0),
         Figure("table1", "Errors on Table I beside the paper's", FIGURE_CAPTION,
-               lambda: table1_figure(evidence.estimates, evidence.published, order)),
+               lambda: table1_figure(evidence.estimates, evidence.published, evidence.colours)),
     )  # fmt: skip
 
 
@@ -184,16 +184,17 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) 
     return low, high
 
 
-def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence[str]) -> Any:
+def table1_figure(estimates: DataFrame, published: DataFrame, colours: Mapping[str, int]) -> Any:
     from matplotlib.lines import Line2D
 
+    variants = [v for v in colours if v in set(estimates["variant"])]
     names = [n for n in dict.fromkeys(published["parameter"]) if n in set(estimates["parameter"])]
     settings = list(dict.fromkeys(estimates["setting"]))
     figure, axes = panels(len(names), 2, 6.8, 1.5 + (0.16 + 0.19 * len(settings)) * len(variants))
     for i, (axis, name) in enumerate(zip(axes, names, strict=True)):
         own = estimates[estimates["parameter"] == name]
         for j, setting in enumerate(settings):
-            draw_boxes(axis, own[own["setting"] == setting], variants, j, len(settings))
+            draw_boxes(axis, own[own["setting"] == setting], variants, colours, j, len(settings))
         errors = 100.0 * published.loc[published["parameter"] == name, "relative_error"].to_numpy()
         axis.axvline(errors.mean(), color="black", lw=1.2, ls="--", zorder=0)
         axis.plot(np.maximum(errors, FLOOR), np.full(errors.size, -0.5), "D", color="black", ms=5, clip_on=False,
@@ -201,21 +202,25 @@ def table1_figure(estimates: DataFrame, published: DataFrame, variants: Sequence
         row_names(axis, i, variants)
         axis.set(xscale="log", ylim=(len(variants) - 0.4, -0.6), title=name, xlabel="relative error [%]")
         axis.grid(axis="x", alpha=0.3)
-    handles = [Line2D([], [], color=COLOURS[j % 7], lw=3, label=f"ours, {s}") for j, s in enumerate(settings)]
+    handles = [Line2D([], [], color=INK, ls=dash_of(j), label=f"ours, {s}") for j, s in enumerate(settings)]
     paper = "the paper: its rows, and their mean"
     legend_below(figure, 3, [*handles, Line2D([], [], color="black", marker="D", ls="--", lw=1.2, label=paper)])
     return figure
 
 
-def draw_boxes(axis: Any, own: DataFrame, variants: Sequence[str], j: int, n: int) -> None:
-    samples = [100.0 * own.loc[own["variant"] == v, "relative_error"].to_numpy() for v in variants]
-    shown = [(i, np.maximum(s, FLOOR)) for i, s in enumerate(samples) if s.size]
+def draw_boxes(axis: Any, own: DataFrame, variants: Sequence[str], colours: Mapping[str, int], j: int, n: int) -> None:
     width = 0.7 / n
-    places = [i + width * (j - (n - 1) / 2.0) for i, _ in shown]
-    colour = COLOURS[j % len(COLOURS)]
-    line = {"color": colour, "lw": 1.2}
-    axis.boxplot(
-        [s for _, s in shown], positions=places, orientation="horizontal", whis=(5, 95), widths=0.8 * width,
-        manage_ticks=False, medianprops={"color": colour, "lw": 2.4}, boxprops=line, whiskerprops=line, capprops=line,
-        flierprops={"marker": ".", "ms": 2.5, "mfc": colour, "mec": "none", "alpha": 0.6},
-    )  # fmt: skip
+    for i, variant in enumerate(variants):
+        errors = 100.0 * own.loc[own["variant"] == variant, "relative_error"].to_numpy()
+        colour = line_look(colours[variant])["color"]
+        line = {"color": colour, "lw": 1.2, "ls": dash_of(j)}
+        axis.boxplot(
+            [np.maximum(errors, FLOOR)], positions=[i + width * (j - (n - 1) / 2.0)], orientation="horizontal",
+            whis=(5, 95), widths=0.8 * width, manage_ticks=False, medianprops={"color": colour, "lw": 2.4},
+            boxprops=line, whiskerprops=line, capprops=line | {"ls": "-"},
+            flierprops={"marker": ".", "ms": 2.5, "mfc": colour, "mec": "none", "alpha": 0.6},
+        )  # fmt: skip
+
+
+def dash_of(j: int) -> Any:
+    return DASHES[j % len(DASHES)]

@@ -1,6 +1,6 @@
 """Table II of the paper beside ours: mean and spread of repeated identifications."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import COLOURS, MARKERS, legend_below, panels, row_names
+from armid.report.style import legend_below, line_look, mark_handles, marker_of, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, VARIANT, Analysis, Evidence
 from armid.study.analyses.table1 import paper_layout
 from armid.units import shown
@@ -33,9 +33,9 @@ TABLE_CAPTION = (
     "stand's, synthetic), so the two need not agree."
 )
 FIGURE_CAPTION = (
-    "Result of each run, one mark and colour a record; the paper's identifications of its measured records above as "
-    "diamonds. The line is the truth of the synthetic records, the grey band the truth +- one Cramer-Rao standard "
-    "deviation of one record (median over the runs), dotted lines are bounds of the box."
+    "Result of each run, one mark a record and one colour an identifier; the paper's identifications of its measured "
+    "records above as diamonds. The line is the truth of the synthetic records, the grey band the truth +- one "
+    "Cramer-Rao standard deviation of one record (median over the runs), dotted lines are bounds of the box."
 )
 
 
@@ -44,7 +44,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     if evidence.study.get("report") != "table2" or estimates.empty:
         return ()
     figure = Figure("table2", "Repeated identifications beside the paper's", FIGURE_CAPTION,
-                    lambda: table2_figure(estimates, published))  # fmt: skip
+                    lambda: table2_figure(estimates, published, evidence.colours))  # fmt: skip
     layout = paper_layout(evidence, "Table II", with_truth=False)
     return layout, table2(estimates, published), table2_records(estimates), figure
 
@@ -104,7 +104,7 @@ def spread(values: ArrayLike) -> dict[str, float]:
     return {"n": sample.size, "mean": float(sample.mean()), "deviation": float(sample.std(ddof=0))}
 
 
-def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
+def table2_figure(estimates: DataFrame, published: DataFrame, colours: Mapping[str, int]) -> Any:
     from matplotlib.lines import Line2D
 
     names = list(dict.fromkeys(estimates["parameter"]))
@@ -116,7 +116,8 @@ def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
         paper = factor * published.loc[published["parameter"] == name, "published"].to_numpy(float)
         axis.plot(paper, np.zeros(paper.size), "D", color="black", ms=5)
         for j, (variant, setting) in enumerate(groups):
-            draw_group(axis, own[(own["variant"] == variant) & (own["setting"] == setting)], j + 1, factor)
+            group = own[(own["variant"] == variant) & (own["setting"] == setting)]
+            draw_group(axis, group, j + 1, factor, line_look(colours[variant])["color"])
         # the bounds of the search where they are near
         low, high = axis.get_xlim()
         for bound in (factor * own["low"].min(), factor * own["high"].max()):
@@ -126,21 +127,19 @@ def table2_figure(estimates: DataFrame, published: DataFrame) -> Any:
         axis.set(ylim=(len(groups) + 0.6, -0.6), xlabel=f"{name} [{unit}]")
         axis.tick_params(axis="y", labelsize=9)
     legend_below(figure, 4, [
-        *(Line2D([], [], color=COLOURS[k % 7], marker=MARKERS[k % 7], mfc="none", ls="", label=record)
-          for k, record in enumerate(dict.fromkeys(estimates["case"]))),
+        *mark_handles(dict.fromkeys(estimates["case"])),
         Line2D([], [], color="0.35", lw=1.0, label="truth"), Line2D([], [], color="0.86", lw=6, label="Cramer-Rao"),
         Line2D([], [], color="black", ls=":", lw=1.0, label="bound of the box"),
     ])  # fmt: skip
     return figure
 
 
-def draw_group(axis: Any, group: DataFrame, height: int, factor: float) -> None:
+def draw_group(axis: Any, group: DataFrame, height: int, factor: float, colour: str) -> None:
     records = list(dict.fromkeys(group["case"]))
     for k, record in enumerate(records):
         own = group[group["case"] == record]
         y = height + 0.5 * ((k + 0.5) / len(records) - 0.5)
-        axis.plot(factor * own["value"], np.full(len(own), y), MARKERS[k % 7], ms=4, mfc="none",
-                  color=COLOURS[k % 7])  # fmt: skip
+        axis.plot(factor * own["value"], np.full(len(own), y), marker_of(k), ms=4, mfc="none", color=colour)
     truth, bound = group["truth"].median() * factor, group["deviation"].median() * factor
     if np.isfinite(truth) and np.isfinite(bound):
         axis.fill_betweenx([height - 0.4, height + 0.4], truth - bound, truth + bound, color="0.86", lw=0, zorder=0)
