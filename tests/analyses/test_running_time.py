@@ -17,6 +17,7 @@ from armid.study.analyses.running_time import (
     running_time,
     running_time_figure,
     share_hit,
+    waterfall_figure,
 )
 
 
@@ -81,6 +82,19 @@ def test_the_first_six_lines_have_a_colour_each_and_all_others_are_grey():
 def test_data_profile_by_hand():
     hits, n = np.array([10.0, 50.0, np.inf]), np.array([4, 4, 9])
     assert data_profile(hits, n, np.array([1.0, 2.0, 9.9, 10.0, 1e9])) == pytest.approx([0, 1 / 3, 1 / 3, 2 / 3, 2 / 3])
+
+
+def test_a_waterfall_rises_to_what_the_worst_run_leaves():
+    hits = np.full((4, len(TARGETS)), np.inf)
+    hits[0], hits[1, :6], hits[2, :1] = 1.0, 1.0, 1.0
+    evidence = SimpleNamespace(groups={"s": {"many": np.arange(4), "one": np.array([0])}},
+                               colours={"one": 0, "many": 1}, histories=SimpleNamespace(value_hits=hits))  # fmt: skip
+    figure = waterfall_figure(evidence)
+    many, one = (line.get_ydata() for line in figure.axes[0].lines[:2])
+    assert np.unique(many).tolist() == pytest.approx([1e-10, 1e-1, 1.0])
+    assert np.unique(one).tolist() == pytest.approx([1e-10])
+    assert (np.diff(many) >= 0.0).all()
+    plt.close(figure)
 
 
 def test_a_median_is_a_value_that_a_run_had():

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.report.document import Column, Figure, Part, Table, slug
-from armid.report.style import LEAST_HEIGHT, named_lines, panels
 from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
-from armid.study.analyses.running_time import PAIRS_HIT, share_hit, share_panels
+from armid.study.analyses.running_time import PAIRS_HIT, SHARES, line_panels, share_hit
 
 Array = NDArray[np.floating[Any]]
 ERROR_LABEL = "largest relative error [%]"
@@ -69,14 +68,11 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
                 curves.setdefault(setting, {})[variant] = shown
     every = np.concatenate([line[np.isfinite(line)] for lines in curves.values() for line in lines.values()])
     limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
-    figure, axes = panels(len(curves), 2, 7.8, LEAST_HEIGHT)
-    for axis, (setting, lines) in zip(axes, curves.items(), strict=True):
-        axis.set(xscale="log", yscale="log", xlim=(1, max(grid[-1], 2)), ylim=limits)
-        axis.set(xlabel="simulations", ylabel=label)
-        named_lines(axis, grid, lines, evidence.colours)
+    figure = line_panels([(setting, grid, lines) for setting, lines in curves.items()], evidence.colours,
+                         xscale="log", yscale="log", xlim=(1, max(grid[-1], 2)), ylim=limits, xlabel="simulations",
+                         ylabel=label)  # fmt: skip
+    for axis in figure.axes:
         axis.minorticks_off()
-        axis.grid(alpha=0.3)
-        axis.set_title(setting)
     return figure
 
 
@@ -133,7 +129,4 @@ def attained(evidence: Evidence) -> Any:
         last = max(float(budget[rows].max()) for rows in variants.values())
         grid = np.geomspace(1.0 / evidence.n_free.max(), last, 121)
         curves.append((setting, grid, {v: share_hit(per_parameter[rows], grid) for v, rows in variants.items()}))
-    figure, axes = share_panels(curves, evidence.colours, 2, 7.8)
-    for axis in axes:
-        axis.set(xlabel="simulations / free parameters", ylabel=PAIRS_HIT)
-    return figure
+    return line_panels(curves, evidence.colours, xlabel="simulations / free parameters", ylabel=PAIRS_HIT, **SHARES)

@@ -18,6 +18,7 @@ from armid.study.analyses.success import TOLERANCES
 
 Array = NDArray[np.floating[Any]]
 PAIRS_HIT = "share of (run, target) pairs hit"
+SHARES: Any = {"xscale": "log", "ylim": (0.0, 1.0)}
 # Said of both targets.
 CAPTION = (
     "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
@@ -101,36 +102,31 @@ def ecdf_figure(evidence: Evidence) -> Any:
     kept = evidence.histories
     curves = [(setting, kept.grid, {v: share_hit(kept.error_hits[rows], kept.grid) for v, rows in variants.items()})
               for setting, variants in evidence.groups.items()]  # fmt: skip
-    figure, axes = share_panels(curves, evidence.colours, 2, 7.8)
-    for axis in axes:
-        axis.set(xlabel="simulations", ylabel=PAIRS_HIT)
-    return figure
+    return line_panels(curves, evidence.colours, xlabel="simulations", ylabel=PAIRS_HIT, **SHARES)
 
 
-def share_panels(
-    curves: Sequence[tuple[str, ArrayLike, Mapping[str, Array]]], colours: Mapping[str, int], columns: int, width: float
-) -> tuple[Any, list[Any]]:
-    """Draw shares that rise with the simulations, one panel each. curves: title, simulations, and name -> share."""
-    figure, axes = panels(len(curves), columns, width, LEAST_HEIGHT)
-    for axis, (title, grid, lines) in zip(axes, curves, strict=True):
-        axis.set(xscale="log", ylim=(0.0, 1.0))
-        named_lines(axis, grid, lines, colours)
-        axis.set_title(title)
+def line_panels(
+    curves: Sequence[tuple[str, ArrayLike, Mapping[str, Array]]], colours: Mapping[str, int], columns: int = 2,
+    width: float = 7.8, **axes: Any,
+) -> Any:  # fmt: skip
+    """Draw one panel each with a line for each identifier. curves: title, x, and name -> y; axes: scales and labels."""
+    figure, there = panels(len(curves), columns, width, LEAST_HEIGHT)
+    for axis, (title, x, lines) in zip(there, curves, strict=True):
+        axis.set(title=title, **axes)
+        named_lines(axis, x, lines, colours)
         axis.grid(alpha=0.3)
-    return figure, axes
+    return figure
 
 
 def running_time_figure(evidence: Evidence, hits: Array, targets: Array, label: str) -> Any:
     """Draw one panel a setting and one line a variant; a line ends where no run hits the target."""
-    figure, axes = panels(len(evidence.groups), 2, 7.8, LEAST_HEIGHT)
-    for axis, (setting, variants) in zip(axes, evidence.groups.items(), strict=True):
+    curves = []
+    for setting, variants in evidence.groups.items():
         lines = {v: expected_running_time(hits[rows], evidence.used[rows])[0] for v, rows in variants.items()}
-        lines = {v: np.where(np.isfinite(ert), ert, np.nan) for v, ert in lines.items()}
-        axis.set(xscale="log", yscale="log", xlim=(targets[0], targets[-1]), ylim=powers_around(lines.values()))
-        named_lines(axis, targets, lines, evidence.colours)
-        axis.set(title=setting, xlabel=label, ylabel="expected running time [simulations]")
-        axis.grid(alpha=0.3)
-    return figure
+        curves.append((setting, targets, {v: np.where(np.isfinite(ert), ert, np.nan) for v, ert in lines.items()}))
+    limits = powers_around(line for *_, lines in curves for line in lines.values())
+    return line_panels(curves, evidence.colours, xscale="log", yscale="log", xlim=(targets[0], targets[-1]),
+                       ylim=limits, xlabel=label, ylabel="expected running time [simulations]")  # fmt: skip
 
 
 def powers_around(lines: Iterable[Array]) -> tuple[float, float]:
@@ -154,6 +150,11 @@ PROFILE_CAPTION = (
     "is left of the way from a first candidate to the best fitness that anyone found (More and Wild 2009). Each "
     "fitness is compared with its own kind only."
 )
+LEFT_LABEL = "share of the way to the best known fitness that is left"
+WATERFALL_CAPTION = (
+    "What each run leaves of the way from a first candidate to the best known fitness when it ends, sorted: a seed is "
+    "a start. A flat step above the lowest one is a local minimum that many starts end in; 1e-10 and below are alike."
+)
 BEST_FIGURE_CAPTION = (
     "Expected running time with targets of the fitness: what is left of the way from a first candidate (median over "
     "all runs on the case) to the best fitness that anyone found on the same case, noise and seed."
@@ -165,12 +166,14 @@ def best_fitness_parts(evidence: Evidence) -> Sequence[Part]:
         return ()
     hits = evidence.histories.value_hits
     shown = {f"{t:g} left": t for t in SHARES_LEFT}
-    label = "share of the way to the best known fitness that is left"
     title = "Expected running time to the best known fitness"
     return (
         running_time(evidence, hits, shown, "fixed_target", f"{title} [simulations]", BEST_TARGET),
+        Figure("waterfall", "Waterfall of starts", WATERFALL_CAPTION, lambda: waterfall_figure(evidence)),
         Figure("data_profile", "Data profiles", PROFILE_CAPTION, lambda: data_profile_figure(evidence)),
-        Figure("fixed_target", title, BEST_FIGURE_CAPTION, lambda: running_time_figure(evidence, hits, TARGETS, label)),
+        Figure(
+            "fixed_target", title, BEST_FIGURE_CAPTION, lambda: running_time_figure(evidence, hits, TARGETS, LEFT_LABEL)
+        ),
     )
 
 
@@ -196,7 +199,16 @@ def data_profile_figure(evidence: Evidence) -> Any:
         grid = np.geomspace(1.0, int(kept.grid[-1]) / least, N_GRID)
         lines = {v: data_profile(kept.value_hits[rows, place], n_free[rows], grid) for v, rows in variants.items()}
         curves.append((f"{setting}, {share:g} left", grid, lines))
-    figure, axes = share_panels(curves, evidence.colours, columns, 6.6)
-    for axis in axes:
-        axis.set(xlabel="simulations / (free parameters + 1)", ylabel="share of problems solved")
-    return figure
+    return line_panels(curves, evidence.colours, columns, 6.6, xlabel="simulations / (free parameters + 1)",
+                       ylabel="share of problems solved", **SHARES)  # fmt: skip
+
+
+def waterfall_figure(evidence: Evidence) -> Any:
+    """Draw what the runs leave of the way to the best known fitness, sorted, a panel for each setting."""
+    n_hit = np.isfinite(evidence.histories.value_hits).sum(axis=1)
+    left, shares = TARGETS[np.maximum(n_hit - 1, 0)], np.linspace(0.0, 1.0, N_GRID)
+    curves = [(setting, 100.0 * shares,
+               {v: np.quantile(left[rows], shares, method="inverted_cdf") for v, rows in variants.items()})
+              for setting, variants in evidence.groups.items()]  # fmt: skip
+    return line_panels(curves, evidence.colours, yscale="log", ylim=(0.6 * TARGETS[-1], 1.6), ylabel="share of the way left",
+                       xlabel="runs, the best first [%]")  # fmt: skip
