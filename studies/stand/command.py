@@ -13,7 +13,7 @@ import numpy as np
 
 from stand import RefusalError
 from stand.arm import KNOWN, NAME, PARAMETERS, Arm, Manoeuvre, read_manoeuvre, write_manoeuvre
-from stand.campaign import campaign_text, check_place, record_text, replacing, short
+from stand.campaign import EXACT, campaign_text, check_place, record_text, replacing, short
 from stand.effects import Effects, read_effects
 from stand.gyro import REST_SAMPLES, Gyro, Record, recorded
 from stand.motion import SAMPLES_PER_SECOND, Motion, simulate
@@ -49,7 +49,9 @@ def _make(options: argparse.Namespace) -> str:
     # the campaign says that it is synthetic and how it was made
     said = ["SYNTHETIC: a simulated shell transfer arm. No machine was measured.", f"Made by: {settings.command()}"]
     said += truth_lines(settings, records)
-    texts["campaign.toml"] = campaign_text(said, settings.name, settings.gyro, records, window_s=settings.window_s)
+    truth = ("", "[truth]", *(f"{name} = {float(getattr(settings.arm, name))!r}" for name in PARAMETERS))
+    texts["campaign.toml"] = campaign_text(said, settings.name, settings.gyro, records, window_s=settings.window_s,
+                                           constants=(*truth, *EXACT))  # fmt: skip
     texts["README.md"] = readme_text(settings, records)
     # all of it in memory, so that nothing is written before all is there
     files = {name: text.encode() for name, text in texts.items()}

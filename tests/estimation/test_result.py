@@ -9,18 +9,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from armid.estimation.figures import chosen, convergence_figure, figures_of, fit_figure, pairs_of
 from armid.estimation.identify import identify, record_errors
-from armid.estimation.identify_document import (
-    answer,
-    chosen,
-    convergence_figure,
-    details_of,
-    figures_of,
-    fit_figure,
-    identify_document,
-    remarks,
-    result_of,
-)
+from armid.estimation.identify_document import answer, details_of, identify_document, remarks, result_of
 from armid.identifiers import IDENTIFIERS
 from armid.problem.fitness import FITNESS
 from armid.problem.space import space_of
@@ -185,6 +176,36 @@ def test_convergence(found, lowering, tmp_path, fitness):
     size, ink = saved(convergence_figure(found(lowering, fitness=fitness)), tmp_path / "convergence.png")
     assert size == pytest.approx((6.8, 4.2), abs=0.01)
     assert ink > 0.005
+
+
+def test_ellipses_of_the_most_correlated_pairs_with_the_truth(lowering_found):
+    campaign = replace(lowering_found.campaign, truth={"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4})
+    figure = figures_of(replace(lowering_found, campaign=campaign))["pairs"]()
+    information = lowering_found.information
+    correlation = np.abs(information.correlation[np.triu_indices(4, 1)])
+    shown = [abs(float(axis.get_title().split()[1])) for axis in figure.axes]
+    assert shown == pytest.approx(sorted(correlation, reverse=True), abs=1e-3)
+    axis = next(a for a in figure.axes if (a.get_xlabel(), a.get_ylabel()) == ("p0 [MPa]", "n [1]"))
+    x, y = axis.patches[0].get_xy().T
+    ends = [axis.lines[0].get_xdata()[0] + s * 2.4477e-6 * information.deviation[0] for s in (-1.0, 1.0)]
+    assert (x.min(), x.max()) == pytest.approx(tuple(ends), rel=1e-6)
+    assert np.ptp(y) == pytest.approx(2.0 * 2.4477 * information.deviation[3], rel=1e-3)
+    assert np.ravel(axis.lines[-1].get_xydata()) == pytest.approx([3.05, 1.4])
+    plt.close(figure)
+
+
+def test_the_draws_of_a_bootstrap_decide_about_their_ellipse(lowering_found):
+    space, x = lowering_found.space, np.zeros(4)
+    draws = np.random.default_rng(1).normal(0.0, [2.0, 1.0, 0.0, 0.0], (500, 4)) @ np.array(
+        [[1.0, 0.5, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4]
+    )
+    nothing = replace(lowering_found.information, deviation=np.full(4, np.inf), correlation=np.full((4, 4), np.nan))
+    assert pairs_of("c", space, nothing, x, {}) == {}
+    figure = pairs_of("c", space, nothing, x, {}, draws)["pairs"]()
+    (axis,) = figure.axes
+    widths = np.ptp(axis.patches[0].get_xy(), axis=0) / (1e-6, 1.0)
+    assert widths == pytest.approx(2.0 * 2.4477 * draws[:, :2].std(axis=0, ddof=1), rel=1e-3)
+    plt.close(figure)
 
 
 def test_no_screen_is_needed_and_no_figure_stays_open(lowering_found, tmp_path):

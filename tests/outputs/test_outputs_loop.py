@@ -60,6 +60,18 @@ def test_the_report_tells_each_output(closed) -> None:
         pyplot().close(draw())
 
 
+def test_the_residual_of_each_output_is_drawn_against_speed_and_position(closed) -> None:
+    figure = figures_of(closed, report_of(closed), details_of(closed))["against"]()
+    variables = closed.before.train.variables
+    assert len(figure.axes) % 2 == 0
+    for axis in figure.axes:
+        samples, means = axis.lines[0].get_xdata(), {line.get_label(): line for line in axis.lines[1:4:2]}
+        assert len(samples) <= len(variables["theta" if "theta" in axis.get_xlabel() else "omega"])
+        before, after = (np.abs(means[name].get_ydata()).max() for name in ("before", "after"))
+        assert after < before
+    pyplot().close(figure)
+
+
 def test_the_start_of_a_record_held_out_does_not_judge(closed) -> None:
     piece = closed.campaign.holdout[0].pieces[0]
     assert (piece.n_spent, piece.window.start) == (35, 35)

@@ -13,5 +13,5 @@ mends           the mistakes that it looks for, and what undoes each
 simulated       one candidate simulated through every record of a campaign
 examine         all of these for one campaign; groups of parameters that move together
 
-What is shown of the results: identify_document, identifiability_document, with their figures.
+What is shown of the results: figures, identify_document, identifiability_document.
 """

@@ -8,6 +8,7 @@ import numpy as np
 
 from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index
+from armid.estimation.figures import PAIRS, pairs_of
 from armid.estimation.identify import versions_of
 from armid.estimation.information import Level, level_weights, normalised, sensitivities
 from armid.estimation.profile import THRESHOLD, Profile
@@ -39,6 +40,7 @@ FIGURES = {
     "profiles": ("Profile likelihood", "Rise of chi2 when one parameter is held and the others are fitted again. A "
                  "95 % interval ends where the curve meets the dotted threshold; where it leaves the parabola, the "
                  "interval by curvature is not to be believed."),
+    "pairs": PAIRS,
     "sensitivities": ("What the records see", "Correlation of the estimates, the share of the information on each "
                       "parameter that comes from each record, and d speed / d parameter against time, each scaled to "
                       "its largest value: curves that look alike are collinear."),
@@ -61,7 +63,7 @@ def identifiability_document(
     sections: tuple[Section, ...] = (
         Section("Parameters", (parameters, *figures.get("profiles", ()))),
         *(Section(part.title, (part,)) for part in rest),
-        Section("What the records see", (*correlated, *figures.get("sensitivities", ()))),
+        Section("What the records see", (*correlated, *figures.get("pairs", ()), *figures.get("sensitivities", ()))),
         Section("The next record", (offers,)),
         made_section(details.get("made_by", {}), result["versions"], again),
     )
@@ -323,7 +325,8 @@ LINE = 60
 
 
 def figures_of(found: Examination) -> dict[str, Callable[[], Any]]:
-    return {"profiles": lambda: profile_figure(found), "sensitivities": lambda: sensitivity_figure(found)}
+    pairs = pairs_of(found.campaign.name, found.space, found.information, found.x, found.campaign.truth)
+    return {"profiles": lambda: profile_figure(found), "sensitivities": lambda: sensitivity_figure(found), **pairs}
 
 
 def profile_figure(found: Examination) -> Any:

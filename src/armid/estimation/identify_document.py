@@ -1,17 +1,15 @@
 """The document of an identification, and what of it is stored: result.json and details.json."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from textwrap import fill
 from typing import Any
 
 import numpy as np
 
 from armid.engine.calibrate import NOISE_HIDES
+from armid.estimation.figures import PAIRS, curves_of, figures_of, record_figure
 from armid.estimation.identify import Identification, errors_by_file, outputs_entry, versions_of
 from armid.estimation.information import collinear
-from armid.model import Array
-from armid.problem.fitness import SIMILARITIES
 from armid.problem.problem import Replay, judged_by
 from armid.report.document import (
     ERROR_NOTE,
@@ -31,115 +29,19 @@ from armid.report.document import (
     made_section,
     others_text,
     plain,
-    points,
-    record_axes,
     records_note,
     remark_parts,
     rmse_text,
-    small_axes,
     stored_figures,
     table,
     value_text,
 )
 from armid.report.result import Parts
-from armid.report.style import GREY, OKABE_ITO, pyplot
 from armid.units import scale_of, shown
-
-MOST_FITS_DRAWN = 8
-# Letters of a title that fit above one column.
-LINE = 60
-
-
-def figures_of(found: Identification) -> dict[str, Callable[[], Any]]:
-    convergence = {"convergence": lambda: convergence_figure(found)} if len(found.trace[0]) else {}
-    return {"fit": lambda: fit_figure(found), **convergence}
-
-
-def fit_figure(found: Identification) -> Any:
-    replays = chosen(found)
-    figure, axes = record_axes(len(replays), 4.4, (3, 1.4))
-    for pair, replay in zip(axes, replays, strict=True):
-        factor, unit = shown(1.0, replay.record.unit)
-        curves = curves_of(replay, found.candidate)
-        rms = factor * np.sqrt(np.mean(curves["residual"] ** 2))
-        pair[0].set_title(f"{replay.name} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
-        draw_record(pair, {name: (replay.times, y) for name, y in curves.items()}, replay.record.unit)
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=2, frameon=False)
-    there_are = len(found.train_replays) + len(found.holdout_replays)
-    model = " + ".join([found.model.plant.name, *(e.name for e in found.model.effects)])
-    some = "" if len(replays) == there_are else f" ({len(replays)} of {there_are} records)"
-    title = f"{found.campaign.name}: {model}, {found.identifier} on {found.fitness.name}{some}"
-    figure.suptitle(fill(title, LINE * (1 if len(replays) == 1 else 2)), fontsize="large")
-    return figure
-
-
-def curves_of(replay: Replay, candidate: Array) -> dict[str, Array]:
-    measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])[0]
-    return {"measured": measured, "simulated": simulated, "residual": measured - simulated}
-
-
-def chosen(found: Identification) -> list[Replay]:
-    """Return the records that are drawn: the first of each role where there are too many."""
-    train, holdout = list(found.train_replays), list(found.holdout_replays)
-    n_holdout = min(len(holdout), max(MOST_FITS_DRAWN // 2, MOST_FITS_DRAWN - len(train)))
-    return train[: MOST_FITS_DRAWN - n_holdout] + holdout[:n_holdout]
-
-
-def record_figure(curves: Mapping[str, Mapping[str, Any]], unit: str) -> Any:
-    """Draw a stored record for a page. curves: those of `details.json`."""
-    figure, pair = small_axes(6.0, 4.0, (3, 1.4))
-    draw_record(pair, {name: points(curve) for name, curve in curves.items()}, unit)
-    pair[0].legend(frameon=False, fontsize="small")
-    return figure
-
-
-def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) -> None:
-    (upper, lower), (factor, unit) = axes, shown(1.0, si_unit)
-    looks = {"measured": {"color": OKABE_ITO["black"], "lw": 1.6},
-             "simulated": {"color": OKABE_ITO["vermilion"], "lw": 1.3, "ls": "--"}}  # fmt: skip
-    for name, look in looks.items():
-        x, y = curves[name]
-        upper.plot(x, factor * y, label=name, **look)
-    x, y = curves["residual"]
-    lower.axhline(0.0, color=GREY, lw=0.8)
-    lower.plot(x, factor * y, color=OKABE_ITO["blue"], lw=0.8)
-    upper.set_ylabel(f"{'speed' if si_unit in ('rad/s', 'm/s') else 'signal'} [{unit}]")
-    upper.tick_params(labelbottom=False)
-    lower.set(ylabel=f"residual\n[{unit}]", xlabel="time [s]")
-    for axis in axes:
-        axis.margins(x=0.01)
-
-
-def convergence_figure(found: Identification) -> Any:
-    """Draw the best fitness, or for a similarity its degree, against the number of simulations."""
-    from matplotlib.ticker import LogLocator, StrMethodFormatter
-
-    similarity = found.fitness.name.partition(":")[0] in SIMILARITIES
-    evaluations, values = found.trace
-    x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
-    figure, axis = pyplot().subplots(figsize=(6.8, 4.2), layout="constrained")
-    # the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs
-    units = {r.record.unit for r in judged_by(found.fitness, found.train_replays)}
-    si_unit = next(iter(units)) if found.fitness.unit == "signal" and len(units) == 1 else ""
-    factor, unit = shown(1.0, si_unit) if si_unit else (1.0, "")
-    height = 1.0 - y if similarity else y * factor
-    axis.step(x, height, where="post", color=OKABE_ITO["blue"], lw=1.8)
-    if not similarity and np.min(y) > 0.0:
-        # plain numbers at 1, 2, 5
-        axis.set_yscale("log")
-        axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))
-    named = f"{found.fitness.name} [{unit}]" if unit else found.fitness.name
-    axis.set(ylabel="similarity degree of the best" if similarity else f"best {named}", xlabel="simulations")
-    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {height[-1]:.6g} {unit}"
-    axis.set_title(text.rstrip(), fontsize="medium")
-    return figure
-
 
 PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 # Figures that a page takes as they are stored: name -> title and caption.
-FIGURES = {"convergence": ("The search", "Best so far against the number of simulations.")}
+FIGURES = {"convergence": ("The search", "Best so far against the number of simulations."), "pairs": PAIRS}
 MOST_KNOWN_FIRST = 3
 # A mean square on held-out records of more times that on the fitted ones than this.
 CARRIES_OVER = 1.5
@@ -170,13 +72,13 @@ def identify_document(
         ("engine's error [rad/s or m/s]",
          "not known" if result["engine_error"] is None else f"{result['engine_error']:.2g}"),
     ]  # fmt: skip
-    figures = stored_figures(FIGURES, svgs).get("convergence", ())
+    figures, by_record = stored_figures(FIGURES, svgs), error_table("Each record", ["record", "role"], each, unit)
     sections = (
         Section("Parameters", (parameters,)),
         fit_section(details),
         *(Section(part.title, (part,)) for part in remarks),
-        Section("Errors", (errors, error_table("Each record", ["record", "role"], each, unit), *correlated)),
-        Section("Search", (table("How it went", ["what", "value"], search), *figures)),
+        Section("Errors", (errors, by_record, *correlated, *figures.get("pairs", ()))),
+        Section("Search", (table("How it went", ["what", "value"], search), *figures.get("convergence", ()))),
         Section("Equations", (listing("The model that was identified", result["model"]),)),
         made_section(details.get("made_by", {}), result["versions"], again),
     )

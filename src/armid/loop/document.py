@@ -72,7 +72,8 @@ LEAST = 1e-12
 LEAST_SHARE = 0.005
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {
-    "parameters": ("Parameters before and after", "Values with 95 % intervals; open marks are not to be trusted."),
+    "parameters": ("Parameters before and after", "Deviation from the value after, in % of it, with 95 % intervals. "
+                   "Open marks are not to be trusted; a dashed line is the true value, where it is known."),
     "motion": ("Measured and simulated motion", "Grey: measured. The coloured lines are the model before and after."),
     "probabilities": ("How probable each is", "Of all models that were fitted: the share of those that hold it. A name "
                       "counts only where nothing unknown stands beside it."),
@@ -80,6 +81,8 @@ FIGURES = {
                   "and over all of them."),
     "diagnosis": ("Where the discrepancy is", "Mean square of the residual in units of the noise's, part by part, "
                   "before and after; 1 is noise."),
+    "against": ("Residual against speed and position", "Measured minus simulated of the train records, a point a "
+                "sample; the lines are means over equally many samples."),
     "autocorrelation": ("Correlation in time", "Autocorrelation of the whitened residual of the train records, before "
                         "and after; the band holds 95 % of what white noise gives."),
     "missing": ("The missing signal without a form", "What would have to be added at each port, and against what it "
@@ -135,7 +138,8 @@ def loop_document(
     ]
     if "motion" in figures:
         sections.insert(2, Section("Motion", figures["motion"]))
-    drawn = tuple(f for name in ("diagnosis", "autocorrelation", "missing") for f in figures.get(name, ()))
+    last = ("diagnosis", "against", "autocorrelation", "missing")
+    drawn = tuple(f for name in last for f in figures.get(name, ()))
     told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
             for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
     tests = [Sentences(tuple(sentences), title) for title, sentences in told if sentences]

@@ -2,24 +2,27 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import product
 from textwrap import fill
 from typing import Any
 
 import numpy as np
 
-from armid.inference.checks import Diagnosis, Residuals
+from armid.inference.checks import Residuals
 from armid.inference.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop
 from armid.model import Array
 from armid.problem.problem import Replay
-from armid.report.document import points, record_axes, small_axes
-from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, pyplot
+from armid.report.document import points, record_axes, small_axes, value_text
+from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, legend_below, log_axis, panels, pyplot
 from armid.units import shown
 
-LOOKS = (("before", OKABE_ITO["vermilion"], -0.12), ("after", OKABE_ITO["blue"], 0.12))
+LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", OKABE_ITO["blue"]))
 AFTER = OKABE_ITO["blue"]
 KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}
 MOST_RECORDS, MOST_NAMED, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
+# Of the mean residual over a variable, and the least bar of the diagnosis.
+MOST_PARTS, LEAST_RATIO = 30, 1e-3
 PARAMETERS_A_ROW = 4
 # Of a title in medium letters.
 LETTERS_PER_INCH = 9.0
@@ -38,9 +41,10 @@ def figures_of(
         "diagnosis": partial(diagnosis_figure, found),
         "probabilities": partial(probability_figure, report["campaign"], report["probabilities"]),
         "intervals": partial(interval_figure, report["campaign"], details["models"], report["parameters"]["after"]),
-        "parameters": partial(parameter_figure, report["campaign"], report["parameters"]),
+        "parameters": partial(parameter_figure, report["campaign"], report["parameters"], found.campaign.truth),
         "autocorrelation": partial(autocorrelation_figure, found),
     }
+    made |= {"against": partial(against_figure, found)} if moved(found) else {}
     return made if found.missing is None else made | {"missing": partial(missing_figure, found, found.missing)}
 
 
@@ -58,7 +62,7 @@ def motion_figure(found: ClosedLoop) -> Any:
     for (axis,), (replay, *residuals) in zip(axes, rows, strict=True):
         factor, unit = shown(1.0, replay.record.unit)
         axis.plot(replay.times, factor * replay.measured, color=PALE, lw=3.5, label="measured")
-        for residual, (name, colour, _), width in zip(residuals, LOOKS, (1.3, 1.0), strict=True):
+        for residual, (name, colour), width in zip(residuals, LOOKS, (1.3, 1.0), strict=True):
             axis.plot(replay.times, factor * (replay.measured - residual), color=colour, lw=width, label=name)
         axis.set(ylabel=f"{replay.record.output or 'output'} [{unit}]", xlabel="time [s]")
         axis.margins(x=0.01)
@@ -101,7 +105,7 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
     if noise is not None:
         band = 2.0 * noise * factor
         axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="noise, 2 sigma")
-    for name, colour, _ in LOOKS:
+    for name, colour in LOOKS:
         x, y = curves[name]
         axis.plot(x, factor * y, color=colour, lw=0.9, label=name, gid=name)
     axis.set(ylabel=f"residual [{unit}]", xlabel="time [s]")
@@ -109,36 +113,64 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
 
 
 def diagnosis_figure(found: ClosedLoop) -> Any:
+    """Draw a bar for each part of the residual, from 1, which is noise, to its mean square; the largest come first."""
     before, after = found.before.diagnosis, found.after.diagnosis
-    kinds = [k for k in KINDS if before.of_kind(k)]
-    rows = -(-len(kinds) // 2)
-    size = (11.0, 3.9 * rows + 0.8)
-    figure, axes = pyplot().subplots(rows, 2, figsize=size, squeeze=False, layout="constrained")
-    for axis, kind in zip(axes.flat, kinds, strict=False):
-        draw_findings(axis, kind, before, after)
-    for axis in axes.flat[len(kinds) :]:
-        axis.set_visible(False)
+    kinds = {k: sorted(before.of_kind(k), key=lambda f: -f.ratio) for k in KINDS if before.of_kind(k)}
+    heights = [len(findings) + 1 for findings in kinds.values()]
+    size = (7.6, 0.34 * sum(heights) + 1.4)
+    figure, axes = pyplot().subplots(len(kinds), 1, figsize=size, height_ratios=heights, squeeze=False, sharex=True,
+                                     layout="constrained")  # fmt: skip
+    for axis, (kind, findings) in zip(axes.flat, kinds.items(), strict=True):
+        rows = np.arange(len(findings))
+        for diagnosis, (label, colour), shift in zip((before, after), LOOKS, (-0.19, 0.19), strict=True):
+            ratios = {f.where: f.ratio for f in diagnosis.of_kind(kind)}
+            ends = np.array([ratios.get(f.where, 1.0) for f in findings])
+            axis.barh(rows + shift, np.maximum(ends, LEAST_RATIO) - 1.0, 0.36, left=1.0, color=colour, label=label)
+        axis.axvline(1.0, color=GREY, lw=1.0)
+        axis.set_yticks(rows, [f.where for f in findings], fontsize="small")
+        axis.set_ylim(len(findings) - 0.5, -0.5)
+        log_axis(axis)
+        axis.set_title(KINDS[kind], fontsize="medium", loc="left")
     of = "noise" if before.noise_known else "the residual"
-    figure.supylabel(f"mean square / that of {of}", fontsize="medium")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+    axes[-1, 0].set_xlabel(f"mean square / that of {of}")
+    legend_below(figure, 2)
     figure.suptitle(f"{found.campaign.name}: where the discrepancy is (1 is noise)", fontsize="large")
     return figure
 
 
-def draw_findings(axis: Any, kind: str, before: Diagnosis, after: Diagnosis) -> None:
-    names = [f.where for f in before.of_kind(kind)]
-    if kind == "frequency":  # "5 to 12 Hz", "above 250 Hz"
-        names.sort(key=lambda where: float(where.removeprefix("above ").split()[0]))
-    for diagnosis, (label, colour, shift) in zip((before, after), LOOKS, strict=True):
-        ratios = {f.where: f.ratio for f in diagnosis.of_kind(kind)}
-        known = [i for i, n in enumerate(names) if n in ratios]
-        heights = [max(ratios[names[i]], 1e-3) for i in known]
-        axis.plot([i + shift for i in known], heights, "o", color=colour, label=label)
-    axis.axhline(1.0, color=GREY, lw=1.0)
-    axis.set_yscale("log")
-    axis.set_xticks(range(len(names)), names, rotation=45, ha="right", fontsize="small")
-    axis.set_title(KINDS[kind], fontsize="medium")
-    axis.margins(x=0.1)
+def against_figure(found: ClosedLoop) -> Any:
+    """Draw the residual of the train records against speed and position, with its mean over equally many samples."""
+    seen, model = (found.before.train, found.after.train), found.before.train.model
+    names, places = moved(found), sorted({r.place for r in seen[0].replays})
+    figure, axes = panels(len(names) * len(places), len(names), 5.6, 3.6)
+    for axis, (place, name) in zip(axes, product(places, names), strict=True):
+        factor, unit = shown(1.0, unit_of(name, model))
+        height, signal_unit = shown(1.0, model.plant.outputs[place].unit)
+        for residuals, (label, colour) in zip(seen, LOOKS, strict=True):
+            x, y = sorted_by(residuals, name, place)
+            axis.plot(factor * x, height * y, ".", ms=1.5, alpha=0.25, color=colour)
+            means = [np.array([part.mean() for part in np.array_split(values, MOST_PARTS)]) for values in (x, y)]
+            axis.plot(factor * means[0], height * means[1], color=colour, lw=2.0, label=label)
+        axis.axhline(0.0, color=GREY, lw=0.8)
+        axis.set(xlabel=f"{name} [{unit}]", ylabel=f"residual [{signal_unit}]")
+    legend_below(figure, 2)
+    figure.suptitle(f"{found.campaign.name}: residual against speed and position", fontsize="large")
+    return figure
+
+
+def sorted_by(seen: Residuals, name: str, place: int) -> tuple[Array, Array]:
+    """Return a variable and the residual of an output, samples that are no data left out, in the variable's order."""
+    of = np.repeat([r.place for r in seen.replays], np.diff(seen.data.edges)) == place
+    kept = np.flatnonzero(of & (seen.data.sound > 0.0))
+    order = kept[np.argsort(seen.variables[name][kept], kind="stable")]
+    return seen.variables[name][order], np.concatenate(seen.raw)[order]
+
+
+def moved(found: ClosedLoop) -> list[str]:
+    """Return the names of the speed and the position of the plant, those that it has and that move."""
+    seen = found.before.train
+    names = (seen.model.plant.aliases.get(a, a) for a in ("omega", "theta"))
+    return [n for n in names if np.ptp(seen.variables.get(n, 0.0)) > 0.0]
 
 
 def probability_figure(campaign: str, chances: Mapping[str, Any]) -> Any:
@@ -192,39 +224,40 @@ def ends_of(p: Mapping[str, Any], factor: float) -> list[list[float]]:
     return [[max(factor * (p["value"] - p["low"]), 0.0)], [max(factor * (p["high"] - p["value"]), 0.0)]]
 
 
-def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Draw each identified parameter before and after, those of effects after alone. parameters: of `report.json`."""
+def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]], truth: Mapping[str, float]) -> Any:
+    """Draw each identified parameter before and after in % of its value after, those of effects after alone.
+
+    parameters: of `report.json`; one whose value is 0 has no share. truth: true values that are known, SI.
+    """
     before, after = parameters["before"], parameters["after"]
-    each = [(name, before.get(name), p) for name, p in after.items()
-            if p["low"] is not None or (name in before and before[name]["low"] is not None)]  # fmt: skip
-    columns = min(max(len(each), 1), PARAMETERS_A_ROW)
-    rows = -(-max(len(each), 1) // columns)
-    size = (2.6 * columns + 1.2, 3.0 * rows + 0.4)
-    figure, axes = pyplot().subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
-    for axis in axes.flat[len(each) :]:
-        axis.set_axis_off()
-    for axis, (name, *pair) in zip(axes.flat, each, strict=False):
-        factor, unit = shown(1.0, pair[1]["unit"])
-        for place, (p, (_, colour, _)) in enumerate(zip(pair, LOOKS, strict=True)):
+    each = [(name, before.get(name), p) for name, p in after.items() if p["value"]
+            and (p["low"] is not None or (name in before and before[name]["low"] is not None))]  # fmt: skip
+    figure, axes = panels(max(len(each), 1), PARAMETERS_A_ROW, 2.8, 3.0)
+    for axis, (name, *pair) in zip(axes, each, strict=False):
+        value, factor = pair[1]["value"], 100.0 / abs(pair[1]["value"])
+        for place, (p, (_, colour)) in enumerate(zip(pair, LOOKS, strict=True)):
             if p is None:
                 continue
-            axis.errorbar([place], [factor * p["value"]], yerr=ends_of(p, factor), fmt="o", color=colour, capsize=5,
-                          mfc=colour if p["trusted"] else "white")  # fmt: skip
+            axis.errorbar([place], [factor * (p["value"] - value)], yerr=ends_of(p, factor), fmt="o", color=colour,
+                          capsize=5, mfc=colour if p["trusted"] else "white")  # fmt: skip
+        if name in truth:
+            axis.axhline(factor * (truth[name] - value), color=OKABE_ITO["black"], lw=1.0, ls="--")
         axis.set_xticks([0, 1], ["before", "after"])
-        axis.set(xlim=(-0.6, 1.6), ylabel=f"{name} [{unit}]")
-        axis.ticklabel_format(axis="y", useOffset=False)
+        axis.set(xlim=(-0.6, 1.6), ylabel="deviation [%]")
+        axis.set_title(f"{name}, {value_text(pair[1] | {'low': None})}", fontsize="small")
     if not each:
-        axes[0, 0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
-        axes[0, 0].set_axis_off()
-    title = f"{campaign}: parameters, 95 % intervals (open: not to be trusted)"
-    figure.suptitle(fill(title, int(LETTERS_PER_INCH * size[0])), fontsize="medium")
+        axes[0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
+        axes[0].set_axis_off()
+    known = "; dashed: true" if any(name in truth for name, *_ in each) else ""
+    title = f"{campaign}: deviation from the value after, 95 % intervals (open: not trusted{known})"
+    figure.suptitle(fill(title, int(LETTERS_PER_INCH * figure.get_figwidth())), fontsize="medium")
     return figure
 
 
 def autocorrelation_figure(found: ClosedLoop) -> Any:
     figure, axis = pyplot().subplots(figsize=(6.8, 3.6), layout="constrained")
     interval = found.campaign.train[0].spacing
-    for judged, (name, colour, _) in zip((found.before, found.after), LOOKS, strict=True):
+    for judged, (name, colour) in zip((found.before, found.after), LOOKS, strict=True):
         values = correlation(judged.train)
         axis.plot(1e3 * interval * np.arange(len(values)), values, color=colour, lw=1.6, label=name)
     band = 1.96 / np.sqrt(len(found.after.train.residual))

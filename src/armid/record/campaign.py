@@ -46,7 +46,7 @@ class Campaign(Shown):
     half-range within which it is known. rough: those of a tenth or more, with parameters of the plant that are fixed.
     chances: effect -> its probability before the records. known: parameter of the plant -> what is known of it before.
     taken_as_exact: constants of which neither the plant nor the campaign says how well they are known. angle: deg, rad
-    or rpm, in which results show angles and turning speeds.
+    or rpm, in which results show angles and turning speeds. truth: true values of parameters, for figures alone.
     """
 
     name: str
@@ -64,6 +64,7 @@ class Campaign(Shown):
     chances: Mapping[str, float] = field(default_factory=dict)
     known: Mapping[str, Known] = field(default_factory=dict)
     angle: str = DEG
+    truth: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
@@ -186,6 +187,9 @@ def read_campaign(
             warnings.warn(f"{where}: constant '{name}' counts nowhere, since every record sets its own", stacklevel=2)
     plant = scaled(whole.recording(recorded), records, where)
     parameters = overrides_of(sheet.parameters, plant, effects, where)
+    for name in sheet.truth:
+        if name not in (names := named_parameters(plant, effects)):
+            raise unknown_name("parameter", name, names, f"{where}, truth")
     held = {p.name: parameters[p.name].fixed for p in plant.parameters if p.name in parameters}
     fixed = {name: value for name, value in held.items() if value is not None}
     tolerances = tolerances_of(sheet.tolerances, plant, where, fixed)
@@ -208,6 +212,7 @@ def read_campaign(
                              and not {c.name, DEFAULT} & {*sheet.tolerances, *set_by_records(plant)}),
         unmeasured=tuple(o for o in whole.outputs if o.name not in recorded),
         chances=chances,
+        truth=dict(sheet.truth),
         angle=recorded_in.pop() if len(recorded_in) == 1 else DEG,
         known={name: one for name, one in known.items() if name in {p.name for p in plant.parameters} - fixed.keys()},
     )  # fmt: skip
@@ -401,9 +406,7 @@ def overrides_of(
     tables: Mapping[str, Mapping[str, Any]], plant: Plant, effects: Mapping[str, Effect], where: str
 ) -> dict[str, Override]:
     """Return qualified parameter name (`p0`, `coulomb.level`) -> Override; an effect's name may be quoted or nested."""
-    known = {p.name: p for p in plant.parameters}
-    known |= {f"{e.name}.{p.name}": p for e in effects.values() for p in e.parameters}
-    overrides = {}
+    known, overrides = named_parameters(plant, effects), {}
     for name, table in flattened(tables).items():
         if name not in known:
             raise unknown_name("parameter", name, known, where)
@@ -411,6 +414,11 @@ def overrides_of(
         overrides[name] = validated(Override, table, place)
         check_bounds(overrides[name], resolve(known[name], plant.scales), place)
     return overrides
+
+
+def named_parameters(plant: Plant, effects: Mapping[str, Effect]) -> dict[str, Parameter]:
+    of_effects = {f"{e.name}.{p.name}": p for e in effects.values() for p in e.parameters}
+    return {p.name: p for p in plant.parameters} | of_effects
 
 
 def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:

@@ -303,6 +303,10 @@ class CampaignSheet:
         "the probability of an effect, between 0 and 1, or { mean, sd } of a parameter or constant, SI",
         "What is known before the records.",
     ))  # fmt: skip
+    truth: Mapping[str, float] = field(default_factory=dict, metadata=key(
+        table_of(number), "a finite number in SI",
+        "True values of parameters of synthetic records; figures show them, and nothing else reads them.",
+    ))  # fmt: skip
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
     hold: str = field(default="linear", metadata=HOLD)
     most_lost: float = field(default=0.05, metadata=LOST)

@@ -23,6 +23,8 @@ INK, PALE, GREY = "#222222", "0.75", "0.6"
 DPI = 130
 MANY_MARKS = 1_000
 MOST_POINTS = 1_000
+# Largest ratio of the ends of an axis with plain numbers at 1, 2 and 5.
+MOST_PLAIN = 300.0
 # Where labels stand outside of a frame [inch]: behind tick labels of six letters.
 BELOW_INCH, LEFT_INCH = 0.34, 0.6
 # Ids of an SVG come out of a hash; letters are drawn, so that no font is needed to read the file.
@@ -95,6 +97,18 @@ def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list
     for unused in flat[n:]:
         unused.remove()
     return figure, flat[:n]
+
+
+def log_axis(axis: Any) -> None:
+    """Make the x axis of what is drawn logarithmic, with plain numbers at 1, 2, 5 where it spans few powers of ten."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axis.set_xscale("log")
+    low, high = axis.get_xlim()
+    if high < MOST_PLAIN * low:
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def place_labels(axis: Any) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import draw_intervals, legend_below, mark_handles, panels, row_names
+from armid.report.style import draw_intervals, legend_below, log_axis, mark_handles, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence
 
 # A standard deviation within these, in units of the bound, is what an efficient estimate has.
@@ -128,15 +128,6 @@ def cramer_rao_figure(rows: DataFrame, colours: Mapping[str, int]) -> Any:
         row_names(axis, i, [f"{v}\n{s}" for v, s in places])
         axis.set(ylim=(len(places) - 0.5, -0.5), xlabel=f"{name}: standard deviation / bound")
         if rows["high"].max() > LARGEST_LINEAR:
-            log_with_plain_ticks(axis)
+            log_axis(axis)
     legend_below(figure, min(8, len(cases)), mark_handles(cases))
     return figure
-
-
-def log_with_plain_ticks(axis: Any) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    axis.set_xscale("log")
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.xaxis.set_minor_formatter(NullFormatter())

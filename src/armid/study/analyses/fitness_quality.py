@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import INK, legend_below, line_look, panels, row_names, variant_handles
+from armid.report.style import INK, legend_below, line_look, log_axis, panels, row_names, variant_handles
 from armid.study.analyses.analysis import N_RUNS, SETTING, Analysis, Evidence, every_nth
 
 # Smaller relative errors are drawn there.
@@ -88,7 +88,8 @@ def fitness_quality_figure(runs: DataFrame, colours: Mapping[str, int]) -> Any:
             if np.isfinite(middle):
                 axis.plot([max(middle, 100.0 * FLOOR)] * 2, [k - 0.42, k + 0.42], color=INK, lw=2.0, zorder=5)
         row_names(axis, i, names)
-        axis.set(xscale="log", title=setting, xlabel="largest relative error [%]", ylim=(len(names) - 0.5, -0.5))
+        log_axis(axis)
+        axis.set(title=setting, xlabel="largest relative error [%]", ylim=(len(names) - 0.5, -0.5))
         axis.grid(axis="x", alpha=0.3)
     legend_below(figure, 3, variant_handles(colours))
     return figure

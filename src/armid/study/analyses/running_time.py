@@ -210,5 +210,5 @@ def waterfall_figure(evidence: Evidence) -> Any:
     curves = [(setting, 100.0 * shares,
                {v: np.quantile(left[rows], shares, method="inverted_cdf") for v, rows in variants.items()})
               for setting, variants in evidence.groups.items()]  # fmt: skip
-    return line_panels(curves, evidence.colours, yscale="log", ylim=(0.6 * TARGETS[-1], 1.6), ylabel="share of the way left",
-                       xlabel="runs, the best first [%]")  # fmt: skip
+    return line_panels(curves, evidence.colours, yscale="log", ylim=(0.6 * TARGETS[-1], 1.6),
+                       xlabel="runs, the best first [%]", ylabel="share of the way left")  # fmt: skip

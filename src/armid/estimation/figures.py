@@ -1,0 +1,174 @@
+"""Figures of an identification: the fit of each record, the search, and ellipses of pairs of parameters."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import combinations
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+
+from armid.estimation.identify import Identification
+from armid.estimation.information import Information
+from armid.model import Array
+from armid.problem.fitness import SIMILARITIES
+from armid.problem.problem import Replay, judged_by
+from armid.problem.space import Space
+from armid.report.document import points, record_axes, small_axes
+from armid.report.style import GREY, OKABE_ITO, PALE, legend_below, panels, pyplot
+from armid.units import scale_of, shown
+
+MOST_FITS_DRAWN = 8
+# Letters of a title that fit above one column.
+LINE = 60
+MOST_PAIRS = 6
+# Title and caption of the ellipses.
+PAIRS = (
+    "Pairs of parameters",
+    "The most correlated pairs: an ellipse holds both true values in 95 % of all cases, if the intervals hold. Narrow "
+    "ones: a change of one parameter is made up for by the other.",
+)
+# Half axis of the 95 % ellipse of two normal variables, in standard deviations: root of chi2 of 2 degrees of freedom.
+ELLIPSE = 2.4477
+
+
+def figures_of(found: Identification) -> dict[str, Callable[[], Any]]:
+    made: dict[str, Callable[[], Any]] = {"fit": lambda: fit_figure(found)}
+    made |= {"convergence": lambda: convergence_figure(found)} if len(found.trace[0]) else {}
+    own = found.candidate[found.space.free], found.campaign.truth
+    draws = None if found.scatter is None else found.scatter.draws
+    return made | pairs_of(found.campaign.name, found.space, found.information, *own, draws)
+
+
+def fit_figure(found: Identification) -> Any:
+    replays = chosen(found)
+    figure, axes = record_axes(len(replays), 4.4, (3, 1.4))
+    for pair, replay in zip(axes, replays, strict=True):
+        factor, unit = shown(1.0, replay.record.unit)
+        curves = curves_of(replay, found.candidate)
+        rms = factor * np.sqrt(np.mean(curves["residual"] ** 2))
+        pair[0].set_title(f"{replay.name} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
+        draw_record(pair, {name: (replay.times, y) for name, y in curves.items()}, replay.record.unit)
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=2, frameon=False)
+    there_are = len(found.train_replays) + len(found.holdout_replays)
+    model = " + ".join([found.model.plant.name, *(e.name for e in found.model.effects)])
+    some = "" if len(replays) == there_are else f" ({len(replays)} of {there_are} records)"
+    title = f"{found.campaign.name}: {model}, {found.identifier} on {found.fitness.name}{some}"
+    figure.suptitle(fill(title, LINE * (1 if len(replays) == 1 else 2)), fontsize="large")
+    return figure
+
+
+def curves_of(replay: Replay, candidate: Array) -> dict[str, Array]:
+    measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])[0]
+    return {"measured": measured, "simulated": simulated, "residual": measured - simulated}
+
+
+def chosen(found: Identification) -> list[Replay]:
+    """Return the records that are drawn: the first of each role where there are too many."""
+    train, holdout = list(found.train_replays), list(found.holdout_replays)
+    n_holdout = min(len(holdout), max(MOST_FITS_DRAWN // 2, MOST_FITS_DRAWN - len(train)))
+    return train[: MOST_FITS_DRAWN - n_holdout] + holdout[:n_holdout]
+
+
+def record_figure(curves: Mapping[str, Mapping[str, Any]], unit: str) -> Any:
+    """Draw a stored record for a page. curves: those of `details.json`."""
+    figure, pair = small_axes(6.0, 4.0, (3, 1.4))
+    draw_record(pair, {name: points(curve) for name, curve in curves.items()}, unit)
+    pair[0].legend(frameon=False, fontsize="small")
+    return figure
+
+
+def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) -> None:
+    (upper, lower), (factor, unit) = axes, shown(1.0, si_unit)
+    looks = {"measured": {"color": OKABE_ITO["black"], "lw": 1.6},
+             "simulated": {"color": OKABE_ITO["vermilion"], "lw": 1.3, "ls": "--"}}  # fmt: skip
+    for name, look in looks.items():
+        x, y = curves[name]
+        upper.plot(x, factor * y, label=name, **look)
+    x, y = curves["residual"]
+    lower.axhline(0.0, color=GREY, lw=0.8)
+    lower.plot(x, factor * y, color=OKABE_ITO["blue"], lw=0.8)
+    upper.set_ylabel(f"{'speed' if si_unit in ('rad/s', 'm/s') else 'signal'} [{unit}]")
+    upper.tick_params(labelbottom=False)
+    lower.set(ylabel=f"residual\n[{unit}]", xlabel="time [s]")
+    for axis in axes:
+        axis.margins(x=0.01)
+
+
+def convergence_figure(found: Identification) -> Any:
+    """Draw the best fitness, or for a similarity its degree, against the number of simulations."""
+    from matplotlib.ticker import LogLocator, StrMethodFormatter
+
+    similarity = found.fitness.name.partition(":")[0] in SIMILARITIES
+    evaluations, values = found.trace
+    x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
+    figure, axis = pyplot().subplots(figsize=(6.8, 4.2), layout="constrained")
+    # the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs
+    units = {r.record.unit for r in judged_by(found.fitness, found.train_replays)}
+    si_unit = next(iter(units)) if found.fitness.unit == "signal" and len(units) == 1 else ""
+    factor, unit = shown(1.0, si_unit) if si_unit else (1.0, "")
+    height = 1.0 - y if similarity else y * factor
+    axis.step(x, height, where="post", color=OKABE_ITO["blue"], lw=1.8)
+    if not similarity and np.min(y) > 0.0:
+        # plain numbers at 1, 2, 5
+        axis.set_yscale("log")
+        axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+        axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))
+    named = f"{found.fitness.name} [{unit}]" if unit else found.fitness.name
+    axis.set(ylabel="similarity degree of the best" if similarity else f"best {named}", xlabel="simulations")
+    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {height[-1]:.6g} {unit}"
+    axis.set_title(text.rstrip(), fontsize="medium")
+    return figure
+
+
+def pairs_of(
+    campaign: str, space: Space, information: Information, x: Array, truth: Mapping[str, float],
+    draws: Array | None = None,
+) -> dict[str, Callable[[], Any]]:  # fmt: skip
+    """Return what draws ellipses, by the name of the figure; nothing where no two parameters are determined.
+
+    x: SI, (n_free,). draws: estimates of a bootstrap, whose scatter decides then, SI, (n_draws, n_free). truth: known
+    true values, SI.
+    """
+    covariance = information.correlation * np.outer(information.deviation, information.deviation)
+    draws = None if draws is None or len(draws) < 2 else draws
+    if draws is not None:
+        covariance = np.atleast_2d(np.cov(draws.T))
+    known = np.flatnonzero(np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0)).tolist()
+    if len(known) < 2:
+        return {}
+    return {"pairs": partial(pair_figure, campaign, space, covariance, known, x, truth, draws)}
+
+
+def pair_figure(
+    campaign: str, space: Space, covariance: Array, known: Sequence[int], x: Array, truth: Mapping[str, float],
+    draws: Array | None,
+) -> Any:  # fmt: skip
+    """Draw the 95 % ellipses of the pairs that are correlated most, see `pairs_of`."""
+    deviation = np.sqrt(np.diag(covariance))
+    pairs = sorted(combinations(known, 2), key=lambda p: -abs(covariance[p]) / (deviation[p[0]] * deviation[p[1]]))
+    units = [unit for unit, free in zip(space.units, space.free, strict=True) if free]
+    scales = [scale_of(unit, value) for unit, value in zip(units, x, strict=True)]
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    figure, axes = panels(len(pairs[:MOST_PAIRS]), 3, 3.8, 3.4)
+    for axis, (i, j) in zip(axes, pairs[:MOST_PAIRS], strict=True):
+        r = covariance[i, j] / (deviation[i] * deviation[j])
+        ring = np.array([np.cos(angle), r * np.cos(angle) + np.sqrt(1.0 - min(r**2, 1.0)) * np.sin(angle)])
+        factors, names = (scales[i][1], scales[j][1]), (space.free_names[i], space.free_names[j])
+        ellipse = (f * (x[k] + ELLIPSE * deviation[k] * part) for f, k, part in zip(factors, (i, j), ring, strict=True))
+        axis.fill(*ellipse, fc="none", ec=OKABE_ITO["blue"], lw=1.6, label="95 % ellipse")
+        axis.plot(factors[0] * x[i], factors[1] * x[j], "o", color=OKABE_ITO["blue"], ms=5, label="estimate")
+        if draws is not None:
+            axis.plot(factors[0] * draws[:, i], factors[1] * draws[:, j], ".", color=PALE, ms=3, zorder=0,
+                      label="draws of the noise")  # fmt: skip
+        if truth.keys() >= set(names):
+            axis.plot(factors[0] * truth[names[0]], factors[1] * truth[names[1]], "*", color=OKABE_ITO["black"], ms=10,
+                      label="true value")  # fmt: skip
+        axis.set(xlabel=f"{names[0]} [{scales[i][0]}]", ylabel=f"{names[1]} [{scales[j][0]}]")
+        axis.ticklabel_format(useOffset=False)
+        axis.locator_params(nbins=4)
+        axis.set_title(f"correlation {r:+.3f}", fontsize="small")
+    legend_below(figure, 4)
+    figure.suptitle(f"{campaign}: pairs of parameters", fontsize="medium")
+    return figure
