@@ -23,7 +23,7 @@ INK, PALE, GREY = "#222222", "0.75", "0.6"
 DPI = 130
 MANY_MARKS = 1_000
 MOST_POINTS = 1_000
-# Largest ratio of the ends of an axis with plain numbers at 1, 2 and 5.
+# Largest ratio of the ends of a logarithmic axis with plain numbers.
 MOST_PLAIN = 300.0
 # Where labels stand outside of a frame [inch]: behind tick labels of six letters.
 BELOW_INCH, LEFT_INCH = 0.34, 0.6
@@ -100,13 +100,13 @@ def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list
 
 
 def log_axis(axis: Any) -> None:
-    """Make the x axis of what is drawn logarithmic, with plain numbers at 1, 2, 5 where it spans few powers of ten."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+    """Make the x axis of what is drawn logarithmic, with plain numbers where it spans few powers of ten."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
     axis.set_xscale("log")
     low, high = axis.get_xlim()
     if high < MOST_PLAIN * low:
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_locator(MaxNLocator(5) if high < 10.0 * low else LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.xaxis.set_minor_formatter(NullFormatter())
 
