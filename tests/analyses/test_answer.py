@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from made_results import PAPER_CASES
 
 from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.answer import answer_of
 from armid.study.analyses.overview import main_table
-from armid.study.analyses.ranks import RANKS, arrived, rank_tests, steps_of, tied
+from armid.study.analyses.ranks import RANKS, arrived, rank_tests, steps_of, suite_answer, tied
 
 
 def on_the_same_noise(made, offsets, **more):
@@ -90,3 +91,21 @@ def test_a_study_that_was_cut_off_after_its_first_case_has_an_answer_and_ranks_n
     assert "the tests" not in answer
     (text,) = RANKS.parts(evidence)
     assert "arrive" not in text.text
+
+
+def test_the_answer_of_a_suite_says_who_cannot_be_told_from_the_best_and_where_the_own_stands(made):
+    cases = [{**PAPER_CASES[i % 5], "name": f"p{i}", "suite": f"p{i}", "difficulty": "valley", "floor": 0.0,
+              "bounds": {key: [0, 1] for key in "abcd"}} for i in range(12)]  # fmt: skip
+    results = made(cases=cases, noises=(0.0,), seeds=2, budget=400,
+                   identifiers={"cmaes": 1e-5, "near": 1e-5, "mine": 1e-3, "pso": 1e-2})  # fmt: skip
+    results.study |= {"budget_per_parameter": [100], "plugins": ["mine.py:mine"]}
+    evidence = Evidence(results)
+    (said,) = suite_answer(evidence)
+    best, other = ("cmaes", "near") if "best is cmaes" in said else ("near", "cmaes")
+    assert f"best is {best}" in said
+    assert f"; the tests cannot tell {other} from it. Your own" in said
+    assert "Your own mine comes 3 with " in said
+    assert "The paper's swarm (pso) comes 4 with " in said
+    assert "loses against cmaes" in said.partition("The paper's swarm")[2]
+    results.study["plugins"] = []
+    assert "Your own" not in suite_answer(Evidence(results))[0]

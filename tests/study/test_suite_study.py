@@ -93,7 +93,7 @@ def test_a_report_in_words(written, tmp_path):
     assert [s.title for s in document.sections][:2] == ["Ranks by class of difficulty", "At any time"]
     first, second = document.said[:2]
     assert first.startswith("Budget 5 D, 6 cases: best is ")
-    assert "the paper's swarm (pso) comes" in second
+    assert "The paper's swarm (pso) comes" in second
     assert not any("too easy" in sentence for sentence in document.said)  # two identifiers do not tell
     # by hand: the mean rank is that of the medians over the seeds
     table = document.main[0].frame

@@ -7,17 +7,14 @@ from pandas import DataFrame, Series
 
 from armid.report.document import listed
 from armid.study.analyses.analysis import PAPER, Evidence, is_swarm
-from armid.study.analyses.ranks import arrived_text, compared, suite_answer
+from armid.study.analyses.ranks import alike_text, arrived_text, compared, suite_answer
 
 # The answer names so many settings; the table holds all.
 MOST_SETTINGS = 3
 # Of the paper's simulations: what its table is to be beaten with.
 QUARTER = 0.25
-# Of the identifiers that do not differ significantly from the best, so many are named.
-MOST_ALIKE = 4
 # A parameter whose mean error is more times its scatter than this is off, whatever the search does.
 OFF = 3.0
-SURE = 0.05
 
 
 def answer_of(evidence: Evidence, overview: Any) -> tuple[str, ...]:
@@ -111,9 +108,7 @@ def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
         return text
     pairs = tests.pairs[(tests.pairs["first"] == name) | (tests.pairs["second"] == name)]
     named = zip(pairs["first"], pairs["second"], pairs["p_holm"], strict=True)
-    alike = [str(a if b == name else b) for a, b, p in named if not p < SURE]
-    some = listed(alike[:MOST_ALIKE]) + (f" and {len(alike) - MOST_ALIKE} more" if len(alike) > MOST_ALIKE else "")
-    text += f"; the tests cannot tell {some} from it" if alike else "; it is better than each other by the tests"
+    text += alike_text([(str(a if b == name else b), p) for a, b, p in named])
     return f"{text}; {arrived_text(reached)}" if len(reached) else text
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame, Series
 
 from armid.model import Array
-from armid.report.document import Column, Figure, Part, Table, Text, slug
+from armid.report.document import Column, Figure, Part, Table, Text, listed, slug
 from armid.report.style import INK, line_look, pyplot
 from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, is_swarm
 
@@ -21,6 +21,8 @@ from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, i
 FLOOR = 1e-8
 # With noise, a smaller difference than this share of the Cramer-Rao standard deviation is no difference.
 SHARE_OF_BOUND = 0.01
+# A smaller corrected p tells two identifiers apart. The answer names so many that it does not tell from the best.
+SURE, MOST_ALIKE = 0.05, 4
 # An identifier has arrived when more than this share of its runs has.
 HALF = 0.5
 # A critical-difference diagram of fewer cases would say little.
@@ -366,47 +368,62 @@ SWARM_CAPTION = (
 
 
 def swarm_pairs(evidence: Evidence) -> Table:
-    from statsmodels.stats.multitest import multipletests
-
-    problem_of, rows = {c["name"]: c["suite"] for c in evidence.study["cases"]}, []
+    rows: list[tuple[object, ...]] = []
     for setting in evidence.settings:
-        values = final_values(evidence, setting)
-        swarm = next((v for v in values.columns if is_swarm(v)), None)
-        if swarm is None or values.empty or values.shape[1] < 2:
-            continue
-        logs = DataFrame(np.log(values), index=values.index, columns=values.columns)
-        means = DataFrame(np.exp(logs.groupby(values.index.map(problem_of)).mean()), columns=values.columns)
-        others = [v for v in values.columns if v != swarm]
-        ratios = [float((means[swarm] / means[other]).median()) for other in others]
-        p = [signed_rank(means[swarm].to_numpy(), means[other].to_numpy()) for other in others]
-        corrected = multipletests(p, method="holm")[1]
-        rows += [(setting, swarm, *line) for line in zip(others, ratios, corrected, strict=True)]
+        swarm = next((v for v in evidence.once(final_values, setting).columns if is_swarm(v)), None)
+        rows += [(setting, swarm, *line) for line in against(evidence, setting, swarm)] if swarm else []
     columns = (BUDGET, Column("swarm", "swarm"), Column("variant", "against"), Column("ratio", "ratio", ".3g"),
                Column("p", "p, Holm", ".2g"))  # fmt: skip
     frame = DataFrame(rows, columns=[column.key for column in columns])
     return Table("swarm", "The paper's swarm against the others", SWARM_CAPTION, frame, columns, grouped=True)
 
 
+def against(evidence: Evidence, setting: str, one: str) -> list[tuple[str, float, float]]:
+    """Return each other variant with the ratio of what `one` and it leave, and the corrected p of their test."""
+    from statsmodels.stats.multitest import multipletests
+
+    values, problem_of = evidence.once(final_values, setting), {c["name"]: c["suite"] for c in evidence.study["cases"]}
+    others = [v for v in values.columns if v != one]
+    if values.empty or not others:
+        return []
+    logs = DataFrame(np.log(values), index=values.index, columns=values.columns)
+    means = DataFrame(np.exp(logs.groupby(values.index.map(problem_of)).mean()), columns=values.columns)
+    ratios = [float((means[one] / means[other]).median()) for other in others]
+    p = [signed_rank(means[one].to_numpy(), means[other].to_numpy()) for other in others]
+    return list(zip(others, ratios, multipletests(p, method="holm")[1], strict=True))
+
+
+def alike_text(others: Sequence[tuple[str, float]]) -> str:
+    """Return which others the tests cannot tell from the best, "" without others. others: with their corrected p."""
+    alike = [name for name, p in others if not p < SURE]
+    more = f" and {len(alike) - MOST_ALIKE} more" if len(alike) > MOST_ALIKE else ""
+    if not alike:
+        return "; it is better than each other by the tests" if others else ""
+    return f"; the tests cannot tell {listed(alike[:MOST_ALIKE])}{more} from it"
+
+
 def suite_answer(evidence: Evidence) -> tuple[str, ...]:
-    """Return who is best at each budget, where the paper's swarm wins and loses, and whether the suite is too easy."""
+    """Return who is best at each budget, where plug-ins and the paper's swarm stand, and whether the suite is easy."""
     ranks, pairs = DataFrame(class_ranks(evidence).frame), DataFrame(swarm_pairs(evidence).frame)
     said, winners, classes = [], set(), [name for name in CLASSES if name in ranks]
     for setting, own in ranks.groupby("setting", sort=False):
         for name in classes:
             winners |= set(own.loc[own[name] <= own[name].min(), "variant"])
-        best, against = own.iloc[0], pairs[pairs["setting"] == setting]
-        line = f"Budget {setting}, {best['n']} cases: best is {best['variant']}, mean rank {best['text']} of {len(own)}"
-        if len(against):
-            swarm = own[own["variant"] == against["swarm"].iloc[0]].iloc[0]
-            place, sure = 1 + int((own["rank"] < swarm["rank"]).sum()), against["p"] < 0.05
+        best, tested = own.iloc[0], pairs[pairs["setting"] == setting]
+        alike = alike_text([(name, p) for name, _, p in against(evidence, str(setting), str(best["variant"]))])
+        line = f"Budget {setting}, {best['n']} cases: best is {best['variant']}, mean rank {best['text']}"
+        line += f" of {len(own)}{alike}."
+        line += "".join(f" Your own {v} {standing(own, v)}." for v in own["variant"] if v in evidence.own)
+        if len(tested):
+            swarm, sure = own[own["variant"] == tested["swarm"].iloc[0]].iloc[0], tested["p"] < SURE
             leads = [name for name in classes if swarm[name] <= own[name].min()]
             line += (
-                f"; the paper's swarm ({swarm['variant']}) comes {place} with {swarm['text']}: it wins against "
-                f"{with_ratios(against[sure & (against['ratio'] < 1.0)])}, loses against "
-                f"{with_ratios(against[sure & (against['ratio'] > 1.0)])}, cannot be told from the others, and is best "
-                f"{'on ' + ', '.join(leads) if leads else 'in no class'}"
+                f" The paper's swarm ({swarm['variant']}) {standing(own, swarm['variant'])}: it wins against "
+                f"{with_ratios(tested[sure & (tested['ratio'] < 1.0)])}, loses against "
+                f"{with_ratios(tested[sure & (tested['ratio'] > 1.0)])}, cannot be told from the others, and is best "
+                f"{'on ' + ', '.join(leads) if leads else 'in no class'}."
             )
-        said.append(f"{line}.")
+        said.append(line)
     easy = "fewer than three: the suite is too easy" if len(winners) < 3 else "so the suite is not too easy"
     if len(evidence.variants) < 3 or set(classes) < set(CLASSES):
         return tuple(said)
@@ -414,6 +431,11 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
             f"{easy}.")  # fmt: skip
 
 
-def with_ratios(against: DataFrame) -> str:
-    lines = zip(against["variant"], against["ratio"], strict=True)
+def standing(ranks: DataFrame, variant: str) -> str:
+    row = ranks[ranks["variant"] == variant].iloc[0]
+    return f"comes {1 + int((ranks['rank'] < row['rank']).sum())} with {row['text']}"
+
+
+def with_ratios(tested: DataFrame) -> str:
+    lines = zip(tested["variant"], tested["ratio"], strict=True)
     return ", ".join(f"{variant} (leaves {ratio:.2g} times as much)" for variant, ratio in lines) or "nobody"
