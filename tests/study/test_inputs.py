@@ -6,6 +6,7 @@ import pytest
 from scipy.signal import periodogram
 
 from armid.errors import ArmidError
+from armid.study.analyses.analysis import Evidence, wide_runs
 from armid.study.inputs import SIGNALS, input_values
 from armid.study.results import load_study
 from armid.study.runner import run_study
@@ -75,6 +76,22 @@ def test_random_cases_serve_a_plant_with_an_input(tmp_path, kind):
     assert len(runs) == 3
     assert (runs["error_mass"] < 1e-5).all()
     assert (runs["error_viscous.slope"] < 1e-5).all()
+
+
+def test_noise_is_told_in_the_unit_of_the_records(tmp_path):
+    study = tmp_path / "driven.toml"
+    text = STUDY.format(input=INPUTS["prbs"]).replace("interval_s", "noise_mm_s = [0.0, 2.0]\ninterval_s")
+    study.write_text(text, encoding="utf-8")
+    results = run_study(study, jobs=1, out=tmp_path / "out")
+    evidence = Evidence(results)
+    assert evidence.settings == ["noise-free", "2 mm/s"]
+    runs = wide_runs(evidence).set_index("setting")
+    assert sorted(set(runs["noise_mm_s"])) == [0.0, 2.0]
+    assert runs.loc["2 mm/s", "train_rmse"].to_numpy() == pytest.approx(np.full(3, 2e-3), rel=0.1)
+    assert (runs.loc["noise-free", "train_rmse"] < 1e-6).all()
+    study.write_text(text.replace("noise_mm_s", "noise_deg_s"), encoding="utf-8")
+    with pytest.raises(ArmidError, match="noise_deg_s is given, but the records are in m/s, noise_mm_s is expected"):
+        read_study(study)
 
 
 @pytest.mark.parametrize("kind", INPUTS)

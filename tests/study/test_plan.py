@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from small_study import RUNS_A_SEED, same_results
 
-from armid.study.cases import DEGREE, clean_records
+from armid.study.cases import clean_records
 from armid.study.results import load_study
 from armid.study.run_cache import RunCache
 from armid.study.runner import run_study
 from armid.study.tasks import read_study
+from armid.units import DEGREE
 
 STUDIES = Path(__file__).parents[2] / "studies"
 RANDOM = """\

@@ -22,6 +22,7 @@ from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_windo
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.inputs import input_values, inputs_of
 from armid.study.spec import (
+    NOISES,
     WHOLE,
     CaseSpec,
     ManoeuvreSpec,
@@ -30,7 +31,7 @@ from armid.study.spec import (
     StudySpec,
     SuiteSpec,
 )
-from armid.units import DEGREE
+from armid.units import SUFFIXES
 
 MOST_SAMPLES = 10**7
 KNOWN = "known"
@@ -333,6 +334,11 @@ def in_window(record: Record, window: Sequence[float] | str) -> Record:
     return record if window == WHOLE else with_window(record, (float(window[0]), float(window[1])), record.file)
 
 
+def noise_rms(settings: Mapping[str, Any], unit: str) -> float:
+    """Return the noise of a run, SI: `noise_deg_s` holds the level in the unit of the study's key, see `NOISES`."""
+    return float(SUFFIXES[unit][NOISES[unit]] * settings["noise_deg_s"])
+
+
 def noisy_records(records: Sequence[Record], settings: Mapping[str, Any]) -> tuple[Record, ...]:
     """Return the records with white noise of the gyro added, of an rms that is known and need not be estimated.
 
@@ -340,8 +346,9 @@ def noisy_records(records: Sequence[Record], settings: Mapping[str, Any]) -> tup
     """
     words = "\0".join(str(settings[word]) for word in ("noise_seed", "case", "noise_deg_s", "seed"))
     rng = np.random.default_rng(np.frombuffer(hashlib.sha256(words.encode()).digest(), dtype="<u4"))
-    rms, noisy = DEGREE * settings["noise_deg_s"], []
+    noisy = []
     for record in records:
+        rms = noise_rms(settings, record.unit)
         known = Noise(rms, 0.0, 0.0, 1.0, record.measured.size, KNOWN)
         signal = record.measured + rms * rng.standard_normal(record.measured.size)
         noisy.append(_with_signal(replace(record, noise=known), signal))

@@ -15,9 +15,8 @@ from armid.problem.space import Space, space_of
 from armid.problem.suite import VERSION, suite
 from armid.record import Campaign, Record
 from armid.record.reader import NAME
-from armid.study.cases import campaign_folder, clean_records, in_window, noisy_records, unchanged_campaign
+from armid.study.cases import campaign_folder, clean_records, in_window, noise_rms, noisy_records, unchanged_campaign
 from armid.study.spec import StudyRegistry, lookup
-from armid.units import DEGREE
 
 # How many cases, each at one level of noise and in one window, are kept ready in a process.
 MOST_KEPT = 512
@@ -68,7 +67,7 @@ class RunCache:
         accuracy = None if settings["accuracy"] == "auto" else settings["accuracy"]
         if level:
             # the accuracy that is enough depends on how loud the noise is, not on how it turns out
-            records = [replace(r, noise=replace(r.noise, rms=DEGREE * level)) for r in records]
+            records = [replace(r, noise=replace(r.noise, rms=noise_rms(settings, r.unit))) for r in records]
         replays = tuple(r for record in records for r in replay_of(record, model, space, accuracy).each)
         train = iter(with_fitted_starts(tuple(r for r in replays if r.record.role == "train"), space))
         replays = tuple(next(train) if r.record.role == "train" else r for r in replays)

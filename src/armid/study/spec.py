@@ -125,10 +125,17 @@ ROLE = one_of("train", "holdout")
 BOUNDS = key(table_of(list_of(number, 2, 2)), "[low, high] in SI", "Bounds of the search, by parameter.")
 FIXED = key(table_of(number), "a finite number in SI", "Values of parameters that are not searched.")
 FITNESSES = key(one_or_more(text), "a name or a list of names", "What is minimised; `armid list fitness` shows them.")
-LEVELS = key(
-    one_or_more(at_least_zero), "a number of at least 0 in deg/s, or a list of such",
-    "Standard deviation of the white noise that is added to simulated records.",
-)  # fmt: skip
+# SI unit of the simulated records -> end of the key that says their noise, such as `noise_deg_s`.
+NOISES = {"rad/s": "deg_s", "rad": "deg", "m/s": "mm_s", "m": "mm"}
+
+
+def levels(unit: str) -> Mapping[str, Any]:
+    return key(
+        one_or_more(at_least_zero), f"a number of at least 0 in {unit}, or a list of such",
+        f"Standard deviation of the white noise that is added to simulated records in {unit}.",
+    )  # fmt: skip
+
+
 STUDY_NAME = key(
     plain_name,
     "a plain name of letters, digits, '_', '-' and '.'",
@@ -248,7 +255,10 @@ class EntrySpec:
     budget: tuple[int, ...] | None = field(default=None, metadata=BUDGETS)
     budget_per_parameter: tuple[int, ...] | None = field(default=None, metadata=PER_PARAMETER)
     fitness: tuple[str, ...] | None = field(default=None, metadata=FITNESSES)
-    noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=LEVELS)
+    noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=levels("deg/s"))
+    noise_deg: tuple[float, ...] | None = field(default=None, metadata=levels("deg"))
+    noise_mm_s: tuple[float, ...] | None = field(default=None, metadata=levels("mm/s"))
+    noise_mm: tuple[float, ...] | None = field(default=None, metadata=levels("mm"))
     seeds: tuple[int, ...] | None = field(default=None, metadata=SEEDS)
     options: Mapping[str, Any] = field(default_factory=dict, metadata=key(
         options, "a number, a text, true or false", "Its options; `armid list identifiers --long` shows them.",
@@ -271,7 +281,10 @@ class StudySpec:
     kind: str = field(default=IDENTIFIES, metadata=kind_key(IDENTIFIES))
     report: str = field(default="", metadata=report_key(REPORTS))
     fitness: tuple[str, ...] = field(default=("similarity",), metadata=FITNESSES)
-    noise_deg_s: tuple[float, ...] = field(default=(0.0,), metadata=LEVELS)
+    noise_deg_s: tuple[float, ...] = field(default=(0.0,), metadata=levels("deg/s"))
+    noise_deg: tuple[float, ...] = field(default=(0.0,), metadata=levels("deg"))
+    noise_mm_s: tuple[float, ...] = field(default=(0.0,), metadata=levels("mm/s"))
+    noise_mm: tuple[float, ...] = field(default=(0.0,), metadata=levels("mm"))
     noise_seed: int = field(default=1, metadata=SEED)
     windows_s: tuple[tuple[float, float] | str, ...] = field(default=(WHOLE,), metadata=key(
         one_or_more(window), f"'{WHOLE}', or a list of [begin, end] in seconds and '{WHOLE}'",

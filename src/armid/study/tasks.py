@@ -38,6 +38,7 @@ from armid.study.spec import (
     CLOSES_LOOP,
     IDENTIFIES,
     KIND_NAMES,
+    NOISES,
     REPORTS,
     EntrySpec,
     StudyRegistry,
@@ -208,7 +209,7 @@ class Study:
             raise unknown_name("report", spec.report, REPORTS[1:], where)
         plant = Model(lookup(registry.plants, spec.plant, "plant", where))
         model = registry.with_effects(plant, spec.effects, where)
-        entries = _entries(spec, registry, where)
+        entries = _entries(spec, model.plant.output_unit, registry, where)
         cases = cases_of(spec, model, registry, folder, where)
         for entry in entries:
             _check_noise(entry, cases, registry, where)
@@ -358,14 +359,14 @@ class Study:
         })  # fmt: skip
 
 
-def _entries(spec: StudySpec, registry: StudyRegistry, where: str) -> tuple[Entry, ...]:
-    """Return the identifiers of a study, each built once with its budget to see that it can be."""
+def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) -> tuple[Entry, ...]:
+    """Return the identifiers of a study, each built once with its budget to see that it can be; unit: of records."""
     entries: list[Entry] = []
     for i, table in enumerate(spec.identifiers):
         name = table.get("label", table.get("name"))
         at = f"{where}, identifier {quoted(name) if isinstance(name, str) else i + 1}"
         own = validated(EntrySpec, table, at)
-        noise = spec.noise_deg_s if own.noise_deg_s is None else own.noise_deg_s
+        noise = _levels(own, spec, unit, at)
         entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
                       own.fitness or spec.fitness, noise, own.seeds or spec.seeds,
                       own.budget_per_parameter or spec.budget_per_parameter)  # fmt: skip
@@ -375,6 +376,19 @@ def _entries(spec: StudySpec, registry: StudyRegistry, where: str) -> tuple[Entr
         for other in entries[:i]:
             _check_apart(entry, other, where)
     return tuple(entries)
+
+
+def _levels(own: EntrySpec, spec: StudySpec, unit: str, where: str) -> tuple[float, ...]:
+    """Return the levels of the noise; a key for records in another unit is refused. unit: of the records, SI."""
+    given: dict[str, tuple[float, ...]] = {}
+    for of, end in NOISES.items():
+        told = getattr(own, f"noise_{end}")
+        given[of] = getattr(spec, f"noise_{end}") if told is None else told
+    for of, found in given.items():
+        if of != unit and any(found):
+            wanted = f"noise_{NOISES[unit]} is" if unit in NOISES else "no noise is"
+            raise ArmidError(f"{where}: noise_{NOISES[of]} is given, but the records are in {unit}, {wanted} expected")
+    return given.get(unit, (0.0,))
 
 
 def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
@@ -409,15 +423,13 @@ def _check_apart(entry: Entry, other: Entry, where: str) -> None:
 
 
 def _check_noise(entry: Entry, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
-    """Refuse a fitness that needs noise where there is none, and noise that the plant's speed cannot have."""
+    """Refuse a fitness that needs noise where there is none."""
     at = f"{where}, identifier '{entry.label}'"
-    simulated = any(case.strokes for case in cases)
+    simulated, end = any(case.strokes for case in cases), NOISES.get(cases[0].model.plant.output_unit, "")
     for fitness in entry.fitness:
         if "noise" in fitness_of_name(fitness, registry.fitness).asks and 0.0 in entry.noise_deg_s and simulated:
-            raise ArmidError(f"{at}: fitness '{fitness}' needs noise, but noise_deg_s holds 0, levels of its own that "
+            raise ArmidError(f"{at}: fitness '{fitness}' needs noise, but noise_{end} holds 0, levels of its own that "
                              "are above 0 are expected")  # fmt: skip
-    if any(entry.noise_deg_s) and any(case.model.plant.output_unit != "rad/s" for case in cases):
-        raise ArmidError(f"{at}: noise_deg_s is given, but the plant's speed is no angular one, 0 is expected")
 
 
 def _case_description(case: Case) -> dict[str, Any]:

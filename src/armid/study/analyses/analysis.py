@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,6 +13,8 @@ from armid.model import Array
 from armid.report.document import Column, Part, Table
 from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
+from armid.study.spec import NOISES
+from armid.units import scale_of
 
 Small = NDArray[np.float32]
 P = TypeVar("P", bound=Part)
@@ -112,7 +114,7 @@ def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
     return errors
 
 
-NOISE_FREE = "noise-free"
+NOISE_FREE, SPEED = "noise-free", "rad/s"
 PAPER = "the paper's pso"
 # Variants that a table of every row and parameter is printed for, beside the paper's own method.
 MOST_OTHERS = 3
@@ -147,7 +149,8 @@ class Evidence:
         self._made: dict[Any, Any] = {}
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
-        self.runs = ordered(outcomes(results.runs, self.parameters), self.study)
+        unit = str(self.study.get("unit", SPEED))
+        self.runs = ordered(outcomes(results.runs, self.parameters, unit), self.study)
         budgets = Series("", index=self.runs.index)
         if self.study.get("budget_per_parameter"):
             budgets = Series(budget_texts(self.runs, self.study), index=self.runs.index)
@@ -156,7 +159,7 @@ class Evidence:
         elif (self.runs.groupby(["identifier", "case"])["budget"].nunique() > 1).any():
             budgets = self.runs["budget"].map("{:,}".format)
             self.runs["setting"] += ", " + budgets + " simulations"
-        whole = self.runs.assign(noise=self.runs["noise_deg_s"].map(noise_text), budget=budgets)
+        whole = self.runs.assign(noise=self.runs["noise_deg_s"].map(partial(noise_text, unit=unit)), budget=budgets)
         self._apart = whole.drop_duplicates("setting").set_index("setting")[list(APART)]
         keys = ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]
         done = self.runs.loc[self.runs["status"] == "done", keys]
@@ -292,6 +295,7 @@ def wide_runs(evidence: Evidence) -> DataFrame:
     columns = {"value": "", "truth": "_truth", "relative_error": "_error", "deviation": "_deviation",
                "at_bound": "_at_bound"}  # fmt: skip
     wide = evidence.runs.drop(columns=["started_at", "model", "versions"], errors="ignore")
+    wide = wide.rename(columns={"noise_deg_s": f"noise_{NOISES.get(str(evidence.study.get('unit')), NOISES[SPEED])}"})
     wide.insert(0, "study", str(evidence.study["name"]))
     values: dict[str, Series[Any]] = {}
     for name, rows in evidence.parameters.groupby("parameter", sort=False):
@@ -301,15 +305,15 @@ def wide_runs(evidence: Evidence) -> DataFrame:
     return wide.join(DataFrame(values, index=wide.index))
 
 
-def outcomes(runs: DataFrame, parameters: DataFrame) -> DataFrame:
+def outcomes(runs: DataFrame, parameters: DataFrame, unit: str = SPEED) -> DataFrame:
     """Return the runs with `variant`, `setting` (noise, and the window of several) and `largest_error`.
 
     variant: label of the identifier, and the fitness where a label ran on several. largest_error: relative, over the
-    free parameters whose truth is known; infinite for a failed run, NaN where no truth is known.
+    free parameters whose truth is known; infinite for a failed run, NaN where no truth is known. unit: of the records.
     """
     on_a_case = runs.groupby(["identifier", "case"])["fitness"].transform("nunique")
     several = on_a_case.groupby(runs["identifier"]).transform("max") > 1
-    noise = runs["noise_deg_s"].map(noise_text)
+    noise = runs["noise_deg_s"].map(partial(noise_text, unit=unit))
     largest = runs["run"].map(parameters.groupby("run", sort=False)["relative_error"].max())
     return runs.assign(
         variant=runs["identifier"].where(~several, runs["identifier"] + " on " + runs["fitness"]),
@@ -326,10 +330,11 @@ def budget_texts(runs: DataFrame, study: dict[str, Any]) -> list[str]:
             for c, b in zip(runs["case"], runs["budget"], strict=True)]  # fmt: skip
 
 
-def noise_text(noise_deg_s: float) -> str:
-    if np.isnan(noise_deg_s):
+def noise_text(level: float, unit: str = SPEED) -> str:
+    """Return a level of noise in words; unit: of the records, SI."""
+    if np.isnan(level):
         return "as recorded"
-    return NOISE_FREE if noise_deg_s == 0.0 else f"{noise_deg_s:g} deg/s"
+    return NOISE_FREE if level == 0.0 else f"{level:g} {scale_of(unit)[0]}"
 
 
 def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
