@@ -30,6 +30,7 @@ from armid.study.analyses.success import SUCCESS, success, success_figure, succe
 from armid.study.analyses.table1 import TABLE1
 from armid.study.analyses.table2 import TABLE2
 from armid.study.document import report_of, summary_of
+from armid.units import angles_in
 
 
 def test_the_overview_begins_with_the_paper(made):
@@ -44,12 +45,32 @@ def test_the_overview_begins_with_the_paper(made):
     assert row["largest_worst"] == own["relative_error"].max()
 
 
-def test_without_truths_there_are_medians_of_the_values(made):
+def test_without_truths_there_are_medians_of_the_values_in_units_that_people_read(made):
     evidence = Evidence(made(seeds=2))
     evidence.parameters = evidence.parameters.assign(truth=np.nan)
-    frame = main_table(evidence).frame.set_index(["setting", "variant", "parameter"])
+    table = main_table(evidence)
+    frame = table.frame.set_index(["setting", "variant", "parameter"])
     own = evidence.estimates.groupby(["setting", "variant", "parameter"])["value"].median()
+    own[own.index.get_level_values("parameter") == "p0"] *= 1e-6
     assert frame["median"].to_dict() == own.to_dict()
+    assert frame["unit"].groupby("parameter").first().to_dict() == {"p0": "MPa", "k": "1", "eta3": "1", "n": "1"}
+    headers = [c.header for c in table.columns]
+    shown = [row[headers.index("RMSE train [deg/s]")].text for row in table.cells()]
+    assert shown[0] == f"{np.degrees(0.01):.4g}"
+
+
+@pytest.mark.parametrize(("angle", "label", "factor"), [("deg", "deg/s", 180.0 / np.pi), ("rad", "rad/s", 1.0)])
+def test_a_study_shows_its_fitness_in_the_unit_of_its_records(made, angle, label, factor):
+    results = made(seeds=1, noises=(0.0,), fitness=("rmse",))
+    results.parameters["truth"] = np.nan
+    results.study |= {"angle": angle, "unit": "rad/s"}
+    document = report_of(results)
+    least = factor * results.runs.groupby("identifier")["value"].median().min()
+    assert f"{least:.6g} of rmse [{label}]." in document.answer[0]
+    with angles_in(document.angle):
+        figure = next(f for f in document.figures if f.name == "convergence_fitness").draw()
+    assert figure.axes[0].get_ylabel() == f"best fitness (rmse [{label}])"
+    plt.close(figure)
 
 
 def test_runs_are_counted_with_their_failures_and_reasons(made):

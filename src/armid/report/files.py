@@ -9,6 +9,7 @@ import numpy as np
 from armid.report.document import Document, Table
 from armid.report.latex import latex
 from armid.report.style import save, save_for_print
+from armid.units import angles_in
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -23,16 +24,18 @@ def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
         path_of(f"{table.name}.csv").write_text(csv(table), encoding="utf-8")
         if table.most:
             path_of(f"{table.name}.tex").write_text(latex(table), encoding="utf-8")
-    for figure in document.figures:
-        if figure.draw is not None:
-            save(figure.draw(), path_of(f"{figure.name}.png"), path_of(f"{figure.name}.svg"))
+    with angles_in(document.angle):
+        for figure in document.figures:
+            if figure.draw is not None:
+                save(figure.draw(), path_of(f"{figure.name}.png"), path_of(f"{figure.name}.svg"))
 
 
 def write_prints(document: Document, width: str, path_of: Callable[[str], Path]) -> None:
     """Write each figure as PDF of the width of a page's "single" or "double" column."""
-    for figure in document.figures:
-        if figure.draw is not None:
-            save_for_print(figure.draw, path_of(f"{figure.name}.pdf"), width)
+    with angles_in(document.angle):
+        for figure in document.figures:
+            if figure.draw is not None:
+                save_for_print(figure.draw, path_of(f"{figure.name}.pdf"), width)
 
 
 def csv(table: Table) -> str:

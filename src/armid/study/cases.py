@@ -31,7 +31,7 @@ from armid.study.spec import (
     StudySpec,
     SuiteSpec,
 )
-from armid.units import SUFFIXES
+from armid.units import DEG, SUFFIXES
 
 MOST_SAMPLES = 10**7
 KNOWN = "known"
@@ -47,7 +47,8 @@ class Case:
     """Hold one case: manoeuvres to simulate (strokes), a campaign to read (source) or a problem of `armid.suite()`.
 
     truth: parameter -> true value, SI, empty where not known. published: values of others to stand beside. source:
-    campaign, its folder relative to the study's file; records, its files; digest, of them and campaign.toml.
+    campaign, its folder relative to the study's file; records, its files; digest, of them and campaign.toml. angle: in
+    which that campaign shows angles.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Case:
     published: Mapping[str, float] = field(default_factory=dict)
     strokes: tuple[dict[str, Any], ...] = ()
     source: dict[str, Any] | None = None
+    angle: str = DEG
     suite: SuiteProblem | None = None
 
     @property
@@ -162,7 +164,7 @@ def _campaign_case(
                 with_window(record, window, f"{where}, windows_s")
     files = tuple(r.file for r in campaign.records)
     source = {"campaign": folder_name, "records": files, "digest": digest_of(path, (NAME, *files))}
-    return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source)
+    return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source, campaign.angle)
 
 
 def campaign_folder(folder: Path, campaign: str, where: str) -> Path:

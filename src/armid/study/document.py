@@ -18,6 +18,7 @@ from armid.study.analyses.overview import main_table
 from armid.study.analyses.ranks import class_ranks
 from armid.study.results import StudyResults
 from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
+from armid.units import DEG, angles_in
 
 BESIDE = "each table is there as CSV and LaTeX too, each figure as SVG."
 ALONE = "A seed decides the search alone; the noise is the records' own."
@@ -42,7 +43,7 @@ def report_of(
     Raises ArmidError when no run has ended, for a key to a study that knows its truths, for a kind of study that nobody
     knows, and for an analysis of a user that returns no table and no figure.
     """
-    study, own = results.study, own or {}
+    study, own, angle = results.study, own or {}, str(results.study.get("angle", DEG))
     closes_loops = known_kind(study) == CLOSES_LOOP
     if key is not None and not closes_loops:
         raise ArmidError(f"study '{study['name']}' knows its truths, a key is not expected")
@@ -57,25 +58,27 @@ def report_of(
         found = [Section("Verdicts", (verdicts(runs),)), Section("Campaigns", (campaigns(runs),))]
         facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
     else:
-        evidence = Evidence(results)
-        analyses = OF_SUITES if evidence.is_suite else ANALYSES
-        found = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
-        facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, found[0].parts[0])
+        with angles_in(angle):
+            evidence = Evidence(results)
+            analyses = OF_SUITES if evidence.is_suite else ANALYSES
+            found = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
+            facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, found[0].parts[0])
     sections = (*(s for s in found if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)
     whole = state.startswith("Complete")
     return Document(
         study["name"], "Study", str(study.get("question", "")), (*answer, state) if whole else answer, sections,
-        warning="" if whole else state, facts=facts, main=sections[0].parts,
+        warning="" if whole else state, facts=facts, main=sections[0].parts, angle=angle,
     )  # fmt: skip
 
 
 def summary_of(results: StudyResults) -> Document:
     """Return state and main table alone; no trace is read."""
     if known_kind(results.study) == IDENTIFIES:
-        evidence = Evidence(results)
-        main = class_ranks(evidence) if evidence.is_suite else main_table(evidence)
-        main, answer = evidence.apart(main), answer_of(evidence, main)
+        with angles_in(str(results.study.get("angle", DEG))):
+            evidence = Evidence(results)
+            main = class_ranks(evidence) if evidence.is_suite else main_table(evidence)
+            main, answer = evidence.apart(main), answer_of(evidence, main)
     else:
         runs = loop_runs(results.loops)
         main, answer = verdicts(runs), (counted(runs),)

@@ -46,6 +46,7 @@ from armid.study.spec import (
     lookup,
     study_registry,
 )
+from armid.units import DEG
 
 if TYPE_CHECKING:
     from armid.study.loops import LoopStudy
@@ -258,7 +259,7 @@ class Study:
 
     def description(self, _: Path = Path()) -> dict[str, Any]:
         """Return what a report needs to know, as JSON can hold it, wherever the store is."""
-        spec, entries = self.spec, self.entries
+        spec, entries, angles = self.spec, self.entries, {case.angle for case in self.cases}
         return {
             "name": self.name,
             "question": spec.question,
@@ -267,6 +268,7 @@ class Study:
             "text": self.text,
             "plant": spec.plant,
             "unit": self.cases[0].model.plant.output_unit,
+            "angle": angles.pop() if len(angles) == 1 else DEG,
             "effects": list(spec.effects),
             "budget": max(spec.budget),
             "fitness": list(dict.fromkeys(f for e in entries for f in e.fitness)),

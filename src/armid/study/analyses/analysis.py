@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pandas import DataFrame, Series
 
 from armid.model import Array
+from armid.problem.fitness import FITNESS
 from armid.report.document import Column, Part, Table
 from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
@@ -149,8 +150,9 @@ class Evidence:
         self._made: dict[Any, Any] = {}
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
-        unit = str(self.study.get("unit", SPEED))
-        self.runs = ordered(outcomes(results.runs, self.parameters, unit), self.study)
+        # of the records, SI; older studies do not tell it
+        self.unit = str(self.study.get("unit", SPEED))
+        self.runs = ordered(outcomes(results.runs, self.parameters, self.unit), self.study)
         budgets = Series("", index=self.runs.index)
         if self.study.get("budget_per_parameter"):
             budgets = Series(budget_texts(self.runs, self.study), index=self.runs.index)
@@ -159,7 +161,8 @@ class Evidence:
         elif (self.runs.groupby(["identifier", "case"])["budget"].nunique() > 1).any():
             budgets = self.runs["budget"].map("{:,}".format)
             self.runs["setting"] += ", " + budgets + " simulations"
-        whole = self.runs.assign(noise=self.runs["noise_deg_s"].map(partial(noise_text, unit=unit)), budget=budgets)
+        noise = self.runs["noise_deg_s"].map(partial(noise_text, unit=self.unit))
+        whole = self.runs.assign(noise=noise, budget=budgets)
         self._apart = whole.drop_duplicates("setting").set_index("setting")[list(APART)]
         keys = ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]
         done = self.runs.loc[self.runs["status"] == "done", keys]
@@ -295,7 +298,7 @@ def wide_runs(evidence: Evidence) -> DataFrame:
     columns = {"value": "", "truth": "_truth", "relative_error": "_error", "deviation": "_deviation",
                "at_bound": "_at_bound"}  # fmt: skip
     wide = evidence.runs.drop(columns=["started_at", "model", "versions"], errors="ignore")
-    wide = wide.rename(columns={"noise_deg_s": f"noise_{NOISES.get(str(evidence.study.get('unit')), NOISES[SPEED])}"})
+    wide = wide.rename(columns={"noise_deg_s": f"noise_{NOISES.get(evidence.unit, NOISES[SPEED])}"})
     wide.insert(0, "study", str(evidence.study["name"]))
     values: dict[str, Series[Any]] = {}
     for name, rows in evidence.parameters.groupby("parameter", sort=False):
@@ -334,7 +337,15 @@ def noise_text(level: float, unit: str = SPEED) -> str:
     """Return a level of noise in words; unit: of the records, SI."""
     if np.isnan(level):
         return "as recorded"
-    return NOISE_FREE if level == 0.0 else f"{level:g} {scale_of(unit)[0]}"
+    return NOISE_FREE if level == 0.0 else f"{level:g} {NOISES[unit].replace('_s', '/s')}"
+
+
+def fitness_scale(name: str, unit: str) -> tuple[str, float]:
+    """Return the unit of a fitness as it is written behind its name, and its factor from SI; unit: of the records."""
+    if name not in FITNESS or FITNESS[name].unit != "signal":
+        return "", 1.0
+    shown_unit, factor = scale_of(unit)
+    return f" [{shown_unit}]", factor
 
 
 def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:

@@ -6,7 +6,7 @@ import numpy as np
 from pandas import DataFrame, Series
 
 from armid.report.document import listed
-from armid.study.analyses.analysis import PAPER, Evidence, is_swarm
+from armid.study.analyses.analysis import PAPER, Evidence, fitness_scale, is_swarm
 from armid.study.analyses.ranks import alike_text, arrived_text, compared, suite_answer
 
 # The answer names so many settings; the table holds all.
@@ -130,7 +130,9 @@ def lowest_fitness(evidence: Evidence) -> str:
     if done.empty:
         return "No run has a result."
     medians = done.groupby(["fitness", "variant"], sort=False)["value"].median()
-    said = [f"{medians.loc[f].idxmin()}, {medians.loc[f].min():.6g} of {f}" for f in dict.fromkeys(done["fitness"])]
+    scales = {f: fitness_scale(str(f), evidence.unit) for f in dict.fromkeys(done["fitness"])}
+    said = [f"{medians.loc[f].idxmin()}, {factor * medians.loc[f].min():.6g} of {f}{unit}"
+            for f, (unit, factor) in scales.items()]  # fmt: skip
     return f"No truth is known. Lowest median fitness: {'; '.join(said)}."
 
 

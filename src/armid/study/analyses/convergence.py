@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.report.document import Column, Figure, Part, Table, slug
-from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence
+from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, fitness_scale
 from armid.study.analyses.running_time import PAIRS_HIT, SHARES, line_panels, share_hit
 
 Array = NDArray[np.floating[Any]]
@@ -37,7 +37,9 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     names = list(dict.fromkeys(map(str, evidence.runs["fitness"])))
     for name in names:
         own = (evidence.runs["fitness"] == name).to_numpy()
-        draw = partial(convergence_figure, evidence, own, kept.values, f"best fitness ({name})", LEAST_FITNESS)
+        unit, factor = fitness_scale(name, evidence.unit)
+        label = f"best fitness ({name}{unit})"
+        draw = partial(convergence_figure, evidence, own, factor * kept.values, label, LEAST_FITNESS)
         file = slug("convergence", name) if len(names) > 1 else "convergence_fitness"
         figures.append(Figure(file, f"Convergence of {name}", FITNESS_CAPTION.format(fitness=name), draw))
     return figures

@@ -3,11 +3,14 @@
 Also the last table of every report: what was run, and why runs stopped.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from pandas import DataFrame, Series, factorize
 
 from armid.report.document import Column, Table
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VARIANT, Analysis, Evidence
+from armid.units import scale_of
 
 OVERVIEW_CAPTION = (
     "Relative error abs(value - truth)/abs(truth) in %, mean and median over all finished runs (cases and seeds "
@@ -19,9 +22,9 @@ PAPER_CAPTION = (
     f" The line '{PAPER}' is computed from the values that the paper printed, one run a row, on its own data."
 )
 VALUES_CAPTION = (
-    "No truth is known. Median and population standard deviation of each parameter over all finished runs [SI], "
+    "No truth is known. Median and population standard deviation of each parameter over all finished runs, "
     "Cramer-Rao standard deviation at the solution (median), the errors of the result on the train and the holdout "
-    "records (medians, in the unit of the signal), and runs of which the parameter ended on its bound."
+    "records (medians), and runs of which the parameter ended on its bound."
 )
 RUNS_CAPTION = (
     "One line a noise and identifier. budget, used: simulations of a run (median used); diverged: share of the used "
@@ -43,7 +46,7 @@ RUNS_COLUMNS = (
 
 def main_table(evidence: Evidence) -> Table:
     if not evidence.knows_truth:
-        return values(evidence.runs, evidence.estimates)
+        return values(evidence.runs, evidence.estimates, evidence.unit)
     is_table1 = evidence.study.get("report") == "table1"
     return overview(evidence.runs, evidence.estimates, evidence.published if is_table1 else evidence.published[:0])
 
@@ -95,14 +98,21 @@ def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
     return row
 
 
-def values(runs: DataFrame, estimates: DataFrame) -> Table:
+def values(runs: DataFrame, estimates: DataFrame, unit: str) -> Table:
+    """Return what the parameters are, in units that people read; unit: of the records, SI."""
     joined = estimates.merge(runs[["run", "train_rmse", "holdout_rmse"]], on="run")
     frame = joined.groupby(["setting", "variant", "parameter", "unit"], sort=False).agg(
         n=("run", "size"), median=("value", "median"), deviation=("value", lambda v: v.std(ddof=0)),
         bound=("deviation", "median"), train=("train_rmse", "median"), holdout=("holdout_rmse", "median"),
         n_at_bound=("at_bound", "sum"),
     ).reset_index()  # fmt: skip
-    return Table("values", "Parameters found", VALUES_CAPTION, frame, VALUES_COLUMNS, grouped=True)
+    scales, (signal, factor) = list(map(scale_of, frame["unit"], frame["median"])), scale_of(unit)
+    frame = frame.assign(unit=[name for name, _ in scales], **{
+        key: frame[key] * [scale for _, scale in scales] for key in ("median", "deviation", "bound")
+    })  # fmt: skip
+    columns = tuple(replace(c, header=f"{c.header} [{signal}]", factor=factor) if c.key in ("train", "holdout") else c
+                    for c in VALUES_COLUMNS)  # fmt: skip
+    return Table("values", "Parameters found", VALUES_CAPTION, frame, columns, grouped=True)
 
 
 def runs_table(runs: DataFrame, parameters: DataFrame) -> Table:
