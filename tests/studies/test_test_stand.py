@@ -49,7 +49,8 @@ def test_a_campaign_is_written_in_the_fixed_format(quick: Path) -> None:
     last = {"file": "empty.csv", "role": "holdout", **manoeuvre, "target_angle_deg": 22.0, "shell": False}
     again = first | {"file": "short_2.csv", "repeat_of": "short.csv"}
     heading = {"name": "quick", "plant": "shell_transfer_arm", "gyro_range_deg_s": 200}
-    assert told(quick) == {**heading, "tolerances": {"default": 0.0}, "records": [first, again, last]}
+    known = {"truth": {"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4}, "tolerances": {"default": 0.0}}
+    assert told(quick) == {**heading, **known, "records": [first, again, last]}
     assert (quick / "short.csv").read_text().startswith("time_s,angular_velocity_deg_s\n-0.100,")
     assert speeds(quick / "short.csv").shape == (301, 2)
 
