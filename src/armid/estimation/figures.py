@@ -146,26 +146,29 @@ def pair_figure(
     draws: Array | None,
 ) -> Any:  # fmt: skip
     """Draw the 95 % ellipses of the pairs that are correlated most, see `pairs_of`."""
-    deviation = np.sqrt(np.diag(covariance))
-    pairs = sorted(combinations(known, 2), key=lambda p: -abs(covariance[p]) / (deviation[p[0]] * deviation[p[1]]))
     units = [unit for unit, free in zip(space.units, space.free, strict=True) if free]
     scales = [scale_of(unit, value) for unit, value in zip(units, x, strict=True)]
+    labels = [f"{name} [{unit}]" for name, (unit, _) in zip(space.free_names, scales, strict=True)]
+    factor, deviation = np.array([factor for _, factor in scales]), np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):  # of those that are not known
+        correlation = covariance / np.outer(deviation, deviation)
+    true = np.array([truth.get(name, np.nan) for name in space.free_names])
+    layers = [(x, {"marker": "o", "color": OKABE_ITO["blue"], "ms": 5, "label": "estimate"})]
+    if draws is not None:
+        layers += [(draws, {"marker": ".", "color": PALE, "ms": 3, "zorder": 0, "label": "draws of the noise"})]
+    if not np.isnan(true).all():
+        layers += [(true, {"marker": "*", "color": OKABE_ITO["black"], "ms": 10, "label": "true value"})]
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    figure, axes = panels(len(pairs[:MOST_PAIRS]), 3, 3.8, 3.4)
-    for axis, (i, j) in zip(axes, pairs[:MOST_PAIRS], strict=True):
-        r = covariance[i, j] / (deviation[i] * deviation[j])
-        ring = np.array([np.cos(angle), r * np.cos(angle) + np.sqrt(1.0 - min(r**2, 1.0)) * np.sin(angle)])
-        factors, names = (scales[i][1], scales[j][1]), (space.free_names[i], space.free_names[j])
-        ellipse = (f * (x[k] + ELLIPSE * deviation[k] * part) for f, k, part in zip(factors, (i, j), ring, strict=True))
-        axis.fill(*ellipse, fc="none", ec=OKABE_ITO["blue"], lw=1.6, label="95 % ellipse")
-        axis.plot(factors[0] * x[i], factors[1] * x[j], "o", color=OKABE_ITO["blue"], ms=5, label="estimate")
-        if draws is not None:
-            axis.plot(factors[0] * draws[:, i], factors[1] * draws[:, j], ".", color=PALE, ms=3, zorder=0,
-                      label="draws of the noise")  # fmt: skip
-        if truth.keys() >= set(names):
-            axis.plot(factors[0] * truth[names[0]], factors[1] * truth[names[1]], "*", color=OKABE_ITO["black"], ms=10,
-                      label="true value")  # fmt: skip
-        axis.set(xlabel=f"{names[0]} [{scales[i][0]}]", ylabel=f"{names[1]} [{scales[j][0]}]")
+    pairs = sorted(combinations(known, 2), key=lambda pair: -abs(correlation[pair]))[:MOST_PAIRS]
+    figure, axes = panels(len(pairs), 3, 3.8, 3.4)
+    for axis, pair in zip(axes, map(list, pairs), strict=True):
+        r = correlation[tuple(pair)]
+        ring = np.array([np.cos(angle), r * np.cos(angle) + np.sqrt(max(1.0 - r**2, 0.0)) * np.sin(angle)]).T
+        ellipse = factor[pair] * (x[pair] + ELLIPSE * deviation[pair] * ring)
+        axis.fill(*ellipse.T, fc="none", ec=OKABE_ITO["blue"], lw=1.6, label="95 % ellipse")
+        for values, look in layers:
+            axis.plot(*(factor * np.atleast_2d(values))[:, pair].T, ls="", **look)
+        axis.set(xlabel=labels[pair[0]], ylabel=labels[pair[1]])
         axis.ticklabel_format(useOffset=False)
         axis.locator_params(nbins=4)
         axis.set_title(f"correlation {r:+.3f}", fontsize="small")
