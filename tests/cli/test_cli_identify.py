@@ -55,12 +55,11 @@ def test_writes_result_and_figures_and_the_same_bits_in_another_process(
 ):
     text, result = identified("--seed", "7")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
-        "convergence.png", "convergence.svg", "details.json", "fit.png", "report.html", "report.md",
-        "result.json",
+        "convergence.png", "convergence.svg", "details.json", "fit.png", "pairs.png", "pairs.svg", "report.html",
+        "report.md", "result.json",
     ]  # fmt: skip
-    assert (
-        "wrote result.json, fit.png, convergence.png, convergence.svg, details.json, report.md, report.html to" in text
-    )
+    wrote = "fit.png, convergence.png, convergence.svg, pairs.png, pairs.svg, details.json, report.md, report.html to"
+    assert f"wrote result.json, {wrote}" in text
     assert (result["budget"], result["used"], result["seed"], result["unit"]) == (160, 160, 7, "rad/s")
     assert result["campaign"] == "paper_arm"
     # its TOML stands for the folder
@@ -229,14 +228,14 @@ def test_a_whole_run(run, small_folder, tmp_path):
                   "The tolerances of the constants counted, the deviations are: p0 "):  # fmt: skip
         assert words in ran.out
     assert sorted(p.name for p in out.iterdir()) == [
-        "identifiability.html", "identifiability.json", "identifiability.md", "profiles.png",
+        "identifiability.html", "identifiability.json", "identifiability.md", "pairs.png", "pairs.svg", "profiles.png",
         "profiles.svg", "sensitivities.png", "sensitivities.svg",
     ]  # fmt: skip
     told = json.loads((out / "identifiability.json").read_text())
     assert told["ranked_by"] == "worst"
     assert told["groups"][0]["names"] == ["p0", "eta3", "n"]
     page = (out / "identifiability.html").read_text()
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3
     assert "p0, eta3 and n move together" in page
     again = run("report", out)
     assert (again.code, (out / "identifiability.html").read_text()) == (0, page)

@@ -30,13 +30,13 @@ def test_report_table_and_figures_are_written(stand, tmp_path, capsys):
     assert report["probabilities"]["effects"]["supply_sag"] > 0.99
     text = (tmp_path / "out" / "report.md").read_text()
     figures = ["motion.png", "residuals.png", "diagnosis.png", "probabilities.png", "intervals.png", "parameters.png",
-               "autocorrelation.png"]  # fmt: skip
+               "against.png", "autocorrelation.png"]  # fmt: skip
     for name in figures:
         assert f"]({name})" in text
         assert (tmp_path / "out" / name).stat().st_size > 10_000
     page = (tmp_path / "out" / "report.html").read_text()
     # stored ones, and one for each of the five records
-    assert page.count("<svg") == 6 + 5
+    assert page.count("<svg") == 7 + 5
     for wanted in ("Explained: The declared model lacked supply_sag", "+     supply_sag.supply = ", "armid close-loop ",
                    "How probable each is", "Error on the records held out"):  # fmt: skip
         assert wanted in page, wanted
