@@ -14,10 +14,12 @@ from pymoo.core.algorithm import Algorithm
 from rich.console import Console
 
 import armid
+from armid.by_name import campaign_of
 from armid.cli.new import INERTIA
 from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS
+from armid.registry import load_registry
 from armid.report.result import Result, Shown
 from armid.report.style import pyplot
 from armid.units import angles_in, scale_of
@@ -103,6 +105,41 @@ def test_tables_are_a_campaign(found, axis):
         other = armid.identify(tables, plant=plant, effects=["viscous"], identifier="least_squares")
         np.testing.assert_allclose(other.candidate, found.candidate, rtol=1e-9)
     assert armid.simulate(tables["synthetic_train"], plant="driven_axis", inertia=0.05).campaign.train[0].file
+
+
+def test_a_table_is_read_as_its_file_would_be(axis):
+    table = pd.read_csv(Path(axis) / "synthetic_train.csv").astype({"time_s": "float32", "drive_N_m": "float32"})
+    table["note"], table["load_kg"] = "none yet", pd.array([pd.NA, *range(1, len(table))], dtype="Int64")
+    table.attrs = {"window_s": (np.float64(0.0), 1), "constants": {"gain": np.int64(1)}}
+    (record,) = campaign_of({"move": table}, "driven_axis", load_registry([])).records
+    (speed,), (own, *_) = record.signals, armid.read_campaign(axis).records
+    np.testing.assert_array_equal(speed.measured, own.measured)
+    np.testing.assert_array_equal(record.manoeuvre.inputs["u"], own.manoeuvre.inputs["u"])
+    assert (record.file, record.constants["gain"], record.pieces[0].window.start) == ("move.csv", 1.0, 0)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda t: t.assign(time_s="late"), "move.csv, line 2: time_s is 'late', a finite number is expected"),
+    (lambda t: t.assign(drive_N_m=t["drive_N_m"].where(t.index != 3)), "line 5: drive_N_m has no number there"),
+    (lambda t: t.assign(drive_N_m=t["drive_N_m"].where(t.index != 3, np.inf)), "line 5: drive_N_m is inf, a finite"),
+    (lambda t: t.assign(drive_N_m=t["drive_N_m"] > 0.0), "line 2: drive_N_m is 'False', a finite number is expected"),
+    (lambda t: t.iloc[:0], "move.csv holds no samples"),
+    (lambda t: t.set_axis([*t.columns[:-1], "time_s"], axis=1), "line 1: column 'time_s' is there twice"),
+    (lambda t: t.set_axis(range(t.shape[1]), axis=1), "numbers are there, and no header"),
+    (lambda t: marked(t, role="both"), "tables, record 'move.csv': key 'role' is 'both', .* expected"),
+    (lambda t: marked(t, window_s=t), "tables, record 'move.csv': key 'window_s' is"),
+    (lambda t: marked(t, rolle="train"), "key 'rolle' is unknown, did you mean 'role'"),
+])  # fmt: skip
+def test_what_is_wrong_in_a_table_is_said_as_of_its_file(axis, change, said):
+    table = pd.read_csv(Path(axis) / "synthetic_train.csv")
+    with pytest.raises(armid.DataError, match=said) as caught:
+        armid.identify({"move": change(table)}, plant="driven_axis")
+    assert "\n" not in str(caught.value)
+
+
+def marked(table, **attrs):
+    table.attrs = attrs
+    return table
 
 
 def test_simulating_and_examining(axis, tmp_path):

@@ -11,7 +11,6 @@ from copy import deepcopy
 from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -23,8 +22,8 @@ from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.progress import announced, search_bar, status_line
 from armid.record import Campaign, read_campaign
-from armid.record.campaign import warned_once
-from armid.record.schema import Known, toml
+from armid.record.campaign import campaign_of_tables, warned_once
+from armid.record.schema import Known
 from armid.registry import Registry, load_registry, name_of
 from armid.units import ANGLES, angles_in
 
@@ -142,14 +141,8 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
     for name in names:
         if {"/", "\\"} & {*name}:
             raise DataError(f"the table {quoted(name)} is called like a path: a name without a folder is expected")
-    lines = ['name = "tables"', f"plant = {toml(plant.name if isinstance(plant, Plant) else plant)}"]
-    with TemporaryDirectory(prefix="armid-") as folder:
-        for name, each in zip(names, tables, strict=True):
-            each.to_csv(Path(folder) / f"{name}.csv", index=False)
-            keys = {"role": "train"} | {str(k): v for k, v in each.attrs.items()} | {"file": f"{name}.csv"}
-            lines += ["[[records]]", *(f"{key} = {toml(value)}" for key, value in keys.items())]
-        (Path(folder) / "campaign.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
-        return read_campaign(folder, registry.plants, registry.effects)
+    named = plant.name if isinstance(plant, Plant) else plant
+    return campaign_of_tables(named, dict(zip(names, tables, strict=True)), registry.plants, registry.effects)
 
 
 def each_of(given: Any) -> Iterator[Any]:

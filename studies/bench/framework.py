@@ -17,7 +17,7 @@ from armid.identifiers import IDENTIFIERS
 from armid.model import PLANTS, Model
 from armid.problem.fitness import FITNESS, Fitness
 from armid.problem.meter import Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem, Replay, replays
+from armid.problem.problem import IdentificationProblem, ReadyRecord, Replay, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
 from bench.measure import CPU, Bound, Row
@@ -43,7 +43,7 @@ class Spent:
 
 
 class Watched:
-    """Stand in for a replay, a fitness or a function, and add the time of its work to what was spent on `name` [s]."""
+    """Stand in for a record, a fitness or a function, and add the time of its work to what was spent on `name` [s]."""
 
     def __init__(self, thing: Any, spent: dict[str, float], name: str) -> None:
         self._thing, self._spent, self._name = thing, spent, name
@@ -75,7 +75,7 @@ def sample_replays(n_samples: int = 701) -> tuple[Replay, ...]:
 def identification(made_ready: tuple[Replay, ...], n_iterations: int) -> Spent:
     """Identify with the paper's swarm as `armid identify` does, and tell where the time went."""
     spent = defaultdict[str, float](float)
-    watched = tuple(cast(Replay, Watched(r, spent, "simulation")) for r in made_ready)
+    watched = tuple(Replay(cast(ReadyRecord, Watched(r.ready, spent, "simulation"))) for r in made_ready)
     measure = cast(Fitness, Watched(FITNESS["similarity"], spent, "fitness"))
     meter = Meter(N_PARTICLES * n_iterations)
     start = CPU()

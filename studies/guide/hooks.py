@@ -3,6 +3,7 @@
 MkDocs calls `on_files` and `on_page_markdown`. A page that lies elsewhere in the repository is shown from there.
 """
 
+import json
 import re
 import runpy
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from mkdocs.structure.pages import Page
 
 import armid
 from armid.cli.main import app
-from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, default_of, is_required, toml
+from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, default_of, is_required
 from armid.study.spec import CaseSpec, EntrySpec, LoopSpec, ManoeuvreSpec, RandomCasesSpec, StudySpec, SuiteSpec
 
 ROOT = Path(__file__).parents[2]
@@ -72,7 +73,7 @@ def keys_page() -> str:
 
 def key_row(f: Any) -> str:
     default = default_of(f)
-    shown = "required" if is_required(f) else "" if default is None else f"`{toml(default)}`"
+    shown = "required" if is_required(f) else "" if default is None else f"`{json.dumps(default)}`"
     cells = (f"`{f.name}`", f.metadata["expected"], shown, f.metadata["meaning"])
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 

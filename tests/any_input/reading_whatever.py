@@ -96,10 +96,10 @@ def assert_sound(campaign):
         assert np.isfinite(record.noise.rms)
         for piece in record.pieces:
             assert np.isfinite(list(piece.manoeuvre.constants.values())).all()
-            assert piece.measured.shape == (piece.manoeuvre.n_samples,)
-            assert 0 <= piece.window.start < piece.window.stop <= piece.measured.size
+            assert piece.of(record.measured).shape == (piece.manoeuvre.n_samples,)
+            assert 0 <= piece.window.start < piece.window.stop <= piece.manoeuvre.n_samples
             for values in piece.manoeuvre.inputs.values():
-                assert values.shape == piece.measured.shape
+                assert values.shape == (piece.manoeuvre.n_samples,)
                 assert np.isfinite(values).all()
 
 

@@ -25,9 +25,9 @@ from armid.estimation.advice import (
 from armid.estimation.design import Motions, manoeuvre_grid
 from armid.estimation.least_squares import estimate, refine, weighted_records
 from armid.model import EFFECTS
-from armid.problem.problem import Replay
+from armid.problem.problem import ReadyRecord, Replay
 from armid.problem.space import space_of
-from armid.record import Noise, Piece, Record
+from armid.record import Noise, Piece, Record, Signal
 
 DEGREE = np.pi / 180.0
 NOISE = 0.5 * DEGREE
@@ -111,14 +111,14 @@ def made(model, manoeuvre, window, rng, file):
     """Return the record that the truth gives, with noise."""
     run = simulate(model, manoeuvre, candidate(model)[np.newaxis], Schedule(4))
     measured = run.output[0] + NOISE * rng.normal(size=manoeuvre.n_samples)
-    piece = Piece(manoeuvre, measured, window)
-    noise = Noise(NOISE, 0.0, 0.0, 1.0, 1000, "rest")
-    return Record(file, "train", "rad/s", manoeuvre, measured, np.empty(0), noise, (piece,), (piece,))
+    piece, noise = Piece(manoeuvre, window), Noise(NOISE, 0.0, 0.0, 1.0, 1000, "rest")
+    return Record(file, "train", manoeuvre, (Signal("", "rad/s", measured, np.empty(0), noise),), (piece,), (piece,))
 
 
 def fitted(name, model, records, start=None):
     space = space_of(model)
-    ready = tuple(Replay(r, model, r.pieces, (Calibration(Schedule(2), 1e-6, True),)) for r in records)
+    calibrations = (Calibration(Schedule(2), 1e-6, True),)
+    ready = tuple(Replay(ReadyRecord(r, model, r.pieces, calibrations)) for r in records)
     x = estimate(ready, space) if start is None else refine(ready, space, start)
     problem = weighted_records(ready, space)
     return Rival(name, problem, problem.shares(x), float(problem.chi2(problem.shares(x))[0]))

@@ -14,6 +14,7 @@ from armid.estimation.information import Level, information_at
 from armid.identifiers import IDENTIFIERS
 from armid.problem.fitness import FITNESS, Fitness
 from armid.record import Noise
+from changed_records import with_noise
 
 TRUTH = np.array([3.05e6, 0.9, 0.57, 1.2])
 NOISE = np.radians(0.25)
@@ -26,14 +27,12 @@ def stroke(lowering_replays):
     """One stroke of the arm, of which the noise is known and the motion is that of the truth."""
     replay = lowering_replays[0]
     noise = Noise(NOISE, 0.0, 0.0, 1.0, 400, "rest")
-    return noisy(replace(replay, record=replace(replay.record, noise=noise)), 1)
+    return noisy(replay.changed(record=with_noise(replay.record, **vars(noise))), 1)
 
 
 def noisy(replay, seed):
-    piece = replay.pieces[0]
     clean = replay.signal(TRUTH[np.newaxis])[0]
-    measured = clean + NOISE * np.random.default_rng(seed).standard_normal(len(clean))
-    return replace(replay, pieces=(replace(piece, measured=measured, window=slice(0, len(clean))),))
+    return replay.measuring(clean + NOISE * np.random.default_rng(seed).standard_normal(len(clean)))
 
 
 def minimum(fitness, replay, space):

@@ -28,6 +28,7 @@ from armid.problem.space import space_of
 from armid.record import read_campaign
 from armid.record.reader import record_constants
 from armid.record.schema import RecordSheet
+from changed_records import with_noise
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 DEGREE = np.pi / 180.0
@@ -170,7 +171,7 @@ NOISE = 0.25 * np.pi / 180.0
 @pytest.fixture(scope="module")
 def bought(paper_arm, arm, arm_space):
     """Offers after one lowering, by what they are ranked; the raising and the short stroke are among them."""
-    records = [replace(r, noise=replace(r.noise, rms=NOISE, effective_fraction=1.0)) for r in paper_arm.train]
+    records = [with_noise(r, rms=NOISE, effective_fraction=1.0) for r in paper_arm.train]
     told = replays(records, arm, arm_space)
     one = told[:1]
     information = information_at(one, arm_space, TRUTH)
@@ -235,14 +236,11 @@ def test_the_best_offer_holds_in_60_noises(bought, paper_arm, arm, arm_space):
     best = ranked("volume")[0]
     like = told[0]
     (piece,) = like.pieces
-    new = replace(like, pieces=(replace(piece, manoeuvre=best.feasible.manoeuvre),))
+    new = like.changed(pieces=(replace(piece, manoeuvre=best.feasible.manoeuvre),))
     rng, found = np.random.default_rng(2), []
     clean = [r.signal(TRUTH[np.newaxis])[0] for r in (like, new)]
     for _ in range(60):
-        noisy = tuple(
-            replace(r, pieces=(replace(r.pieces[0], measured=s + NOISE * rng.normal(size=s.size)),))
-            for r, s in zip((like, new), clean)
-        )
+        noisy = tuple(r.measuring(s + NOISE * rng.normal(size=s.size)) for r, s in zip((like, new), clean))
         found.append(refine(noisy, arm_space, TRUTH))
     np.testing.assert_allclose(np.std(found, axis=0) / best.after, 1.0, atol=0.35)
     assert (np.std(found, axis=0) < 0.7 * best.before).any()

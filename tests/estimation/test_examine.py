@@ -24,6 +24,7 @@ from armid.estimation.profile import THRESHOLD
 from armid.model import EFFECTS
 from armid.problem.problem import replays
 from armid.problem.space import space_of
+from changed_records import with_noise
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 
@@ -78,9 +79,7 @@ def test_unseen_moves_are_unseen(one_stroke, arm_space):
 
 def test_holdout_has_no_say(lowering, one_stroke, arm, arm_space):
     train, holdout = lowering.records
-    (piece,) = holdout.pieces
-    lost = replace(piece, measured=-7.0 * piece.measured)
-    garbage = replace(holdout, pieces=(lost,), measured=-7.0 * holdout.measured)
+    garbage = holdout.with_measured({holdout.output: -7.0 * holdout.measured})
     again = examine(replace(lowering, records=(train, garbage)), arm, arm_space)
     assert json.dumps(result_of(again)) == json.dumps(result_of(one_stroke))
 
@@ -129,16 +128,15 @@ def test_nothing_free_is_refused(lowering, arm, arm_space):
 def measuring(campaign, change, noise):
     """Return a campaign whose train records measured something else, with a noise."""
     (train,) = campaign.train
-    told = replace(train.noise, rms=noise)
-    pieces = tuple(replace(p, measured=change(p)) for p in train.pieces)
-    return replace(campaign, records=(replace(train, pieces=pieces, noise=told),))
+    told = with_noise(train, rms=noise).with_measured({train.output: change(train.measured)})
+    return replace(campaign, records=(told,))
 
 
 def test_without_noise_one_is_assumed_and_said(one_stroke, lowering, arm, arm_space):
     (clean,) = (r.signal(TRUTH[np.newaxis])[0] for r in one_stroke.replays)
 
-    def exact(piece):
-        return np.concatenate([clean, piece.measured[clean.size :]])
+    def exact(measured):
+        return np.concatenate([clean, measured[clean.size :]])
 
     found = examine(measuring(lowering, exact, 0.0), arm, arm_space)
     (level,) = found.information.levels
@@ -154,9 +152,9 @@ def test_without_noise_one_is_assumed_and_said(one_stroke, lowering, arm, arm_sp
 
 
 def test_a_misfit_widens_and_is_said(one_stroke, lowering, arm, arm_space):
-    def rocking(piece):
-        times = np.arange(piece.measured.size) * 1e-3
-        return piece.measured + 0.05 * np.sin(2 * np.pi * 8.0 * times)
+    def rocking(measured):
+        times = np.arange(measured.size) * 1e-3
+        return measured + 0.05 * np.sin(2 * np.pi * 8.0 * times)
 
     found = examine(measuring(lowering, rocking, lowering.train[0].noise.rms), arm, arm_space)
     assert found.information.levels[0].from_residual

@@ -19,6 +19,7 @@ from armid.problem.problem import replays
 from armid.problem.similarity import similarity
 from armid.problem.space import space_of
 from armid.record import read_campaign
+from changed_records import noisy
 
 CLEAN = ("--noise-deg-s", "0", "--quantisation-deg-s", "0", "--repeats", "1", "--holdout", "empty")
 TRUTH = np.array([3.2e6, 0.95, 0.60, 1.20])
@@ -58,8 +59,7 @@ def test_noise_leaves_the_truth_inside_the_intervals(found, paper_arm):
 def test_the_holdout_never_enters(found, lowering):
     def with_other_holdout(record):
         rng = np.random.default_rng(1)
-        pieces = [replace(p, measured=rng.normal(size=p.measured.size).cumsum()) for p in record.pieces]
-        return replace(record, pieces=tuple(pieces), measured=-5.0 * record.measured)
+        return record.with_measured({record.output: rng.normal(size=record.measured.size).cumsum()})
 
     other = replace(lowering, records=(lowering.records[0], with_other_holdout(lowering.records[1])))
     without = replace(lowering, records=lowering.records[:1])
@@ -134,7 +134,7 @@ def test_records_joined(several):
 
 
 def test_without_noise_there_is_no_chi_square(several):
-    quiet = replace(several[0], record=replace(several[0].record, noise=replace(several[0].record.noise, rms=0.0)))
+    quiet = noisy(several[0], rms=0.0)
     assert record_errors(quiet, CANDIDATE).chi2_per_sample is None
     assert campaign_errors((quiet, several[1]), CANDIDATE).chi2_per_sample is None
     assert campaign_errors((several[1],), CANDIDATE).chi2_per_sample is not None

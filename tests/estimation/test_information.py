@@ -12,9 +12,10 @@ from armid.estimation.identify_document import remarks
 from armid.estimation.information import collinear, information_at, information_of, sensitivities
 from armid.model import EFFECTS, Effect, Manoeuvre, Model, Parameter
 from armid.model.plants.driven_axis import linear_axis
-from armid.problem.problem import Replay, replays
+from armid.problem.problem import ReadyRecord, Replay, replays
 from armid.problem.space import space_of
-from armid.record import Noise, Piece, Record, read_campaign
+from armid.record import Noise, Piece, Record, Signal, read_campaign
+from changed_records import noisy
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 DEGREE = np.pi / 180.0
@@ -22,8 +23,7 @@ NOISE = 0.25 * DEGREE
 
 
 def with_noise(replay, rms, effective_fraction=1.0):
-    noise = replace(replay.record.noise, rms=rms, effective_fraction=effective_fraction)
-    return replace(replay, record=replace(replay.record, noise=noise))
+    return noisy(replay, rms=rms, effective_fraction=effective_fraction)
 
 
 @pytest.fixture(scope="module")
@@ -81,14 +81,8 @@ def test_two_names_for_one_thing_are_both_not_determined(lowering, arm):
     assert np.isfinite(information.deviation[:4]).all()
 
 
-def measuring(replay, signal):
-    """Return a replay of one piece that measured another signal in its window."""
-    piece = replay.pieces[0]
-    return replace(replay, pieces=(replace(piece, measured=np.array(signal), window=slice(0, len(signal))),))
-
-
 def test_without_noise_and_residual_the_interval_is_nothing(lowering_replays, arm_space):
-    clean = measuring(lowering_replays[0], lowering_replays[0].signal(TRUTH[np.newaxis])[0])
+    clean = lowering_replays[0].measuring(lowering_replays[0].signal(TRUTH[np.newaxis])[0])
     information = information_at((with_noise(clean, 0.0),), arm_space, TRUTH)
     np.testing.assert_array_equal(information.half_width, 0.0)
     assert not information.levels[0].from_residual
@@ -98,7 +92,7 @@ def test_without_noise_and_residual_the_interval_is_nothing(lowering_replays, ar
 def test_what_the_model_lacks_widens(lowering_replays, arm_space):
     replay = with_noise(lowering_replays[0], NOISE)
     swinging = 3.0 * DEGREE * np.sin(2 * np.pi * 8.0 * replay.times)
-    lacking = information_at((measuring(replay, replay.measured + swinging),), arm_space, TRUTH)
+    lacking = information_at((replay.measuring(replay.measured + swinging),), arm_space, TRUTH)
     plain = information_at((replay,), arm_space, TRUTH)
     assert not plain.levels[0].from_residual
     level = lacking.levels[0]
@@ -114,16 +108,16 @@ def test_what_the_model_lacks_widens(lowering_replays, arm_space):
 def test_what_probes_elsewhere_lose_in_the_engine_hides_no_misfit(lowering_replays, arm_space, lowering_found):
     """Probes over the top of an unbalanced disc said that the engine is off by more than the whole residual."""
     replay = with_noise(lowering_replays[0], NOISE)
-    swinging = measuring(replay, replay.measured + 3.0 * DEGREE * np.sin(2 * np.pi * 8.0 * replay.times))
+    swinging = replay.measuring(replay.measured + 3.0 * DEGREE * np.sin(2 * np.pi * 8.0 * replay.times))
     off = tuple(replace(c, error=100.0, reached=False) for c in swinging.calibrations)
-    level = information_at((replace(swinging, calibrations=off),), arm_space, TRUTH).levels[0]
+    level = information_at((swinging.changed(calibrations=off),), arm_space, TRUTH).levels[0]
     assert level.from_residual
-    coarse = tuple(replace(r, calibrations=off) for r in lowering_found.train_replays)
+    coarse = tuple(r.changed(calibrations=off) for r in lowering_found.train_replays)
     assert not any("the engine is off" in text for text in remarks(replace(lowering_found, train_replays=coarse)))
     # where the engine itself is off at the estimate, what it leaves is no misfit
     rough = tuple(replace(c, schedule=Schedule(1, refinement=1)) for c in replay.calibrations)
-    wrong = replace(with_noise(replay, 1e-9), calibrations=rough)
-    clean = measuring(wrong, replay.signal(TRUTH[np.newaxis])[0])
+    wrong = with_noise(replay, 1e-9).changed(calibrations=rough)
+    clean = wrong.measuring(replay.signal(TRUTH[np.newaxis])[0])
     assert clean.engine_error_at(TRUTH) > 0.0
     assert not information_at((clean,), arm_space, TRUTH).levels[0].from_residual
 
@@ -210,9 +204,10 @@ def axis_replay(rng, start_noise):
     noise = Noise(AXIS_NOISE, None, 0.0, 1.0, 1501, "differences")
 
     def replay(manoeuvre, measured):
-        piece = Piece(manoeuvre, measured, slice(0, 1501), start_deviation={"start_speed": start_noise})
-        record = Record("a.csv", "train", "m/s", manoeuvre, measured, np.empty(0), noise, (piece,), (piece,))
-        return Replay(record, model, (piece,), (calibration,))
+        piece = Piece(manoeuvre, slice(0, 1501), start_deviation={"start_speed": start_noise})
+        signal = Signal("", "m/s", measured, np.empty(0), noise)
+        record = Record("a.csv", "train", manoeuvre, (signal,), (piece,), (piece,))
+        return Replay(ReadyRecord(record, model, (piece,), (calibration,)))
 
     clean = replay(true, np.zeros(1501)).signal(np.array([[MASS, SLOPE]]))[0]
     return replay(told, clean + AXIS_NOISE * rng.normal(size=1501)), space
@@ -236,7 +231,7 @@ def test_intervals_cover_the_truth_in_spite_of_a_noisy_start():
 
 def surely_started(replay):
     """The same record, said to start from a state that is known: no noise of the start is reckoned with."""
-    return replace(replay, pieces=tuple(replace(piece, start_deviation={}) for piece in replay.pieces))
+    return replay.changed(pieces=tuple(replace(piece, start_deviation={}) for piece in replay.pieces))
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """What identification makes of a dead time: its value, its interval, its derivative, and that it is no lag."""
 
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,16 +86,11 @@ def test_intervals_hold_the_truth(fitted):
     signals, rng, found = [r.signal(truth)[0] for r in ready], np.random.default_rng(8), []
     for _ in range(24):
         pairs = zip(ready, signals, strict=True)
-        noisy = tuple(with_signal(r, s + NOISE * rng.standard_normal(len(s))) for r, s in pairs)
+        noisy = tuple(r.measuring(s + NOISE * rng.standard_normal(len(s))) for r, s in pairs)
         x = refine(noisy, space, np.array([DRUM, FRICTION, 0.012]))
         found.append((x[2] - DELAY) / information_at(noisy, space, x).deviation[2])
     assert np.sum(np.abs(found) > 1.96) <= 4
     assert abs(np.mean(found)) <= 3.0 / np.sqrt(24)
-
-
-def with_signal(replay, signal):
-    pieces = tuple(replace(p, measured=signal[: len(p.measured)]) for p in replay.pieces)
-    return replace(replay, pieces=pieces)
 
 
 def test_a_dead_time_is_no_lag_and_a_lag_no_dead_time(fitted):
@@ -111,7 +105,7 @@ def test_a_dead_time_is_no_lag_and_a_lag_no_dead_time(fitted):
     for name, make in (("dead time", None), ("lag", [r.signal(values)[0] for r in lagged])):
         for model, records in (("dead time", ready), ("lag", lagged)):
             own = records if make is None else tuple(
-                with_signal(r, s + NOISE * rng.standard_normal(len(s))) for r, s in zip(records, make, strict=True)
+                r.measuring(s + NOISE * rng.standard_normal(len(s))) for r, s in zip(records, make, strict=True)
             )  # fmt: skip
             box = space if model == "dead time" else lagging
             fit = refine(own, box, np.array([DRUM, FRICTION, 0.01]))

@@ -1,7 +1,7 @@
 """Least squares in the box against textbook problems and scipy's, and on the arm."""
 
 import threading
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from scipy.optimize import lsq_linear
 from armid.errors import ArmidError
 from armid.estimation.least_squares import LeastSquaresProblem, descend, estimate, fit, refine, side_by_side
 from armid.problem.space import Space
+from changed_records import noisy
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 
@@ -100,13 +101,7 @@ def test_a_parameter_without_influence_stays_where_it_is():
 
 def clean(replays):
     """Return replays that measured the truth without noise."""
-    found = []
-    for r in replays:
-        (piece,) = r.pieces
-        signal = r.signal(TRUTH[np.newaxis])[0]
-        noise = replace(r.record.noise, rms=0.0)
-        found.append(replace(r, pieces=(replace(piece, measured=signal),), record=replace(r.record, noise=noise)))
-    return tuple(found)
+    return tuple(noisy(r, rms=0.0).measuring(r.signal(TRUTH[np.newaxis])[0]) for r in replays)
 
 
 def test_the_arm_is_found_from_any_corner(lowering_replays, arm_space):
@@ -118,8 +113,7 @@ def test_the_arm_is_found_from_any_corner(lowering_replays, arm_space):
 
 def test_a_fixed_parameter_stays_and_weights_count(lowering_replays, arm_space):
     (good,) = clean(lowering_replays)
-    (piece,) = good.pieces
-    bad = replace(good, pieces=(replace(piece, measured=1.02 * piece.measured),))
+    bad = good.measuring(1.02 * good.measured)
     space = arm_space.with_fixed("n", 1.4)
     heavy = refine((good, bad), space, TRUTH[:3], weights=(1000.0, 1.0))
     even = refine((good, bad), space, TRUTH[:3])

@@ -19,6 +19,7 @@ from armid.record import read_campaign, write_table
 from armid.record.table import read_table
 from armid.report.style import DPI, save
 from armid.report.terminal import show
+from changed_records import noisy
 
 
 @pytest.fixture
@@ -92,10 +93,9 @@ def test_remarks_name_bounds_pairs_divergence_and_noise(lowering_found):
 
 def test_noise_from_differences_and_a_lacking_model_are_told(lowering_found):
     replay = lowering_found.train_replays[0]
-    noise = replace(replay.record.noise, source="differences", mean=None, rms=1e-4)
     level = replace(lowering_found.information.levels[0], rms=3e-2, from_residual=True)
     told = replace(
-        lowering_found, train_replays=(replace(replay, record=replace(replay.record, noise=noise)),),
+        lowering_found, train_replays=(noisy(replay, source="differences", mean=None, rms=1e-4),),
         information=replace(lowering_found.information, levels=(level,)),
     )  # fmt: skip
     said = "\n".join(remarks(told))

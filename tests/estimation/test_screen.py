@@ -274,11 +274,13 @@ def test_a_clock_is_moved_by_a_time_and_not_by_samples(campaign):
     """A record of few samples of which hardly any would be left stays as it is."""
     folder = campaign("arm")
     sparse("raise.csv")(folder)
-    pieces = [r.pieces[0] for r in read_campaign(folder).train if r.file in ("lower.csv", "raise.csv")]
-    left = [moved(p, 0.2) for p in pieces]
-    lost = [(p.n_samples - m.n_samples) * p.manoeuvre.interval for p, m in zip(pieces, left, strict=True)]
+    records = [r for r in read_campaign(folder).train if r.file in ("lower.csv", "raise.csv")]
+    left = [moved(r, 0.2) for r in records]
+    lost = [(r.n_samples - m.n_samples) * r.manoeuvre.interval for r, m in zip(records, left, strict=True)]
     assert lost == pytest.approx([0.2, 0.2])
-    assert moved(pieces[1], 5.0) is pieces[1]
+    shift = round(0.2 / records[0].manoeuvre.interval)
+    np.testing.assert_array_equal(left[0].seen, records[0].seen[shift:][: left[0].n_samples])
+    assert moved(records[1], 5.0).pieces[0] is records[1].pieces[0]
 
 
 # Those that take longest, each like one of the others.

@@ -85,8 +85,7 @@ def late(campaign):
     record = records["short.csv"]
     shift = round(0.004 / record.manoeuvre.interval)
     measured = np.concatenate([record.rest[-shift:], record.measured[:-shift]])
-    pieces = tuple(replace(p, measured=measured[p.start_index :][: len(p.measured)]) for p in record.pieces)
-    records["short.csv"] = replace(record, measured=measured, pieces=pieces)
+    records["short.csv"] = record.with_measured({record.output: measured})
     return replace(campaign, records=tuple(records.values()))
 
 

@@ -15,6 +15,5 @@ COMMON = ("--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", *STROKES
 
 
 def garbage(record, rng):
-    measured = rng.standard_normal(record.measured.shape)
-    pieces = tuple(replace(p, measured=measured[p.start_index :][: len(p.measured)]) for p in record.pieces)
-    return replace(record, measured=measured, rest=rng.standard_normal(record.rest.shape), pieces=pieces)
+    measured, rest = rng.standard_normal(record.measured.shape), rng.standard_normal(record.rest.shape)
+    return record.with_signals(lambda signal: replace(signal, measured=measured, rest=rest))

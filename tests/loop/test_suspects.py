@@ -15,6 +15,7 @@ from armid.model import PLANTS, Model
 from armid.record import RecordWarning, read_campaign, write_table
 from armid.record.noise import noise_of
 from armid.record.table import read_table
+from changed_records import trimmed
 
 pytestmark = pytest.mark.slow
 ARM = PLANTS["shell_transfer_arm"]
@@ -141,9 +142,8 @@ def test_hum_is_noise(campaign, sound, size):
         phase = rng.random()
         hum = size * (np.sin(2.0 * np.pi * (50.04 * times + phase)) + 0.3 * np.sin(2.0 * np.pi * 150.12 * times))
         rest, measured = record.rest + hum[: len(record.rest)], record.measured + hum[len(record.rest) :]
-        pieces = tuple(replace(p, measured=measured) for p in record.pieces)
         noise = noise_of(rest, measured, record.manoeuvre.interval)
-        return replace(record, rest=rest, measured=measured, pieces=pieces, whole_pieces=pieces, noise=noise)
+        return record.with_signals(lambda signal: replace(signal, rest=rest, measured=measured, noise=noise))
 
     found = close_loop(Model(ARM), replace(campaign, records=tuple(map(humming, campaign.records))), CANDIDATES)
     assert (found.verdict, found.suspects) == ("no_discrepancy", ())
@@ -154,7 +154,7 @@ def test_hum_is_noise(campaign, sound, size):
 def test_a_shift_is_undone_where_it_was_measured(campaign):
     record = campaign.records[0]
     fault = Fault("late")
-    there = fault.trimmed(fault.undone(record, -0.005, ARM), 0.005, ARM)
+    there = trimmed(fault, fault.undone(record, -0.005, ARM), 0.005, ARM)
     inside = there.pieces[0].window
     assert inside.stop == record.pieces[0].window.stop - 7
     inner = slice(20, inside.stop - 20)

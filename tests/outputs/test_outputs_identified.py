@@ -34,7 +34,7 @@ def ready(campaign):
 def test_outputs_of_a_file_share_their_simulation(ready) -> None:
     assert [r.name for r in ready] == ["a.csv, motor_speed", "a.csv, load_angle", "a.csv, deflection",
                                        "b.csv, load_angle"]  # fmt: skip
-    assert ready[0].simulated == ready[1].simulated == ready[2].simulated != ready[3].simulated
+    assert ready[0].ready is ready[1].ready is ready[2].ready is not ready[3].ready
     for replay, signal in zip(ready, signals_of(ready, WHOLE[np.newaxis]), strict=True):
         np.testing.assert_array_equal(signal, replay.signal(WHOLE[np.newaxis]))
 

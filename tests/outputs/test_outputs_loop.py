@@ -15,6 +15,7 @@ from armid.model import EFFECTS
 from armid.model.effects.sensor import sensor_effects
 from armid.record import read_campaign
 from armid.report.style import pyplot
+from changed_records import trimmed
 
 pytestmark = pytest.mark.slow
 FRICTION = 0.3
@@ -97,11 +98,7 @@ def test_where_nothing_is_missing_no_sensor_is_accused(sound) -> None:
 
 def closed_with(campaign, file, kind, value):
     """Close the loop on a drive with a fault of its sensor of the load, or of the times of a file."""
-
-    def faulty(record):
-        return next(r for r in record.each if r.output == "load_angle")
-
-    records = tuple(Fault(kind).trimmed(r, -value, campaign.plant, faulty(r)) if r.file == file else r
+    records = tuple(trimmed(Fault(kind), r, -value, campaign.plant, "load_angle") if r.file == file else r
                     for r in campaign.records)  # fmt: skip
     return close_loop(campaign.model(), replace(campaign, records=records), {"coulomb": EFFECTS["coulomb"]})
 

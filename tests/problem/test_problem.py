@@ -16,7 +16,7 @@ from armid.errors import ArmidError
 from armid.identifiers import PaperPSO
 from armid.problem.fitness import FITNESS, Fitness
 from armid.problem.meter import PENALTY, Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem, Replay, replays
+from armid.problem.problem import IdentificationProblem, ReadyRecord, Replay, replays
 from armid.problem.similarity import similarity
 from armid.problem.space import space_of
 from armid.record import read_campaign
@@ -30,17 +30,17 @@ ALGORITHMS = {
 
 
 class Counted:
-    """Stand in for a replay and count the candidates that are really simulated."""
+    """Stand in for a record that is simulated and count the candidates that really are."""
 
-    def __init__(self, replay):
-        self.replay, self.simulated = replay, 0
+    def __init__(self, ready):
+        self.ready, self.simulated = ready, 0
 
     def runs(self, candidates):
         self.simulated += len(candidates)
-        return self.replay.runs(candidates)
+        return self.ready.runs(candidates)
 
     def __getattr__(self, name):
-        return getattr(self.replay, name)
+        return getattr(self.ready, name)
 
 
 @pytest.fixture
@@ -58,8 +58,8 @@ def test_says_what_its_columns_are(arm_space, lowering_replays):
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_never_more_simulations_than_the_budget(arm_space, lowering_replays, name):
-    counted, meter = Counted(lowering_replays[0]), Meter(137)
-    problem = IdentificationProblem(arm_space, (counted,), FITNESS["rmse"], meter)
+    counted, meter = Counted(lowering_replays[0].ready), Meter(137)
+    problem = IdentificationProblem(arm_space, (Replay(counted),), FITNESS["rmse"], meter)
     result = minimize(problem, ALGORITHMS[name](), MeterTermination(meter), seed=1)
     assert counted.simulated == meter.used == 137
     assert meter.best_f == problem.value(meter.best_x)[0] == meter.log().F.min() == result.F[0]
@@ -135,14 +135,14 @@ def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
     X = np.random.default_rng(3).uniform(problem.xl, problem.xu, (37, 4))
     whole = problem.value(X)
     seen = []
-    signal = Replay.runs
+    runs = ReadyRecord.runs
 
-    def watched(replay, candidates):
+    def watched(ready, candidates):
         seen.append(len(candidates))
-        return signal(replay, candidates)
+        return runs(ready, candidates)
 
     monkeypatch.setattr("armid.problem.problem.MOST_VALUES", 1000)
-    monkeypatch.setattr(Replay, "runs", watched)
+    monkeypatch.setattr(ReadyRecord, "runs", watched)
     np.testing.assert_array_equal(problem.value(X), whole)
     assert seen == [16, 16, 5]
 

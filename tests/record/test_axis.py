@@ -83,7 +83,7 @@ def test_restarts_cut_pieces_from_measured_states(write_axis, axis_columns):
     assert record.n_samples == 5000
     for piece in record.pieces:
         rows = slice(piece.start_index, piece.start_index + 1000)
-        np.testing.assert_array_equal(piece.measured, axis_columns["velocity_m_s"][rows])
+        np.testing.assert_array_equal(piece.of(record.measured), axis_columns["velocity_m_s"][rows])
         np.testing.assert_array_equal(piece.manoeuvre.inputs["u"], axis_columns["drive_V"][rows])
         assert piece.manoeuvre.start_time == pytest.approx(axis_columns["time_s"][piece.start_index])
         state = piece.manoeuvre.constants

@@ -16,7 +16,7 @@ from armid.record import RecordWarning, read_campaign
 from armid.record.broken import repeated_samples
 from armid.record.resample import timing_of
 from armid.record.sensor import Sensor
-from armid.record.signal import signal_of
+from armid.record.signal import column_of
 from armid.record.table import read_table, time_column
 
 WHEEL = 'name = "wheel"\nplant = "{}"\nhold = "zero"\n{}\n[[records]]\nfile = "a.csv"\nrole = "train"\n'
@@ -73,9 +73,10 @@ def test_a_speed_that_is_renewed_every_18th_sample_counts_once_a_renewal(write, 
     columns |= {"angular_velocity_rad_s": np.round(held / 0.01) * 0.01, "time_s": TIMES + jitter}
     warned = ["renewed every 18 rows"] if uneven == 0.0 else ["irregular sampling", "renewed every 18 rows"]
     record, campaign = read(write, columns, warns=warned)
-    assert record.sensor.hold == 18
-    assert record.sensor.step == pytest.approx(0.01)
-    assert record.broken == ()
+    (signal,) = record.signals
+    assert signal.sensor.hold == 18
+    assert signal.sensor.step == pytest.approx(0.01)
+    assert signal.broken == ()
     assert record.n_samples == pytest.approx(N / 18, abs=1)
     assert record.noise.rms == pytest.approx(0.02, rel=0.35)
     residual, replay = residual_at(record, campaign, 0.25)
@@ -95,10 +96,11 @@ def test_sticks_of_a_coarse_encoder_are_data(write):
         times = TIMES + uneven * INTERVAL * rng.uniform(-1.0, 1.0, N)
         columns = {"time_s": times, "drive_V": drive, "angle_rad": np.round(angle / step) * step}
         record, _ = read(write, columns, "rotary_arm", warns=["irregular"] if uneven else [])
-        assert record.data is None
-        assert record.broken == ()
+        (signal,) = record.signals
+        assert signal.data is None
+        assert signal.broken == ()
         assert record.n_samples == N
-        assert record.sensor.step == pytest.approx(step)
+        assert signal.sensor.step == pytest.approx(step)
         assert record.noise.rms >= step / np.sqrt(12.0) * (1.0 - 1e-9)
 
 
@@ -110,7 +112,7 @@ def test_outputs_at_different_rates_stand_in_one_file(write):
     record, _ = read(write, columns, "rotary_arm", warns=["angle_rad has no number in 1500 of 3000 rows.*line 3"])
     angle, speed = record.each
     assert (angle.output, angle.n_samples, speed.n_samples) == ("angle", N // 2, N)
-    assert speed.data is None
+    assert speed.signals[0].data is None
     np.testing.assert_allclose(angle.measured[:-1], whole[:-1], atol=1e-4)
     assert "temperature_C" not in record.columns
     columns["angle_rad"] = np.where(np.arange(N) % 3 == 0, whole, np.nan)
@@ -128,7 +130,7 @@ def test_one_wild_sample_never_hides_the_motion(write, at):
     record, campaign = read(
         write, columns, warns=[f"a.csv: angular_velocity_rad_s is -1e.06 on line {at + 2}, far from"]
     )
-    assert [(b.kind, b.count, b.line) for b in record.broken] == [("spikes", 1, at + 2)]
+    assert [(b.kind, b.count, b.line) for b in record.signals[0].broken] == [("spikes", 1, at + 2)]
     assert record.n_samples == N - 1
     assert record.noise.rms == pytest.approx(sound.noise.rms, rel=0.05)
     assert campaign.plant.scales.speed == pytest.approx(np.max(np.abs(sound.measured)))
@@ -144,7 +146,7 @@ def test_no_more_than_a_share_is_left_out_without_an_error(write):
     assert re.search(r"a\.csv, line \d+: \d+\.\d% of the samples of angular_velocity_rad_s are no data, most of them "
                      r"are at the limit of the sensor: at most 5% are expected", said)  # fmt: skip
     record, _ = read(write, columns, entry="most_lost = 0.6\n")
-    (clipped,) = record.broken
+    (clipped,) = record.signals[0].broken
     assert clipped.kind == "clipped"
     assert record.n_samples == N - clipped.count
 
@@ -233,7 +235,8 @@ def test_of_measured_records_nothing_is_left_out(name):
             times = time_column(table)
             timing = timing_of(times, False, file.name)
             signals = [
-                signal_of(table, header, 1.0, times, timing, is_speed="velocity" in header) for header in headers
+                column_of(table, header, "rad/s" if "velocity" in header else "rad", 1.0, times, timing).signal
+                for header in headers
             ]
         assert all(signal.broken == () for signal in signals), file.name
         assert signals[0].sensor.hold in holds

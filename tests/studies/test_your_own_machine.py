@@ -76,8 +76,7 @@ def test_a_late_voltage_is_no_late_torque(folder, plugin):
     for replay in replays(read_campaign(folder / "campaign", {"boom": boom}).records, model, space):
         signal = replay.signal(space.complete(np.empty((1, 0))))[0]
         signal = signal + replay.record.noise.rms * rng.standard_normal(signal.shape)
-        pieces = tuple(replace(p, measured=signal[p.start_index :][: len(p.measured)]) for p in replay.record.pieces)
-        records.append(replace(replay.record, measured=signal, pieces=pieces))
+        records.append(replay.measuring(signal).record)
     for plant in (boom, torque_alone):
         campaign = replace(read_campaign(folder / "campaign", {"boom": plant}), records=tuple(records))
         found = close_loop(Model(plant), campaign, {n: EFFECTS[n] for n in ("controller_delay", "output_lag")})

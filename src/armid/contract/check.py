@@ -15,7 +15,7 @@ from armid.estimation.screen import screen
 from armid.identifiers import as_identifier
 from armid.model import PLANTS, Array, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
-from armid.problem.problem import Replay
+from armid.problem.problem import ReadyRecord
 from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
@@ -51,7 +51,8 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
     yield ContractPoint("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")
     for record in campaign.records:
         noise, n = record.noise, record.measured.size
-        own = f"{n}" if record.data is None else f"{int(record.data.sum())} of {n}"
+        data = record.signals[0].data
+        own = f"{n}" if data is None else f"{int(data.sum())} of {n}"
         text = f"{own} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
         yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})")
     try:
@@ -64,7 +65,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
             text = f"taken as exact: {names}; [tolerances] of campaign.toml says how well each is known"
             yield ContractPoint("constants", True, text)
         middle = space.complete(0.5 * (space.low + space.high)[np.newaxis, space.free])
-        for replay in (one for record in campaign.records for one in replay_at(middle, record, model).each):
+        for replay in (one for record in campaign.records for one in ready_at(middle, record, model).each):
             signal = replay.signal(middle)[0]
             whole = bool(np.isfinite(signal).all())
             size = f"up to {np.max(np.abs(signal)):.3g}" if whole else "diverges"
@@ -76,11 +77,11 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         yield ContractPoint("model", False, str(error))
 
 
-def replay_at(candidate: Array, record: Record, model: Model) -> Replay:
+def ready_at(candidate: Array, record: Record, model: Model) -> ReadyRecord:
     """Make a record ready to be simulated with one candidate; to calibrate the whole box takes far longer."""
     pieces, accuracy = tuple(p.until_window_end() for p in record.pieces), accuracy_against(record.noises, model)
     calibrations = (calibrate(model, p.manoeuvre, candidate, accuracy, spans=False) for p in pieces)
-    return Replay(record, model, pieces, tuple(calibrations))
+    return ReadyRecord(record, model, pieces, tuple(calibrations))
 
 
 def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:

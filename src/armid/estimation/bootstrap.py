@@ -20,9 +20,17 @@ from armid.estimation.information import NORMAL_95, Information, Level, start_ch
 from armid.estimation.least_squares import WeightedRecords
 from armid.model import Array
 from armid.problem.fitness import Fitness
-from armid.problem.problem import LANES, MOST_VALUES, Replay, fitness_of, output_sizes, signals_of, weights_of
+from armid.problem.problem import (
+    LANES,
+    MOST_VALUES,
+    Replay,
+    by_record,
+    fitness_of,
+    output_sizes,
+    signals_of,
+    weights_of,
+)
 from armid.problem.space import Space
-from armid.problem.starts import by_file
 
 # Draws, enough for a standard deviation to 7 %; where the estimates are skewed so many, for quantiles.
 DRAWS, MANY_DRAWS = 100, 400
@@ -142,10 +150,10 @@ class Task:
         """Return noise without the part that fitted starts take up."""
         parts = np.split(noise, self.ends, axis=1)
         left = [part.copy() for part in parts]
-        first = [np.cumsum([0, *(p.n_samples for p in r.pieces)]) for r in self.replays]
-        for outputs in by_file(self.replays):
+        first = [np.cumsum([0, *r.lengths]) for r in self.replays]
+        for ready, outputs in by_record(self.replays).items():
             places = {r.place: self.replays.index(r) for r in outputs}
-            for k, correction in enumerate(piece.correction for piece in outputs[0].pieces):
+            for k, correction in enumerate(piece.correction for piece in ready.pieces):
                 if correction is None or not places.keys() >= set(correction.places):
                     continue
                 rows = {place: slice(first[i][k], first[i][k + 1]) for place, i in places.items()}

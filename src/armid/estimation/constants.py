@@ -5,16 +5,15 @@ constants, whose prior is a normal distribution with their tolerance as standard
 variance t^2 adds t^2 C C^T to the covariance of the noise.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
 from armid.estimation.least_squares import LeastSquaresProblem
-from armid.model import Array, Manoeuvre, Plant
-from armid.problem.problem import Replay, signals_of
+from armid.model import Array, Plant
+from armid.problem.problem import Replay, signals_of, with_each
 from armid.record import Piece, Record
 
 # Relative step of the differences.
@@ -53,39 +52,19 @@ class Product:
         return self.tolerance * self.slope
 
 
-def with_constants(piece: Piece, constants: Mapping[str, float]) -> Piece:
-    manoeuvre = replace(piece.manoeuvre, constants={**piece.manoeuvre.constants, **constants})
-    return replace(piece, manoeuvre=manoeuvre)
-
-
-def of_pieces(undo: Callable[..., Piece], **told: Any) -> Callable[[Record], Record]:
-    """Return what changes each piece of each output of a file."""
-
-    def changed(record: Record) -> Record:
-        pieces, whole = (tuple(undo(p, **told) for p in some) for some in (record.pieces, record.whole_pieces))
-        return replace(record, pieces=pieces, whole_pieces=whole, others=tuple(map(changed, record.others)))
-
-    return changed
-
-
 def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> Record:
-    return of_pieces(moved_piece, plant=plant, shares=shares)(record) if shares else record
+    return record.with_pieces(lambda piece: moved_piece(piece, plant, shares)) if shares else record
 
 
 def moved_replays(replays: Sequence[Replay], shares: Mapping[str, float]) -> tuple[Replay, ...]:
-    """Return replays with constants moved; outputs of one file go on sharing their manoeuvres, and so their starts."""
-    made: dict[int, Manoeuvre] = {}
-    found = []
-    for replay in replays:
-        pairs = [(piece, moved_piece(piece, replay.model.plant, shares)) for piece in replay.pieces]
-        shared = (replace(new, manoeuvre=made.setdefault(id(old.manoeuvre), new.manoeuvre)) for old, new in pairs)
-        found.append(replace(replay, pieces=tuple(shared)))
-    return tuple(found)
+    """Return replays with constants moved."""
+    return with_each(replays, lambda ready: replace(
+        ready, pieces=tuple(moved_piece(p, ready.model.plant, shares) for p in ready.pieces)))  # fmt: skip
 
 
 def moved_piece(piece: Piece, plant: Plant, shares: Mapping[str, float]) -> Piece:
     given = {c.name: c.value for c in plant.constants} | dict(piece.manoeuvre.constants)
-    return with_constants(piece, {name: given[name] * (1.0 + share) for name, share in shares.items()})
+    return piece.with_constants({name: given[name] * (1.0 + share) for name, share in shares.items()})
 
 
 def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[str]) -> Array:

@@ -9,7 +9,6 @@ import numpy as np
 
 from armid.engine import Schedule, simulate
 from armid.engine.simulate import Simulation
-from armid.estimation.constants import with_constants
 from armid.estimation.information import Level, inverse
 from armid.estimation.least_squares import slopes_of, stencil
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Model, Plant
@@ -162,7 +161,7 @@ def keyed(plant: Plant, records: Sequence[Record]) -> Iterator[Feasible]:
         apart = (abs(keys[a.key] - keys[b.key]) >= APART * ((a.high or 0.0) - (a.low or 0.0)) for a, b in pairs)
         if keys and all(apart):
             constants = {k.constant: float(keys[k.key]) * k.factor for k in plant.keys}
-            yield Feasible(keys, with_constants(piece, constants).manoeuvre, piece.window)
+            yield Feasible(keys, piece.with_constants(constants).manoeuvre, piece.window)
 
 
 def key_levels(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> tuple[float | bool, ...]:
@@ -218,7 +217,7 @@ def changed_inputs(records: Sequence[Record]) -> Iterator[Feasible]:
     for record, (size, pace) in product(records, list(product(SIZES, PACES))[1:]):
         piece = record.pieces[0].until_window_end()
         start = {n: v * np.sign(size) for n, v in piece.manoeuvre.constants.items() if n == "start_speed"}
-        manoeuvre = with_constants(piece, start).manoeuvre
+        manoeuvre = piece.with_constants(start).manoeuvre
         inputs = {name: paced(v, pace, manoeuvre.hold) * (size if np.ptp(np.sign(v)) > 1 else 1.0)
                   for name, v in manoeuvre.inputs.items()}  # fmt: skip
         keys: dict[str, Key] = {"like": record.file, "size": size, "pace": pace}

@@ -10,12 +10,10 @@ from scipy.special import fdtrc
 
 from armid.engine import simulate
 from armid.errors import ArmidError
-from armid.estimation.constants import with_constants
 from armid.estimation.least_squares import LEAST, LeastSquaresProblem, WeightedRecords, step_in_box
 from armid.model import Array
-from armid.problem.problem import Replay
+from armid.problem.problem import Replay, by_record
 from armid.problem.space import Space
-from armid.problem.starts import by_file
 from armid.record.noise import correlation_sum, new_share
 from armid.record.record import NOISE_FREE, Noise
 
@@ -174,24 +172,23 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
 def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
     """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,)."""
     candidate = records.whole(z[np.newaxis])
-    for outputs in by_file(records.replays):
-        replay, rows = outputs[0], dict.fromkeys(outputs, 0)
+    for ready, outputs in by_record(records.replays).items():
+        rows = dict.fromkeys(outputs, 0)
         # a speed held for a second is the size of a position
-        move = 1e-4 * replay.model.plant.scales.speed
-        for index, (piece, calibration) in enumerate(zip(replay.pieces, replay.calibrations, strict=True)):
+        move = 1e-4 * ready.model.plant.scales.speed
+        for index, (piece, calibration) in enumerate(zip(ready.pieces, ready.calibrations, strict=True)):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
                 start = piece.manoeuvre.constants.get(name, 0.0)
-                either = (with_constants(piece, {name: start + side}).manoeuvre for side in (move, -move))
-                above, below = (simulate(replay.model, m, candidate, calibration.schedule).outputs[:, 0]
+                either = (piece.with_constants({name: start + side}).manoeuvre for side in (move, -move))
+                above, below = (simulate(ready.model, m, candidate, calibration.schedule).outputs[:, 0]
                                 for m in either)  # fmt: skip
                 changes = [np.zeros(r.record.n_samples) for r in records.replays]
                 slopes = (above - below) / (2.0 * move)
                 for change, r in zip(changes, records.replays, strict=True):
                     if r in outputs:
-                        own = r.pieces[index]
-                        change[rows[r] : rows[r] + own.n_samples] = deviation * slopes[r.place, own.samples]
+                        change[rows[r] : rows[r] + r.lengths[index]] = deviation * slopes[r.place, r.samples[index]]
                 yield records.weighted(changes)
-            rows = {r: row + r.pieces[index].n_samples for r, row in rows.items()}
+            rows = {r: row + r.lengths[index] for r, row in rows.items()}
 
 
 def inverse(matrix: Array) -> Array:

@@ -7,10 +7,9 @@ from itertools import combinations
 
 import numpy as np
 
-from armid.estimation.constants import of_pieces, with_constants
 from armid.estimation.design import range_of
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
-from armid.record import Piece, Record
+from armid.record import Piece, Record, Signal
 from armid.record.start import Track, state_shown
 
 DEGREES, ANGULAR = 180.0 / np.pi, "angular"
@@ -85,7 +84,7 @@ def mends(plant: Plant, record: Record, shift: int) -> Iterator[Mend]:
     """Yield what may be undone in a record; shift: by how many samples its signal may come too late."""
     yield from mends_of_sizes(plant, record)
     yield from mends_of_zeros(plant, record)
-    for a, b in combinations(record.each, 2):
+    for a, b in combinations(record.signals, 2):
         if a.unit == b.unit:
             words = f"its {a.output} and {b.output} look exchanged: the other way round"
             yield Mend("exchanged", np.nan, words, partial(with_outputs_exchanged, plant=plant, a=a.output, b=b.output))
@@ -97,24 +96,25 @@ def mends(plant: Plant, record: Record, shift: int) -> Iterator[Mend]:
     if shift:
         seconds = shift * record.manoeuvre.interval
         words = f"its clock looks {abs(seconds):.3g} s {'late' if shift > 0 else 'early'}: moved by that"
-        yield Mend("late", seconds, words, of_pieces(moved, seconds=seconds))
+        yield Mend("late", seconds, words, partial(moved, seconds=seconds))
 
 
 def mends_of_sizes(plant: Plant, record: Record) -> Iterator[Mend]:
     for factor, (kind, words) in FACTORS.items():
-        for one in record.each:
+        for one in record.signals:
             if kind != ANGULAR or one.unit.startswith("rad"):
-                signal = f"{one.output} [{one.unit}]" if record.others else f"{one.unit} signal"
+                signal = f"{one.output} [{one.unit}]" if record.signals[1:] else f"{one.unit} signal"
                 yield Mend("unit" if kind == ANGULAR else kind, factor, f"the measured {signal}: {words}",
                            partial(scaled, plant=plant, output=one.output, factor=factor))  # fmt: skip
         for name in (i.name for i in plant.inputs if kind != ANGULAR):
-            yield Mend("input", factor, f"input '{name}': {words}", of_pieces(with_input, name=name, factor=factor))
+            yield Mend("input", factor, f"input '{name}': {words}",
+                       of_pieces(partial(with_input, name=name, factor=factor)))  # fmt: skip
     for factor, words in TIMES.items():
         yield Mend("time", factor, words, partial(with_interval, plant=plant, factor=factor))
 
 
 def mends_of_zeros(plant: Plant, record: Record) -> Iterator[Mend]:
-    angles = [one.output for one in record.each if one.unit == "rad"]
+    angles = [one.output for one in record.signals if one.unit == "rad"]
     position = record.constants.get("start_position") if record.unit == "rad/s" else None
     for turn in np.deg2rad(TURNS).tolist():
         more = f"looks counted from elsewhere: with {np.rad2deg(turn):g} deg more"
@@ -122,7 +122,7 @@ def mends_of_zeros(plant: Plant, record: Record) -> Iterator[Mend]:
             yield Mend("zero", turn, f"{output} {more}", partial(turned, plant=plant, output=output, turn=turn))
         if position is not None:
             start = {"start_position": position + turn}
-            yield Mend("zero", turn, f"the angle {more}", of_pieces(with_constants, constants=start))
+            yield Mend("zero", turn, f"the angle {more}", of_pieces(partial(Piece.with_constants, constants=start)))
 
 
 def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
@@ -131,7 +131,7 @@ def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
 
     def mend(words: str, change: Callable[..., dict[str, float]], kind: str = "key") -> Mend:
         def undo(piece: Piece) -> Piece:
-            return with_constants(piece, change({**defaults, **piece.manoeuvre.constants}))
+            return piece.with_constants(change({**defaults, **piece.manoeuvre.constants}))
 
         return Mend(kind, np.nan, words, of_pieces(undo))
 
@@ -156,6 +156,10 @@ def may_be_radians(key: ManoeuvreKey, value: float) -> bool:
     return 0.0 < abs(value) <= 2.0 * np.pi and low <= DEGREES * value <= high
 
 
+def of_pieces(undo: Callable[[Piece], Piece]) -> Callable[[Record], Record]:
+    return lambda record: record.with_pieces(undo)
+
+
 def scaled(record: Record, plant: Plant, output: str, factor: float) -> Record:
     return with_measured(record, plant, {n: factor * x for n, x in measured_of(record).items() if n == output}, factor)
 
@@ -176,14 +180,14 @@ def with_other_taken_off(record: Record, plant: Plant, output: str, other: str) 
 
 
 def measured_of(record: Record) -> dict[str, Array]:
-    return {one.output: one.measured for one in record.each}
+    return {one.output: one.measured for one in record.signals}
 
 
 def with_interval(record: Record, plant: Plant, factor: float) -> Record:
     def slower(old: Manoeuvre) -> Manoeuvre:
         return replace(old, interval=factor * old.interval, start_time=factor * old.start_time)
 
-    told = of_pieces(lambda piece: replace(piece, manoeuvre=slower(piece.manoeuvre)))(record)
+    told = record.with_pieces(lambda piece: replace(piece, manoeuvre=slower(piece.manoeuvre)))
     return with_measured(replace(told, manoeuvre=slower(told.manoeuvre)), plant, {})
 
 
@@ -192,16 +196,14 @@ def with_measured(record: Record, plant: Plant, measured: Mapping[str, Array], f
 
     factor: what the start of a plant that records one speed is multiplied by.
     """
-    each = []
-    for one in record.each:
-        signal = measured.get(one.output, one.measured)
-        pieces = (replace(p, measured=signal[p.start_index : p.start_index + len(p.measured)]) for p in one.pieces)
-        noise = replace(one.noise, rms=one.noise.rms * rms(signal) / rms(one.measured))
-        each.append(replace(one, measured=signal, noise=noise, pieces=tuple(pieces)))
-    changed = replace(each[0], others=tuple(each[1:]))
-    return replace(
-        changed, pieces=tuple(with_constants(p, start_of(changed, p, plant, factor)) for p in changed.pieces)
-    )
+
+    def changed(one: Signal) -> Signal:
+        samples = measured.get(one.output, one.measured)
+        noise = replace(one.noise, rms=one.noise.rms * rms(samples) / rms(one.measured))
+        return replace(one, measured=samples, noise=noise)
+
+    record = record.with_signals(changed)
+    return replace(record, pieces=tuple(p.with_constants(start_of(record, p, plant, factor)) for p in record.pieces))
 
 
 def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[str, float]:
@@ -211,7 +213,7 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
     if not piece.start_deviation:
         return {}
     given = {n: v for n, v in old.items() if n not in piece.start_deviation}
-    tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.each}
+    tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.signals}
     return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index)[0]
 
 
@@ -220,21 +222,31 @@ def with_input(piece: Piece, name: str, factor: float) -> Piece:
     return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs=inputs))
 
 
-def moved(piece: Piece, seconds: float) -> Piece:
-    """Return a piece whose measured signal comes earlier by some time (later where negative); what is lost goes.
+def moved(record: Record, seconds: float) -> Record:
+    """Return a record whose measured signals come earlier by some time (later where negative); what is lost goes.
 
     Where inputs drive the machine they come later instead, so that its measured start stays where it is. A piece of
     which hardly anything would be left stays as it is.
     """
-    shift = round(seconds / piece.manoeuvre.interval)
-    n, window, inputs = len(piece.measured), piece.window, piece.manoeuvre.inputs
-    if inputs:
-        rows = np.clip(np.arange(n) - shift, 0, n - 1)
-        return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs={k: v[rows] for k, v in inputs.items()}))
-    begin, end = max(window.start, -shift), min(window.stop, n - shift)
-    if end - begin < FEWEST_LEFT:
-        return piece
-    return replace(piece, measured=np.roll(piece.measured, -shift), window=slice(begin, end)).until_window_end()
+    shift = round(seconds / record.manoeuvre.interval)
+    if record.manoeuvre.inputs:
+        return record.with_pieces(partial(driven_later, shift=shift))
+    earlier, pieces = {s.output: s.measured.copy() for s in record.signals}, []
+    for piece in record.pieces:
+        begin, end = max(piece.window.start, -shift), min(piece.window.stop, piece.manoeuvre.n_samples - shift)
+        if end - begin < FEWEST_LEFT:
+            pieces.append(piece)
+            continue
+        for own in map(piece.of, earlier.values()):
+            own[:] = np.roll(own, -shift)
+        pieces.append(replace(piece, window=slice(begin, end)).until_window_end())
+    return replace(record.with_measured(earlier), pieces=tuple(pieces))
+
+
+def driven_later(piece: Piece, shift: int) -> Piece:
+    n, inputs = piece.manoeuvre.n_samples, piece.manoeuvre.inputs
+    rows = np.clip(np.arange(n) - shift, 0, n - 1)
+    return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs={k: v[rows] for k, v in inputs.items()}))
 
 
 def rms(values: Array) -> float:

@@ -8,17 +8,17 @@ of mistakes is undone in turn, and one is named only where that takes away most 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
-from armid.estimation.constants import of_pieces, with_constants
 from armid.estimation.least_squares import WeightedRecords, descend
-from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, rms
+from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, of_pieces, rms
 from armid.model import Array, Manoeuvre, Model, Plant
-from armid.problem.problem import Replay
+from armid.problem.problem import ReadyRecord
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
@@ -72,7 +72,7 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
     """
-    campaign = replace(campaign, records=tuple(r.filled for r in campaign.records))
+    campaign = replace(campaign, records=tuple(map(filled, campaign.records)))
     seen = [s for r in campaign.records for one in r.each for s in (*noise_or_rest(one), *of_position(one))]
     seen += list(given_twice(campaign.records))
     noise = {s.record for s in seen if s.kind == "noise"}
@@ -98,6 +98,11 @@ def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, .
     return (*seen, *(s for s in times if not told & {"", s.record}), *found)
 
 
+def filled(record: Record) -> Record:
+    """Return a record with the straight lines between its samples taken as measured."""
+    return record.with_signals(lambda signal: replace(signal, data=None))
+
+
 class Trial:
     """Fit one model to records, and tell its errors on them, each as rms of the residual over rms of the signal.
 
@@ -109,7 +114,8 @@ class Trial:
 
     def problem(self, records: Sequence[Record]) -> WeightedRecords:
         rough = Calibration(Schedule(SUBSTEPS), np.nan, True)
-        ready = tuple(one for r in records for one in Replay(r, self.model, r.pieces, (rough,) * len(r.pieces)).each)
+        whole = [ReadyRecord(r, self.model, r.pieces, (rough,) * len(r.pieces)) for r in records]
+        ready = tuple(one for each in whole for one in each.each)
         # of an angle or a position the zero says nothing
         moved = [r.measured - (np.mean(r.measured) if r.record.unit in ("rad", "m") else 0.0) for r in ready]
         return WeightedRecords(ready, self.space, tuple(1.0 / max(float(np.linalg.norm(x)), 1e-300) for x in moved))
@@ -128,7 +134,7 @@ class Trial:
         problem = self.problem(records)
         of = zip(problem.weights, problem.replays, problem.simulated(np.atleast_2d(Z)), strict=True)
         squares = [np.sum((w * (signal - r.measured)) ** 2, axis=1) for w, r, signal in of]
-        counts = np.array([len(r.each) for r in records])
+        counts = np.array([len(r.signals) for r in records])
         means = np.add.reduceat(np.array(squares).T, np.cumsum(counts) - counts, axis=1) / counts
         return np.asarray(np.nan_to_num(np.sqrt(means), nan=np.inf))
 
@@ -170,8 +176,8 @@ class Trial:
     def shift(self, record: Record, Z: Array) -> int:
         """Return by how many samples the first piece comes too late, 0 where no shift makes it more alike."""
         piece = record.pieces[0]
-        x, n = piece.measured[piece.window], piece.n_samples
-        (signals,) = self.signals(replace(record, pieces=(piece,), others=()), Z)
+        x, n = record.signals[0].seen(piece), record.signals[0].n_seen(piece)
+        (signals,) = self.signals(replace(record.each[0], pieces=(piece,)), Z)
         product = np.fft.irfft(np.fft.rfft(x, 2 * n) * np.conj(np.fft.rfft(signals, 2 * n)), axis=-1)
         shifts = np.arange(-int(MOST_SHIFT * n), int(MOST_SHIFT * n) + 1)
         # energy of both in the part that they then have in common
@@ -371,12 +377,12 @@ def told_as(other: Record) -> Mend:
     constants = {n: v for n, v in manoeuvre.constants.items() if not n.startswith("start_")}
     what = "inputs" if manoeuvre.inputs else "manoeuvre"
     words = f"it and {other.file} look exchanged: each with the {what} of the other"
-    undo = of_pieces(driven_as, constants=constants, inputs=manoeuvre.inputs)
+    undo = of_pieces(partial(driven_as, constants=constants, inputs=manoeuvre.inputs))
     return Mend("exchanged", np.nan, words, undo, other.file)
 
 
 def driven_as(piece: Piece, constants: Mapping[str, float], inputs: Mapping[str, Array]) -> Piece:
-    told = with_constants(piece, constants)
+    told = piece.with_constants(constants)
     n = min([piece.window.stop, *map(len, inputs.values())])
     shorter = replace(told, window=slice(piece.window.start, n)).until_window_end()
     return replace(shorter, manoeuvre=replace(shorter.manoeuvre, inputs={k: v[:n] for k, v in inputs.items()}))
@@ -390,21 +396,13 @@ def shortened(record: Record, n_records: int) -> Record:
     """Return a record cut to what is looked at; whole where most of its motion comes later."""
     pieces, left = [], most_samples(n_records)
     for piece in record.pieces:
-        if left < min(FEWEST_SAMPLES, piece.n_samples):
+        start, n = piece.window.start, min(piece.window.stop - piece.window.start, left)
+        if n < min(FEWEST_SAMPLES, piece.window.stop - start):
             break
-        stop = min(piece.window.stop, piece.window.start + left)
-        pieces.append(replace(piece, window=slice(piece.window.start, stop)).until_window_end())
-        left -= pieces[-1].n_samples
-    kept, whole = (np.concatenate([p.measured[p.window] for p in ps]) for ps in (pieces, record.pieces))
-    if rms(kept) <= 0.5 * rms(whole):
-        return record
-    windows = [p.window for p in pieces]
-    return replace(record, pieces=tuple(pieces), others=tuple(cut(one, windows) for one in record.others))
-
-
-def cut(record: Record, windows: Sequence[slice]) -> Record:
-    pairs = zip(record.pieces, windows, strict=False)
-    return replace(record, pieces=tuple(replace(p, window=w).until_window_end() for p, w in pairs))
+        pieces.append(replace(piece, window=slice(start, start + n)).until_window_end())
+        left -= n
+    short = replace(record, pieces=tuple(pieces))
+    return record if rms(short.seen) <= 0.5 * rms(record.seen) else short
 
 
 def every(record: Record, step: int, plant: Plant) -> Record:
@@ -421,10 +419,9 @@ def every(record: Record, step: int, plant: Plant) -> Record:
         return replace(old, interval=step * old.interval, n_samples=-(-old.n_samples // step), inputs=inputs)
 
     window = slice(*(-(-end // step) for end in (piece.window.start, piece.window.stop)))
-    kept = replace(piece, manoeuvre=rarer(piece.manoeuvre), measured=piece.measured[::step], window=window)
-    others = tuple(every(one, step, plant) for one in record.others)
-    return replace(record, manoeuvre=rarer(record.manoeuvre), measured=record.measured[::step], pieces=(kept,),
-                   others=others)  # fmt: skip
+    kept = replace(piece, manoeuvre=rarer(piece.manoeuvre), window=window)
+    thinner = record.with_measured({s.output: s.measured[::step] for s in record.signals})
+    return replace(thinner, manoeuvre=rarer(record.manoeuvre), pieces=(kept,))
 
 
 def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator[Suspicion]:
@@ -449,7 +446,7 @@ def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator
 
 def noise_or_rest(record: Record) -> Iterator[Suspicion]:
     """Yield what the speed of one file shows alone: no motion but noise, or motion where there should be rest."""
-    x = np.concatenate([p.measured[p.window] for p in record.pieces])
+    x = record.seen
     n, deviations = len(x), x - np.mean(x)
     lags = range(1, min(20, n // 2))
     correlation = [float(deviations[k:] @ deviations[:-k]) / float(deviations @ deviations) for k in lags]
@@ -497,10 +494,10 @@ def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
 
     Compared are fingerprints of `ALIKE` successive samples; simulations without noise may well agree.
     """
-    records = [r for r in records if not r.is_noise_free]
+    records = [filled(r) for r in records if not r.is_noise_free]
     if len(records) < 2:
         return
-    prints = [fingerprints(np.concatenate([p.measured[p.window] for p in r.pieces])) for r in records]
+    prints = [fingerprints(r.seen) for r in records]
     owner = np.concatenate([np.full(len(p), i) for i, p in enumerate(prints)])
     _, place, counts = np.unique(np.concatenate(prints), return_inverse=True, return_counts=True)
     shared = np.flatnonzero(counts[place] > 1)

@@ -65,7 +65,7 @@ class SimulatedCampaign(Shown):
 
     def plot(self) -> Any:
         """Draw the signal of each record over what was measured, and return matplotlib's figure."""
-        each = [record for first in self.campaign.records for record in first.each]
+        each = [one for record in self.campaign.records for one in record.each]
         outputs = {o.name: o for o in self.model.plant.outputs}
         figure, cells = record_axes(len(each), 2.9)
         for (axis,), record in zip(cells, each, strict=True):

@@ -16,7 +16,7 @@ from armid.estimation.information import start_changes
 from armid.inference.decisions import CERTAIN, SIGNIFICANCE
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
-from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_samples
+from armid.inference.whitening import WhitenedData, WhiteRecords, whitened
 from armid.model import Array, Model
 from armid.problem.problem import Replay
 from armid.record import Record
@@ -120,7 +120,7 @@ class Residuals:
         """The replays whose errors count: invalid samples are replaced by simulated ones."""
         pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
         return tuple(r if sound.all() else
-                     with_samples(r, np.where(sound > 0.0, r.measured, r.signal(self.candidate[np.newaxis])[0]))
+                     r.measuring(np.where(sound > 0.0, r.measured, r.signal(self.candidate[np.newaxis])[0]))
                      for r, sound in pairs)  # fmt: skip
 
     @cached_property
@@ -129,10 +129,10 @@ class Residuals:
         names = variable_names(self.model)
         parts: dict[str, list[Array]] = {n: [] for n in names}
         for replay in self.replays:
-            for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
+            for piece, calibration, samples in zip(replay.pieces, replay.calibrations, replay.samples, strict=True):
                 found = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
                 for n in names:
-                    parts[n].append(found[n][piece.samples])
+                    parts[n].append(found[n][samples])
         return {n: np.concatenate(p) for n, p in parts.items()}
 
     @cached_property
@@ -140,9 +140,10 @@ class Residuals:
         """Samples before and after each one-way switch of the plant, name -> (n_samples,); empty without a switch."""
         found: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
-            runs = (zip(r.pieces, r.runs(self.candidate[np.newaxis]), strict=True) for r in self.replays)
-            after = np.concatenate([piece.manoeuvre.times()[piece.samples] >= run.switch_times[name][0]
-                                    for piece, run in chain.from_iterable(runs)])  # fmt: skip
+            runs = (zip(r.pieces, r.samples, r.ready.runs(self.candidate[np.newaxis]), strict=True)
+                    for r in self.replays)  # fmt: skip
+            after = np.concatenate([piece.manoeuvre.times()[samples] >= run.switch_times[name][0]
+                                    for piece, samples, run in chain.from_iterable(runs)])  # fmt: skip
             found |= {f"before '{name}'": ~after, f"after '{name}'": after}
         return {n: samples for n, samples in found.items() if samples.any()}
 
@@ -306,7 +307,7 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
 def repeat_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare the mean of repeats with their scatter (pure-error lack of fit), which needs no other noise."""
     groups: dict[tuple[str, str], list[Array]] = {}
-    for record, part in zip(seen.data.records, seen.data.by_record(seen.residual), strict=True):
+    for record, part in zip(seen.data.each, seen.data.by_record(seen.residual), strict=True):
         groups.setdefault((record.manoeuvre_file, record.output), []).append(part)
     for (name, _), parts in groups.items():
         if len(parts) < 2 or len({len(p) for p in parts}) > 1:
@@ -331,7 +332,7 @@ def time_tests(seen: Residuals) -> Iterator[Finding]:
         return
     parts, hum = seen.renewed, [sum(ends) / 2.0 for ends in mains_hum(seen)]
     if hum:
-        parts = [without_lines(p, hum, r.spacing) for p, r in zip(parts, seen.data.records, strict=True)]
+        parts = [without_lines(p, hum, r.spacing) for p, r in zip(parts, seen.data.each, strict=True)]
     lags = min(LAGS, *(len(p) // 4 for p in parts))
     total = 0.0
     for deviations in (p - np.mean(p) for p in parts):
@@ -404,7 +405,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
     raw = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else white
     left = spectra(raw, seen, hum)
-    rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.records], seen, hum) if coloured else {}
+    rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.each], seen, hum) if coloured else {}
     flat = 1.0 if seen.data.known else float(np.mean(np.concatenate(seen.renewed) ** 2))
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
@@ -428,7 +429,7 @@ def bridged(signal: Array, replay: Replay) -> Array:
 
 def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
     """Return the stretches of frequency, (low, high) [Hz], in which the rests show the mains or a harmonic of it."""
-    rests = [(r.rest - np.mean(r.rest), r.spacing) for r in seen.data.records if r.noise.source == "rest"]
+    rests = [(r.rest - np.mean(r.rest), r.spacing) for r in seen.data.each if r.noise.source == "rest"]
     if not rests:
         return []
     width = BESIDE / min(len(x) * step for x, step in rests)
@@ -459,7 +460,7 @@ def spectra(
     without: stretches of frequency, (low, high) [Hz], that are left out.
     """
     found: dict[int, list[float]] = {}
-    for record, level, signal in zip(seen.data.records, seen.data.levels, signals, strict=True):
+    for record, level, signal in zip(seen.data.each, seen.data.levels, signals, strict=True):
         taper = np.hanning(len(signal) + 2)[1:-1]
         power = np.abs(np.fft.rfft(signal * taper)[1:-1]) ** 2 / float(taper @ taper) / level.rms**2
         frequency = np.fft.rfftfreq(len(signal), record.spacing)[1:-1]

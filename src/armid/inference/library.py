@@ -21,7 +21,7 @@ from armid.estimation.least_squares import side_by_side
 from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import EFFECTS, Array, Effect, Manoeuvre, Model, Parameter, distinct
 from armid.model.parameter import powers_of
-from armid.problem.problem import Replay
+from armid.problem.problem import ReadyRecord, Replay, by_record
 from armid.problem.space import Space, space_of
 from armid.problem.starts import fits_starts
 from armid.record import Override, Record
@@ -169,7 +169,7 @@ class Library:
         misfit: of the fit. Itself where no start is fitted and the misfit is not another.
         """
         if fits_starts(replays):
-            data = replace(self.data, records=tuple(r.record for r in replays))
+            data = replace(self.data, records=tuple(ready.record for ready in by_record(replays)))
             return replace(self, data=data, misfit=misfit, _problems={})
         return self if 0.5 < misfit / self.misfit < 2.0 else replace(self, misfit=misfit, _problems={})
 
@@ -282,11 +282,9 @@ class Schedules:
 def scheduled_replays(records: Sequence[Record], model: Model, known: Sequence[Schedules]) -> tuple[Replay, ...]:
     """Return records ready to be simulated, each piece on the finest of some schedules."""
     ready: list[Replay] = []
-    # of the records of one file the first holds the others
-    for record in reversed({r.file: r for r in reversed(records)}.values()):
-        each = zip(*(s.by_file[record.file] for s in known), strict=True)
-        finest = tuple(max(c, key=lambda one: one.schedule.substeps) for c in each)
-        ready += Replay(record, model, tuple(p.until_window_end() for p in record.pieces), finest).each
+    for record in records:
+        calibrations = finest(*(s.by_file[record.file] for s in known))
+        ready += ReadyRecord(record, model, tuple(p.until_window_end() for p in record.pieces), calibrations).each
     return tuple(ready)
 
 
@@ -389,7 +387,7 @@ def calibrated_replays(
     """Make records ready to be simulated, on the engine's standard accuracy or one that a decision cannot tell from it.
 
     near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
-    each sampling interval, for all others of that interval. noise: of each record [its unit]; hidden: largest mean
+    each sampling interval, for all others of that interval. noise: of each signal [its unit]; hidden: largest mean
     square of the engine's error, in units of the noise.
     """
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
@@ -408,20 +406,20 @@ def calibrated_replays(
         rows = np.vstack([rows, weak])
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
-    allowed: dict[str, Array] = {}
-    for record, rms in zip(records, noise or (), strict=noise is not None):
-        of_file = allowed.setdefault(record.file, np.full(len(outputs), np.inf))
-        of_file[outputs.index(record.output) if record.output else 0] = np.sqrt(hidden) * rms
+    allowed, levels = None, iter(noise or ())
     known: dict[object, Calibration] = {}
     ready: list[Replay] = []
-    # of the records of one file the first holds the others
-    for record in reversed({r.file: r for r in reversed(records)}.values()):
+    for record in records:
+        if noise is not None:
+            allowed = np.full(len(outputs), np.inf)
+            for signal in record.signals:
+                allowed[outputs.index(signal.output) if signal.output else 0] = np.sqrt(hidden) * next(levels)
         pieces = tuple(p.until_window_end() for p in record.pieces)
         likenesses = [p.manoeuvre.interval if on_one else p.manoeuvre.likeness() for p in pieces]
         for likeness, piece in zip(likenesses, pieces, strict=True):
             if likeness not in known:
-                known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed.get(record.file))
-        ready += Replay(record, model, pieces, tuple(known[likeness] for likeness in likenesses)).each
+                known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed)
+        ready += ReadyRecord(record, model, pieces, tuple(known[likeness] for likeness in likenesses)).each
     return tuple(ready)
 
 
@@ -432,10 +430,9 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
 
 
-def with_finest(replay: Replay, others: Sequence[Replay]) -> Replay:
-    """Return a replay with the finest calibration that others have of each of its pieces, of equal ones the first."""
-    each = zip(*(r.calibrations for r in others), strict=True)
-    return replace(replay, calibrations=tuple(max(c, key=lambda one: one.schedule.substeps) for c in each))
+def finest(*several: Sequence[Calibration]) -> tuple[Calibration, ...]:
+    """Return of several calibrations of the same pieces the finest for each, of equal ones the first."""
+    return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*several, strict=True))
 
 
 def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:

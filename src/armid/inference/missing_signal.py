@@ -15,7 +15,7 @@ from armid.inference.library import Library
 from armid.inference.model import Fit, beyond
 from armid.inference.refit import candidate_at, free_values
 from armid.model import Array, Effect, Model, Parameter
-from armid.problem.problem import Replay
+from armid.problem.problem import Replay, by_record, with_each
 from armid.problem.space import Space
 from armid.record import Piece
 
@@ -133,11 +133,10 @@ def segments(
     A port at which no signal moves the output has no gain, nor has one whose signals do what those of an earlier port
     do, a factor aside. All ports together cost one compiled model, none where the model holds the test signals already.
     """
-    files: dict[tuple[int, ...], list[tuple[Replay, float]]] = {}
-    for replay, level in zip(replays, levels, strict=True):
-        files.setdefault(replay.simulated, []).append((replay, level))
-    whole = [segment_of(outputs, i, k, space, x) for i, outputs in enumerate(files.values())
-             for k in range(len(outputs[0][0].pieces))]  # fmt: skip
+    level_of = dict(zip(replays, levels, strict=True))
+    whole = [segment_of(outputs, [level_of[r] for r in outputs], i, k, space, x)
+             for i, (ready, outputs) in enumerate(by_record(replays).items())
+             for k in range(len(ready.pieces))]  # fmt: skip
     known = dict(zip(space.names, space.complete(x[np.newaxis])[0], strict=True))
     held = {e.name for e in model.effects}
     probes = [p for p in map(bump_at, ports) if p.name not in held]
@@ -158,17 +157,20 @@ def segments(
     return whole
 
 
-def segment_of(outputs: Sequence[tuple[Replay, float]], group: int, index: int, space: Space, x: Array) -> Segment:
-    one, (replays, levels) = slice(index, index + 1), zip(*outputs, strict=True)
-    alone = tuple(replace(r, pieces=r.pieces[one], calibrations=r.calibrations[one]) for r in replays)
-    records, replay = WeightedRecords(alone, space, (1.0,) * len(alone)), replays[0]
+def segment_of(
+    replays: Sequence[Replay], levels: Sequence[float], group: int, index: int, space: Space, x: Array
+) -> Segment:
+    one, replay = slice(index, index + 1), replays[0]
+    alone = with_each(replays, lambda r: replace(r, pieces=r.pieces[one], calibrations=r.calibrations[one]))
+    records = WeightedRecords(alone, space, (1.0,) * len(alone))
     residual, jacobian = records.residual_and_slopes(records.shares(x))
     level = np.repeat(levels, [len(r.measured) for r in alone])
     times = replay.pieces[index].manoeuvre.times()
     n_knots = int(np.clip((times[-1] - times[0]) / KNOT_S, 4, MOST_KNOTS_OF_A_PIECE)) + 1
     # Steps over several samples would jump across a narrow triangle; the weights belong to another set of parameters.
     schedule = replace(replay.calibrations[index].schedule, plan=None, weights=None)
-    return Segment(replays, levels, index, schedule, np.linspace(times[0], times[-1], n_knots), residual / level,
+    knots = np.linspace(times[0], times[-1], n_knots)
+    return Segment(tuple(replays), tuple(levels), index, schedule, knots, residual / level,
                    jacobian / level[:, np.newaxis], {}, group)  # fmt: skip
 
 
@@ -217,7 +219,7 @@ class Probe:
         run = self.run(segment, size, segment.knots, float(segment.knots[1] - segment.knots[0]))
         pairs, correction = zip(segment.replays, segment.levels, strict=True), segment.piece.correction
         outputs = run.outputs if correction is None else correction.corrected(run.outputs)
-        seen = ((outputs[r.place][:, r.pieces[segment.index].samples], level) for r, level in pairs)
+        seen = ((outputs[r.place][:, r.samples[segment.index]], level) for r, level in pairs)
         return np.concatenate([(output[1:] - output[0]).T / size / level for output, level in seen])
 
 

@@ -12,9 +12,10 @@ from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.information import start_changes
 from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
-from armid.inference.library import Active, EffectKey, calibrated_replays, is_finer, with_finest
+from armid.inference.library import Active, EffectKey, calibrated_replays, finest, is_finer
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
+from armid.problem.problem import by_record, with_each
 from armid.problem.starts import fits_starts, with_starts
 
 # Relative change of the sum of squares at which a fit stops: far below the 1 that means anything in 10,000 samples.
@@ -176,12 +177,14 @@ def fit_from(
 def with_standard_accuracy(fit: Fit) -> Fit:
     """Return a fit about its own starts whose records are simulated on the engine's standard accuracy, or finer."""
     records = fit.records
-    standard = calibrated_replays([r.record for r in records.replays], fit.model, records.space, fit.values)
+    each = [ready.record for ready in by_record(records.replays)]
+    standard = calibrated_replays(each, fit.model, records.space, fit.values)
     if not is_finer(standard, records.replays):
         return with_own_starts(fit)
     # The pieces are those of the fit, whose constants may be others than the record's; none is simulated coarser.
-    pairs = zip(records.replays, standard, strict=True)
-    replays = tuple(with_finest(ours, (theirs, ours)) for ours, theirs in pairs)
+    theirs = {r.record.file: r.calibrations for r in standard}
+    replays = with_each(records.replays, lambda ours: replace(
+        ours, calibrations=finest(theirs[ours.record.file], ours.calibrations)))  # fmt: skip
     again = fit_from(replace(records, replays=replays), fit.active, [fit.z])
     return with_own_starts(replace(again, constants=fit.constants))
 

@@ -25,7 +25,7 @@ MOST_PARTS, MOST_OF_SIZE = 5, 3
 
 def parts_of(data: WhitenedData) -> list[NDArray[np.int64]]:
     """Return what is left out in turn, as numbers of samples: manoeuvres with their repeats, or blocks of time."""
-    names = [r.manoeuvre_file for r in data.records]
+    names = [r.manoeuvre_file for r in data.each]
     each = data.by_record(np.arange(data.edges[-1]))
     distinct = list(dict.fromkeys(names))
     if len(distinct) > 1:

@@ -27,11 +27,11 @@ from armid.estimation.least_squares import (
     forward_slopes,
     step_in_box,
 )
-from armid.inference.kinds.faults import with_shared_starts
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
-from armid.problem.starts import fits_starts, with_starts
+from armid.problem.problem import ReadyRecord, with_each
+from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 
 # Step of the differences, in prior standard deviations.
 STEP = 1e-2
@@ -197,18 +197,16 @@ def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array,
     there = moved(base, unknowns, values)
     started = with_starts(there.replays, there.whole(z[np.newaxis])[0])
     names = base.model.plant.start_constants.values()
-    replays = list(base.replays)
-    for i, (old, new) in enumerate(zip(base.replays, started, strict=True)):
+    pieces_of = {r.record.file: r.pieces for r in started}
+
+    def begun(ready: ReadyRecord) -> ReadyRecord:
         pieces = []
-        for mine, theirs in zip(old.pieces, new.pieces, strict=True):
+        for mine, theirs in zip(ready.pieces, pieces_of[ready.record.file], strict=True):
             own = {n: theirs.manoeuvre.constants[n] for n in names if n in theirs.manoeuvre.constants}
-            manoeuvre = replace(mine.manoeuvre, constants={**mine.manoeuvre.constants, **own})
-            pieces.append(replace(mine, manoeuvre=manoeuvre, correction=theirs.correction))
-        replays[i] = replace(old, pieces=tuple(pieces))
-    for file in dict.fromkeys(r.record.file for r in replays):
-        inside = [i for i, r in enumerate(replays) if r.record.file == file]
-        replays = list(with_shared_starts(replays, inside))
-    return replace(base, replays=tuple(replays))
+            pieces.append(replace(mine.with_constants(own), correction=theirs.correction))
+        return with_shown_starts(replace(ready, pieces=tuple(pieces)))
+
+    return replace(base, replays=with_each(base.replays, begun))
 
 
 def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, weight: float) -> float:

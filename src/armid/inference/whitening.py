@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 from armid.estimation.information import MISFIT
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.model import Array, Plant
-from armid.problem.problem import Replay, signals_of
+from armid.problem.problem import signals_of
 from armid.record import Record
 from armid.record.noise import correlation_sum, new_share
 
@@ -164,9 +164,9 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class WhitenedData:
-    """Hold records with their noise, the outputs of one file as a record each.
+    """Hold records with their noise; what is of each record is of each of its signals, the records one by one.
 
-    levels: noise of each record. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of
+    levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of
     fits are kept, None: nowhere. cover: of a signal without a form; None for none.
     """
 
@@ -182,9 +182,14 @@ class WhitenedData:
         return 0.0 if self.cover is None else float(np.sum(np.log1p(self.cover.sizes)))
 
     @cached_property
+    def each(self) -> tuple[Record, ...]:
+        """The records, once for each of their signals."""
+        return tuple(one for r in self.records for one in r.each)
+
+    @cached_property
     def lengths(self) -> tuple[tuple[int, ...], ...]:
         """Samples in the windows of the pieces of each record."""
-        return tuple(tuple(p.n_samples for p in r.pieces) for r in self.records)
+        return tuple(r.lengths for r in self.each)
 
     @cached_property
     def edges(self) -> NDArray[np.int64]:
@@ -240,35 +245,25 @@ class WhitenedData:
 
 def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
     """Return records with their noise; others: records of the same sensors whose rests tell of their noise too."""
-    each = tuple(one for r in records for one in r.each)
-    levels = noise_levels(each, plant, others)
+    each, more = (tuple(one for r in some for one in r.each) for some in (records, others))
+    levels = noise_levels(each, plant, more)
     sound = np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
-    return WhitenedData(each, levels, sound)
+    return WhitenedData(tuple(records), levels, sound)
 
 
 def soundness(record: Record, reach: int) -> Array:
     """Return 0 for the samples of a record behind some that are no data, as far as the filter of the noise reaches."""
     sound = []
     for piece in record.pieces:
-        apart = np.diff(np.arange(piece.measured.size)[piece.samples])
+        n_seen = record.signals[0].n_seen(piece)
+        apart = np.diff(np.arange(piece.manoeuvre.n_samples)[record.signals[0].samples(piece)])
         # of a sensor that holds its value, or comes rarely, the usual distance is not a gap
-        near = np.append(True, apart <= 1.5 * np.median(apart)) if apart.size else np.ones(piece.n_samples, np.bool_)
+        near = np.append(True, apart <= 1.5 * np.median(apart)) if apart.size else np.ones(n_seen, np.bool_)
         unsound = ~near
         for _ in range(reach - 1):
             unsound[1:] |= unsound[:-1]
         sound.append(np.where(unsound & (reach > 0), 0.0, 1.0))
     return np.concatenate(sound)
-
-
-def with_samples(replay: Replay, values: Array) -> Replay:
-    """Return a replay in whose windows other values were measured, (n_samples,)."""
-    pieces, first = [], 0
-    for piece in replay.pieces:
-        measured = piece.measured.copy()
-        measured[piece.samples] = values[first : first + piece.n_samples]
-        pieces.append(replace(piece, measured=measured))
-        first += piece.n_samples
-    return replace(replay, pieces=tuple(pieces))
 
 
 @dataclass(frozen=True, eq=False)

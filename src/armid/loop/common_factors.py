@@ -10,6 +10,7 @@ from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.refit import candidate_at
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
+from armid.problem.problem import with_each
 
 
 def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
@@ -26,11 +27,12 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
             own[owner.name.removeprefix(ROUGHLY)] = slope(fit, fit.records, name, 1.0 + value)
         else:
             strengths.append(slope(fit, fit.records, name, value))
+    pieces = {r.record.file: r.pieces for r in fit.records.replays}
     for key in library.candidates:
         if key.name.startswith(ROUGHLY) and key not in fit.active:
             records = library.problem((*fit.active, key), fit.values)
-            pairs = zip(records.replays, fit.records.replays, strict=True)
-            there = replace(records, replays=tuple(replace(r, pieces=at.pieces) for r, at in pairs))
+            there = replace(records, replays=with_each(
+                records.replays, lambda ready: replace(ready, pieces=pieces[ready.record.file])))  # fmt: skip
             own[key.name.removeprefix(ROUGHLY)] = slope(fit, there, f"{key.compiled}.error", 1.0)
     if not own:
         return ()

@@ -417,9 +417,9 @@ def carried_sentence(found: ClosedLoop) -> str:
     factors = [float(np.sqrt(np.mean(raw**2))) / level.rms for raw, level in zip(unseen.raw, unseen.data.levels,
                                                                                  strict=True)]  # fmt: skip
     worst = int(np.argmax(np.nan_to_num(factors, nan=np.inf)))
-    missed = f"{unseen.data.records[worst].file} is missed by {factors[worst]:.3g} times its noise"
+    missed = f"{unseen.data.each[worst].file} is missed by {factors[worst]:.3g} times its noise"
     if not np.isfinite(factors[worst]):
-        missed = f"{unseen.data.records[worst].file} makes the simulation diverge"
+        missed = f"{unseen.data.each[worst].file} makes the simulation diverge"
     if found.withdrawn is None and judged.diagnosis.significant:
         named = f"With {' + '.join(found.effects)} the declared model" if found.effects else "The declared model"
         return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}"

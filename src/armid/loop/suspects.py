@@ -54,7 +54,7 @@ def suspects_of(accused: Sequence[Hypothesis], model: Hypotheses, found: Inferen
 
 
 def fault_of(what: OfRecord, name: str, fit: Fit, found: Inference) -> Suspect:
-    record, fault, plant = fit.records.data.records[what.index], what.fault, found.found.library.declared.plant
+    record, fault, plant = fit.records.data.each[what.index], what.fault, found.found.library.declared.plant
     if fault.kind == "label":
         told = record.constants[fault.constant]
         return Suspect(record.file, record.role, "label", FREED, 1.0 - told, fault.unit(record, plant))
@@ -90,7 +90,7 @@ def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
     """Return the samples that are no data, which were left out."""
     return [
         Suspect(record.file, record.role, b.kind, LEFT_OUT, float(b.count), "samples", None, None, b.from_s, b.to_s)
-        for record in (one for r in records for one in r.each) for b in record.broken
+        for record in records for signal in record.signals for b in signal.broken
     ]  # fmt: skip
 
 

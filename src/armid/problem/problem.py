@@ -1,8 +1,9 @@
 """Identification as a problem on which any algorithm of pymoo can work."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,11 +15,12 @@ from armid.problem.fitness import Fitness, joined, record_weights
 from armid.problem.meter import Meter, Metered
 from armid.problem.space import Space
 from armid.record import Piece, Record
+from armid.record.record import Samples
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
-    """Simulate the pieces of one record, each on its own calibrated schedule; for other outputs see `signals_of`."""
+class ReadyRecord:
+    """Simulate the pieces of one record, each on its own calibrated schedule."""
 
     record: Record
     model: Model
@@ -32,14 +34,71 @@ class Replay:
         pairs = [(run, piece.correction) for run, piece in zip(runs, self.pieces, strict=True)]
         return [run if c is None else replace(run, outputs=c.corrected(run.outputs)) for run, c in pairs]
 
+    @cached_property
+    def prepared(self) -> tuple[Prepared, ...]:
+        pairs = zip(self.pieces, self.calibrations, strict=True)
+        return tuple(prepare(self.model, piece.manoeuvre, c.schedule) for piece, c in pairs)
+
+    @property
+    def each(self) -> tuple["Replay", ...]:
+        """What is compared: each of its signals."""
+        return tuple(Replay(self, i) for i in range(len(self.record.signals)))
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Compare one signal of a record with its simulation; `signals_of` simulates a record once for all its signals."""
+
+    ready: ReadyRecord
+    index: int = 0
+
+    @property
+    def record(self) -> Record:
+        """The record with this signal alone."""
+        return self.ready.record.each[self.index]
+
+    @property
+    def model(self) -> Model:
+        return self.ready.model
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        return self.ready.pieces
+
+    @property
+    def calibrations(self) -> tuple[Calibration, ...]:
+        return self.ready.calibrations
+
+    def changed(self, **changes: Any) -> "Replay":
+        """Return the same signal of a record with other fields of `ReadyRecord`."""
+        return replace(self, ready=replace(self.ready, **changes))
+
+    def measuring(self, values: Array) -> "Replay":
+        """Return a replay of which other values were measured, (n_samples,)."""
+        measured, first = self.record.measured.copy(), 0
+        for piece, samples, n in zip(self.pieces, self.samples, self.lengths, strict=True):
+            piece.of(measured)[samples] = values[first : first + n]
+            first += n
+        return self.changed(record=self.ready.record.with_measured({self.record.output: measured}))
+
+    @cached_property
+    def samples(self) -> list[Samples]:
+        """Which samples of each piece are compared."""
+        return [self.record.signals[0].samples(piece) for piece in self.pieces]
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """How many samples of each piece these are."""
+        return tuple(self.record.signals[0].n_seen(piece) for piece in self.pieces)
+
     def seen(self, runs: Sequence[Simulation]) -> Array:
-        pairs = ((piece, run.outputs[self.place]) for piece, run in zip(self.pieces, runs, strict=True))
-        parts = [signal if piece.data is None and not piece.window.start else signal[:, piece.samples]
-                 for piece, signal in pairs]  # fmt: skip
+        triples = zip(self.pieces, self.samples, (run.outputs[self.place] for run in runs), strict=True)
+        parts = [signal if isinstance(samples, slice) and not piece.window.start else signal[:, samples]
+                 for piece, samples, signal in triples]  # fmt: skip
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def signal(self, candidates: Array) -> Array:
-        return self.seen(self.runs(candidates))
+        return self.seen(self.ready.runs(candidates))
 
     @cached_property
     def place(self) -> int:
@@ -53,45 +112,39 @@ class Replay:
         return f"{self.record.file}, {self.record.output}" if several else self.record.file
 
     @property
-    def each(self) -> tuple["Replay", ...]:
-        """The replays of all outputs of the record's file."""
-        others = [
-            replace(self, record=one, pieces=tuple(
-                replace(other.until_window_end(), manoeuvre=mine.manoeuvre)
-                for other, mine in zip(one.pieces, self.pieces, strict=True)
-            )) for one in self.record.others
-        ]  # fmt: skip
-        return (self, *others)
-
-    @cached_property
-    def simulated(self) -> tuple[int, ...]:
-        """What replays have in common whose signals come from one simulation."""
-        return tuple(map(id, (self.model, *(p.manoeuvre for p in self.pieces), *self.calibrations)))
-
-    @cached_property
-    def prepared(self) -> tuple[Prepared, ...]:
-        pairs = zip(self.pieces, self.calibrations, strict=True)
-        return tuple(prepare(self.model, piece.manoeuvre, c.schedule) for piece, c in pairs)
-
-    @property
     def measured(self) -> Array:
-        return np.concatenate([p.measured[p.samples] for p in self.pieces])
+        return np.concatenate([self.record.signals[0].seen(p) for p in self.pieces])
 
     @property
     def times(self) -> Array:
-        return np.concatenate([p.manoeuvre.times()[p.samples] for p in self.pieces])
+        pairs = zip(self.pieces, self.samples, strict=True)
+        return np.concatenate([p.manoeuvre.times()[samples] for p, samples in pairs])
 
     def engine_error_at(self, candidate: Array) -> float:
         """Return the largest error of the engine at one whole candidate [unit of the record], from halved steps."""
         halved = (replace(c, schedule=Schedule(2 * c.schedule.substeps)) for c in self.calibrations)
-        coarse, fine = (r.signal(candidate[np.newaxis]) for r in (self, replace(self, calibrations=tuple(halved))))
+        coarse, fine = (r.signal(candidate[np.newaxis]) for r in (self, self.changed(calibrations=tuple(halved))))
         return float(np.max(np.abs(coarse - fine))) * 16.0 / 15.0
 
 
-def replay_of(
+def with_each(replays: Sequence[Replay], change: Callable[[ReadyRecord], ReadyRecord]) -> tuple[Replay, ...]:
+    """Return replays whose records are changed, each once for all its signals."""
+    made = {ready: change(ready) for ready in by_record(replays)}
+    return tuple(replace(r, ready=made[r.ready]) for r in replays)
+
+
+def by_record(replays: Sequence[Replay]) -> dict[ReadyRecord, list[Replay]]:
+    """Return the replays of each record."""
+    groups: dict[ReadyRecord, list[Replay]] = {}
+    for replay in replays:
+        groups.setdefault(replay.ready, []).append(replay)
+    return groups
+
+
+def ready_record(
     record: Record, model: Model, space: Space, accuracy: str | None = None, threads: int = 1,
     known: dict[object, Calibration] | None = None, spans: bool = True,
-) -> Replay:  # fmt: skip
+) -> ReadyRecord:  # fmt: skip
     """Calibrate the engine on candidates spread over the space and make a record ready to be simulated.
 
     accuracy: None: as the record's noise asks for. known: calibrations of the same model and space by manoeuvre, so
@@ -107,7 +160,7 @@ def replay_of(
         if key not in known:
             known[key] = calibrate(model, piece.manoeuvre, spread, wanted, spans)
         calibrations.append(known[key])
-    return Replay(record, model, pieces, tuple(calibrations), threads)
+    return ReadyRecord(record, model, pieces, tuple(calibrations), threads)
 
 
 def replays(
@@ -132,16 +185,13 @@ def replays(
     tuple of Replay
     """
     known: dict[object, Calibration] = {}
-    return tuple(one for r in records for one in replay_of(r, model, space, accuracy, threads, known, spans).each)
+    return tuple(one for r in records for one in ready_record(r, model, space, accuracy, threads, known, spans).each)
 
 
 def signals_of(replays: Sequence[Replay], candidates: Array) -> list[Array]:
-    """Return the signal of each replay, as `Replay.signal` does; the outputs of one file share their simulation."""
-    runs: dict[tuple[int, ...], list[Simulation]] = {}
-    for replay in replays:
-        if replay.simulated not in runs:
-            runs[replay.simulated] = replay.runs(candidates)
-    return [replay.seen(runs[replay.simulated]) for replay in replays]
+    """Return the signal of each replay, as `Replay.signal` does; those of one record share its simulation."""
+    runs = {ready: ready.runs(candidates) for ready in by_record(replays)}
+    return [replay.seen(runs[replay.ready]) for replay in replays]
 
 
 def residuals(replays: Sequence[Replay], space: Space, X: ArrayLike, weights: ArrayLike) -> Array:

@@ -15,11 +15,11 @@ import numpy as np
 
 from armid.engine import probes
 from armid.model import Array
-from armid.problem.problem import Replay
+from armid.problem.problem import ReadyRecord, Replay, by_record, with_each
 from armid.problem.space import Space
 from armid.record import Piece
 from armid.record.noise import correlation_sum
-from armid.record.record import StartCorrection
+from armid.record.record import Samples, StartCorrection
 
 # Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
 MOVE = 1e-4
@@ -40,24 +40,32 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
     mean square that no start brings down and c = 1 + 2 sum rho its correlation in time: a model that lacks something
     must not be made up for by a start that the first samples rule out.
     """
-    found: list[Replay] = []
-    for outputs in by_file(replays):
-        starts = [Start(outputs, k) for k in range(len(outputs[0].pieces))]
-        fitted = [start.fitted(candidate) for start in starts]
-        each = [replace(r, pieces=tuple(piece[i] for piece in fitted)) for i, r in enumerate(outputs)]
-        records = [replace(r.record, pieces=r.pieces, others=()) for r in each]
-        records[0] = replace(records[0], others=tuple(records[1:]))
-        found += [replace(r, record=record) for r, record in zip(each, records, strict=True)]
-    return tuple(found)
+
+    def started(ready: ReadyRecord) -> ReadyRecord:
+        pieces = tuple(Start(ready, k).fitted(candidate) for k in range(len(ready.pieces)))
+        return replace(ready, record=replace(ready.record, pieces=pieces), pieces=pieces)
+
+    return with_each(replays, started)
+
+
+def with_shown_starts(ready: ReadyRecord) -> ReadyRecord:
+    """Return a record whose samples are others than those to which its starts were fitted, corrected by these."""
+
+    def shown(piece: Piece) -> Piece:
+        if piece.correction is None:
+            return piece
+        return replace(piece, correction=replace(piece.correction, measured=ready.record.seen_by_all(piece)))
+
+    return replace(ready, pieces=tuple(map(shown, ready.pieces)))
 
 
 def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
     """Return the whole candidate of 48 over the box that comes nearest to the records, each from its best start."""
     spread = space.complete(probes(space.low[space.free], space.high[space.free], N_PROBES))
     chi2 = np.zeros(len(spread))
-    for outputs in by_file(replays):
-        for k in range(len(outputs[0].pieces)):
-            start = Start(outputs, k)
+    for ready in by_record(replays):
+        for k in range(len(ready.pieces)):
+            start = Start(ready, k)
             signals, answers = start.linear(start.constants, spread)
             residual, slopes = start.residual(signals), start.seen_slopes(answers)
             for i in np.flatnonzero(np.isfinite(chi2)):
@@ -69,60 +77,61 @@ def fits_starts(replays: Sequence[Replay]) -> bool:
     return any(piece.shown_start for r in replays for piece in r.pieces)
 
 
-def by_file(replays: Sequence[Replay]) -> list[list[Replay]]:
-    groups: dict[tuple[int, ...], list[Replay]] = {}
-    for replay in replays:
-        groups.setdefault(replay.simulated, []).append(replay)
-    return list(groups.values())
-
-
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Fit the start of one piece. outputs: the replays of its file; index: which piece."""
+    """Fit the start of one piece of a record, to all its signals; index: which piece."""
 
-    outputs: Sequence[Replay]
+    ready: ReadyRecord
     index: int
 
     @property
-    def pieces(self) -> list[Piece]:
-        return [r.pieces[self.index] for r in self.outputs]
+    def piece(self) -> Piece:
+        return self.ready.pieces[self.index]
 
     @property
     def names(self) -> list[str]:
-        return list(self.pieces[0].shown_start)
+        return list(self.piece.shown_start)
 
     @property
     def constants(self) -> Array:
-        given = self.pieces[0].manoeuvre.constants
+        given = self.piece.manoeuvre.constants
         return np.array([given[name] for name in self.names])
 
     @property
     def size(self) -> float:
-        return self.outputs[0].model.plant.scales.speed
+        return self.ready.model.plant.scales.speed
+
+    @cached_property
+    def places(self) -> tuple[int, ...]:
+        return tuple(r.place for r in self.ready.each)
+
+    @cached_property
+    def samples(self) -> tuple[Samples, ...]:
+        return tuple(signal.samples(self.piece) for signal in self.ready.record.signals)
 
     @cached_property
     def weights(self) -> Array:
         """1/noise of each sample that is seen, the outputs one behind the other, (n_seen,)."""
-        sizes = self.outputs[0].model.plant.sizes
-        noise = [max(r.record.noise.rms, LEAST_NOISE * sizes[r.place]) for r in self.outputs]
-        return np.repeat(1.0 / np.array(noise), [p.n_samples for p in self.pieces])
+        sizes, signals = self.ready.model.plant.sizes, self.ready.record.signals
+        noise = [max(s.noise.rms, LEAST_NOISE * sizes[i]) for s, i in zip(signals, self.places, strict=True)]
+        return np.repeat(1.0 / np.array(noise), [s.n_seen(self.piece) for s in signals])
 
     @cached_property
     def measured(self) -> Array:
-        return np.concatenate([p.measured[p.samples] for p in self.pieces])
+        return self.ready.record.seen_by_all(self.piece)
 
     def signals(self, starts: Array, population: Array) -> Array:
         """Return the outputs of the file, each candidate from its own start, (n_outputs, n_candidates, n_samples)."""
-        first, prepared = self.outputs[0], self.outputs[0].prepared[self.index]
+        prepared = self.ready.prepared[self.index]
         whole = np.tile(prepared.starts, (len(starts), 1))
-        whole[:, [first.model.starts.index(name) for name in self.names]] = starts
-        outputs = prepared.run(population, first.threads, whole).outputs
-        return np.asarray(outputs[[r.place for r in self.outputs]])
+        whole[:, [self.ready.model.starts.index(name) for name in self.names]] = starts
+        outputs = prepared.run(population, self.ready.threads, whole).outputs
+        return np.asarray(outputs[list(self.places)])
 
     def seen(self, signals: Array) -> Array:
         """Return what is seen in the windows over the noise, the outputs one behind the other, (n_candidates, n)."""
-        pairs = zip(signals, self.pieces, strict=True)
-        return np.asarray(self.weights * np.concatenate([signal[:, piece.samples] for signal, piece in pairs], axis=1))
+        pairs = zip(signals, self.samples, strict=True)
+        return np.asarray(self.weights * np.concatenate([signal[:, samples] for signal, samples in pairs], axis=1))
 
     def residual(self, signals: Array) -> Array:
         return np.asarray(self.weights * self.measured - self.seen(signals))
@@ -138,7 +147,7 @@ class Start:
     @cached_property
     def shown(self) -> tuple[Array, Array]:
         """The start that the reader saw, and how far from it the fit may go, SI, both (n_constants,)."""
-        piece = self.pieces[0]
+        piece = self.piece
         deviations = np.array([piece.start_deviation[name] for name in self.names])
         return np.array(list(piece.shown_start.values())), WIDER * deviations
 
@@ -166,16 +175,16 @@ class Start:
         both = np.linalg.solve(normal, np.column_stack([slopes, held * (shown - constants)]))
         return np.asarray(both[:, :-1]), np.asarray(both[:, -1])
 
-    def fitted(self, candidate: Array) -> list[Piece]:
-        """Return the piece of each output from the best start of a candidate, as it is where the candidate diverges."""
-        pieces, constants, population = self.pieces, self.constants, candidate[np.newaxis]
+    def fitted(self, candidate: Array) -> Piece:
+        """Return the piece from the best start of a candidate, as it is where the candidate diverges."""
+        piece, constants, population = self.piece, self.constants, candidate[np.newaxis]
         if not self.names:
-            return pieces
+            return piece
         signals, slopes = self.linear(constants, population)
         for _ in range(MOST_STEPS):
             residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
-                return pieces
+                return piece
             misfit = self.misfit(residual, seen)
             gain, offset = self.answer(constants, seen, misfit)
             shorter = constants + (gain @ residual + offset) / 2.0 ** np.arange(MOST_HALVINGS)[:, np.newaxis]
@@ -189,13 +198,12 @@ class Start:
             if before - costs[better[0]] < ARRIVED:
                 break
         if not np.isfinite(slopes).all():
-            return pieces
+            return piece
         gain, offset = self.answer(constants, self.seen_slopes(slopes)[:, 0], misfit)
-        places, samples = tuple(r.place for r in self.outputs), tuple(p.samples for p in pieces)
-        correction = StartCorrection(places, slopes[:, :, 0], gain * self.weights, offset, self.measured, samples)
+        correction = StartCorrection(self.places, slopes[:, :, 0], gain * self.weights, offset, self.measured,
+                                     self.samples)  # fmt: skip
         start = dict(zip(self.names, map(float, constants), strict=True))
-        manoeuvre = replace(pieces[0].manoeuvre, constants={**pieces[0].manoeuvre.constants, **start})
-        return [replace(piece, manoeuvre=manoeuvre, correction=correction) for piece in pieces]
+        return replace(piece.with_constants(start), correction=correction)
 
     def seen_slopes(self, slopes: Array) -> Array:
         shape = (len(slopes), slopes.shape[2], len(self.weights))

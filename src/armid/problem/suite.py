@@ -20,9 +20,9 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import EFFECTS, PLANTS, Array, Manoeuvre, Model
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import PENALTY
-from armid.problem.problem import IdentificationProblem, replay_of, replays, residuals
+from armid.problem.problem import IdentificationProblem, ready_record, replays, residuals
 from armid.problem.space import Space, space_of
-from armid.record import Campaign, Noise, Piece, Record, read_campaign
+from armid.record import Campaign, Noise, Piece, Record, Signal, read_campaign
 from armid.units import DEGREE
 
 VERSION = 1
@@ -158,7 +158,7 @@ def suite(
             raise ArmidError(f"campaign {quoted(campaign.name)}: the suite has a problem of that name already, another "
                              "name is expected in campaign.toml")  # fmt: skip
         measured[campaign.name] = campaign
-        if objectives == "one" or sum(len(r.each) for r in campaign.train) > 1:
+        if objectives == "one" or sum(len(r.signals) for r in campaign.train) > 1:
             keys.append((campaign.name, 1))
     return Suite(tuple(keys), objectives, units, measured)
 
@@ -289,20 +289,15 @@ class SuiteProblem(Problem):  # type: ignore[misc]
             n_samples = round(given.duration_s / INTERVAL_S) + 1
             constants = {"theta_C": start * DEGREE, "theta_D": target * DEGREE, "shell": shell, "U": supply}
             manoeuvre, rms = Manoeuvre(INTERVAL_S, n_samples, constants), given.noise_deg_s * DEGREE
-            empty = np.zeros(n_samples)
-            record = Record(
-                file=f"{self.name}, record {number}", role="train", unit=self.model.plant.output_unit,
-                manoeuvre=manoeuvre, measured=empty, rest=np.empty(0),
-                noise=Noise(rms, 0.0, 0.0, 1.0, n_samples, "known"),
-                pieces=(Piece(manoeuvre, empty, slice(0, n_samples)),), whole_pieces=(),
-                output=self.model.plant.outputs[0].name,
-            )  # fmt: skip
-            replay = replay_of(record, self.model, self.space, "standard")
+            (output, *_), noise = self.model.plant.outputs, Noise(rms, 0.0, 0.0, 1.0, n_samples, "known")
+            signal = Signal(output.name, output.unit, np.zeros(n_samples), np.empty(0), noise)
+            pieces = (Piece(manoeuvre, slice(0, n_samples)),)
+            record = Record(f"{self.name}, record {number}", "train", manoeuvre, (signal,), pieces, whole_pieces=())
+            (replay,) = ready_record(record, self.model, self.space, "standard").each
             # recorded at the very steps of the search, so that the truth is the optimum of what has no noise, bit for
             # bit; normal numbers by the inverse distribution, as numpy's own may change between its versions
             measured = replay.signal(self.space.complete(truth[np.newaxis]))[0] + rms * ndtri(rng.random(n_samples))
-            pieces = (Piece(manoeuvre, measured, slice(0, n_samples)),)
-            ready.append(replace(replay, record=replace(record, measured=measured, pieces=pieces), pieces=pieces))
+            ready.append(replay.measuring(measured))
         return IdentificationProblem(self.space, tuple(ready), FITNESS[given.fitness])
 
     @cached_property
@@ -407,7 +402,7 @@ class MeasuredProblem(SuiteProblem):
 
     def __init__(self, campaign: Campaign, objectives: str = "one", units: str = "box") -> None:
         self.campaign, model = campaign, campaign.model()
-        space, n_records = space_of(model, campaign.parameters), sum(len(r.each) for r in campaign.train)
+        space, n_records = space_of(model, campaign.parameters), sum(len(r.signals) for r in campaign.train)
         self._declare(campaign.name, 1, model, space, n_records, objectives, units)
 
     truth = optimum_x = optimum_value = None  # type: ignore[assignment]

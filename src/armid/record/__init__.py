@@ -1,10 +1,10 @@
 """What was measured: campaigns of records, their noise and the windows that count.
 
 In reading order:
-campaign  `read_campaign`: campaign.toml and its CSV files -> Campaign; `write_campaign`
+campaign  `read_campaign`: campaign.toml and its CSV files -> Campaign; the same of tables; `write_campaign`
 schema    the kinds of values in a TOML file, and the shape of campaign.toml
-reader    one [[records]] entry and its CSV file -> Record
-table     CSV files of numbers, and what their headers mean
+reader    one [[records]] entry and its table -> Record
+table     CSV files of numbers or tables of pandas, and what their headers mean
 resample  even time grids out of the times of a file; which samples count
 start     the state from which a record or a piece of it is simulated
 noise     the noise of a sensor, from rest or from the motion itself
@@ -12,16 +12,16 @@ dialect   CSV files with other separators, decimals, comments, units, encodings
 sensor    step and hold of a sensor, from the values as they were read
 signal    one measured column: which rows are data, its noise, its turns
 broken    samples that are no data: clipped and repeated ones, wild ones
-record    Record (one output of one file), Piece, Noise, Irregularity: what all of that is put into
+record    Record (one file), its Signals, its Pieces, Noise, Irregularity: what all of that is put into
 """
 
 from armid.record.campaign import Campaign, read_campaign, write_campaign
-from armid.record.record import Irregularity, Noise, Piece, Record, RecordWarning
+from armid.record.record import Irregularity, Noise, Piece, Record, RecordWarning, Signal
 from armid.record.resample import IrregularSamplingWarning
 from armid.record.schema import Override
 from armid.record.table import write_table
 
 __all__ = [
     "Campaign", "IrregularSamplingWarning", "Irregularity", "Noise", "Override", "Piece", "Record", "RecordWarning",
-    "read_campaign", "write_campaign", "write_table",
+    "Signal", "read_campaign", "write_campaign", "write_table",
 ]  # fmt: skip

@@ -3,9 +3,10 @@
 import os.path
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -16,15 +17,17 @@ from armid.errors import ArmidError, DataError, caused_by, nearest, quoted
 from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, fitting_form
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
-from armid.record.reader import NAME, SUFFIX, campaign_path, gravity_of, read_record, record_path
+from armid.record.reader import NAME, SUFFIX, campaign_path, gravity_of, record_of, record_path
 from armid.record.record import Record, RecordWarning
 from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, load_toml, unknown_name, validated
-from armid.record.table import write_table
+from armid.record.table import CsvTable, read_table, table_of, write_table
 from armid.report.result import NewFiles, Shown
 from armid.units import DEG, DEGREE, angle_of
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from armid.report.document import Document
 
 # Records of each role that a campaign's repr names.
@@ -78,7 +81,7 @@ class Campaign(Shown):
 
         rows = [(r.file, r.role, own.output or self.plant.output, own.unit, len(own.measured),
                  f"{(len(own.measured) - 1) * r.manoeuvre.interval:.4g}", f"{own.noise.rms:.3g}")
-                for r in self.records for own in (r, *r.others)]  # fmt: skip
+                for r in self.records for own in r.signals]  # fmt: skip
         headers = ("record", "role", "output", "unit", "samples", "duration [s]", "noise, rms [unit]")
         main = table("Records", headers, rows)
         return Document(self.name, "Campaign", "What was recorded?", (repr(self),), (Section("Records", (main,)),),
@@ -151,13 +154,46 @@ def read_campaign(
     DataError
         One sentence (file, line or key, found, expected) for whatever cannot be used.
     """
-    plants = PLANTS if plants is None else plants
     toml = campaign_path(path)
     above = toml.parent.name or toml.parent.resolve().name
     # what messages put before the files of the campaign: c00/
     folder = f"{above if above.isprintable() else quoted(above)}/" if above else ""
     where = f"{folder}{toml.name}"
-    sheet = validated(CampaignSheet, load_toml(toml, where), where)
+
+    def source(file: str, at: str) -> Callable[[float | None], CsvTable]:
+        return partial(read_table, record_path(toml.parent, file, at), f"{folder}{file}")
+
+    return campaign_of(load_toml(toml, where), source, toml.parent, where, plants, effects)
+
+
+@caused_by(DataError)
+def campaign_of_tables(
+    plant: str, tables: Mapping[str, "DataFrame"], plants: Mapping[str, Plant], effects: Mapping[str, Effect]
+) -> Campaign:
+    """Return the campaign of tables of pandas, each with its name; their `attrs` hold the keys of [[records]]."""
+    files = {f"{name}.csv": table for name, table in tables.items()}
+    records = [{"role": "train", **as_toml(dict(table.attrs)), "file": file} for file, table in files.items()]
+    sheet = {"name": "tables", "plant": plant, "records": records}
+    return campaign_of(sheet, lambda file, _: partial(table_of, files[file], file), Path("tables"), "tables", plants,
+                       effects)  # fmt: skip
+
+
+def as_toml(value: Any) -> Any:
+    """Return a value with the types that a TOML file gives."""
+    if isinstance(value, Mapping):
+        return {str(key): as_toml(inner) for key, inner in value.items()}
+    return [*map(as_toml, value)] if isinstance(value, list | tuple) else getattr(value, "item", lambda: value)()
+
+
+def campaign_of(
+    given: Mapping[str, Any], source: Callable[[str, str], Callable[[float | None], CsvTable]], folder: Path,
+    where: str, plants: Mapping[str, Plant] | None, effects: Mapping[str, Effect] | None,
+) -> Campaign:  # fmt: skip
+    """Return a campaign; given: what campaign.toml holds. where: how messages name that.
+
+    source: file and how messages name its entry -> what reads its table, with the counts of a turn.
+    """
+    sheet, plants = validated(CampaignSheet, given, where), PLANTS if plants is None else plants
     if sheet.plant not in plants:
         raise unknown_name("plant", sheet.plant, plants, where)
     effects = {**sensor_effects(plants[sheet.plant]), **(EFFECTS if effects is None else effects)}
@@ -171,15 +207,16 @@ def read_campaign(
     sheet = with_known_constants(sheet, known, declared, where)
     entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
     places = [f"{where}, record {quoted(entry.file)}" for entry in entries]
-    paths = [record_path(toml.parent, entry.file, at) for entry, at in zip(entries, places, strict=True)]
+    sources = [source(entry.file, at) for entry, at in zip(entries, places, strict=True)]
+    records: list[Record] = []
     with warned_once():
-        records = [read_record(path, folder, entry, sheet, declared, at)
-                   for path, entry, at in zip(paths, entries, places, strict=True)]  # fmt: skip
-    for record in records if declared.records_one_speed else ():
-        if record.unit != records[0].unit:
-            raise ArmidError(f"{folder}{record.file}: the speed is in {record.unit}, {records[0].unit} is expected "
-                             f"as in {records[0].file}")  # fmt: skip
-    recorded = {one.output for record in records for one in record.each}
+        for read, entry, at in zip(sources, entries, places, strict=True):
+            table = read(sheet.counts_per_turn)
+            records.append(record_of(table, entry, sheet, declared, at))
+            if declared.records_one_speed and records[-1].unit != records[0].unit:
+                raise ArmidError(f"{table.file}: the speed is in {records[-1].unit}, {records[0].unit} is expected as "
+                                 f"in {records[0].file}")  # fmt: skip
+    recorded = {signal.output for record in records for signal in record.signals}
     whole = declared.for_unit(records[0].unit) if declared.records_one_speed else declared
     own = [{*e.constants, *(k.constant for k in declared.keys if k.key in e.keys)} for e in entries]
     for name in sheet.constants:
@@ -196,10 +233,10 @@ def read_campaign(
     values = {c.name: c.value for c in plant.constants} | dict(sheet.constants) | fixed
     # of what is 0 in every record nothing is known by a share of it
     sized = {name for name, value in values.items() if any(r.constants.get(name, value) for r in records)}
-    recorded_in = {angle_of(own.header) for r in records for own in r.each if own.unit in ("rad", "rad/s")}
+    recorded_in = {angle_of(own.header) for r in records for own in r.signals if own.unit in ("rad", "rad/s")}
     return Campaign(
         name=sheet.name,
-        folder=toml.parent,
+        folder=folder,
         plant=plant,
         effects=tuple(sheet.effects),
         records=tuple(records),
@@ -274,7 +311,7 @@ def warned_once(kind: type[Warning] = RecordWarning) -> Iterator[None]:
             sentence = f"{', '.join([first, *names[:MOST_NAMED]])}{more}: {said}"
         else:
             sentence = f"{first}: {said}; the same with other numbers: {', '.join(names[:MOST_NAMED])}{more}"
-        warnings.warn(sentence, category, stacklevel=4)
+        warnings.warn(sentence, category, stacklevel=5)
 
 
 def record_entries(tables: Sequence[Mapping[str, Any]], keys: Sequence[str], where: str) -> list[RecordSheet]:

@@ -1,19 +1,19 @@
-"""One record out of its CSV file and its entry in the campaign."""
+"""One record out of its table and its entry in the campaign."""
 
 import os.path
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Manoeuvre, ManoeuvreKey, Output, Plant
+from armid.model import Manoeuvre, ManoeuvreKey, Plant
 from armid.model.plant import unit_ends
-from armid.record.record import Piece, Record
+from armid.record.record import Piece, Record, Signal
 from armid.record.resample import Timing, is_constant, onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
-from armid.record.signal import Signal, signal_of
+from armid.record.signal import Column, column_of
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
     LARGEST,
@@ -23,7 +23,6 @@ from armid.record.table import (
     input_columns,
     output_columns,
     position_of,
-    read_table,
     time_column,
 )
 from armid.units import COUNTS, DEGREE
@@ -34,58 +33,42 @@ ROUNDING = 1e-9
 SATURATED_SAMPLES = 5
 
 
-def read_record(
-    path: Path, folder: str, sheet: RecordSheet, campaign: CampaignSheet, plant: Plant, where: str
-) -> Record:
-    """Read the record of one [[records]] entry: of the first output in the file, with those of the others.
+def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plant: Plant, where: str) -> Record:
+    """Return the record of one [[records]] entry and its table, with a signal for each output that it holds.
 
-    folder: what messages put before the name of the file. plant: the one that the campaign names; its sibling for the
-    record's unit is taken. Warns with RecordWarning of what had to be assumed and of what is no data, of uneven times
-    with IrregularSamplingWarning.
+    plant: the one that the campaign names; its sibling for the record's unit is taken. Warns with RecordWarning of what
+    is no data, of uneven times with IrregularSamplingWarning.
     """
-    table = read_table(path, f"{folder}{sheet.file}", campaign.counts_per_turn)
     times = time_column(table)
     plant, found = output_columns(table, plant)
     timing = timing_of(times, plant.from_rest, table.file)
     sources = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where)
     driven = [table.numbers(header) for header in sources.values()]
 
-    def signal(header: str, factor: float, unit: str) -> Signal:
+    def column(header: str, factor: float, unit: str, output: str = "") -> Column:
         most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
-        return signal_of(table, header, factor, times, timing, driven, unit in ("rad/s", "m/s"), campaign.unwrap,
-                         most_lost)  # fmt: skip
+        return column_of(table, header, unit, factor, times, timing, driven, campaign.unwrap, most_lost, output)
 
-    signals = {output: signal(header, output.factors[header], output.unit) for output, header in found.items()}
-    check_signals(signals, timing, campaign.gyro_range_deg_s, table)
+    measured = [column(header, o.factors[header], o.unit, o.name) for o, header in found.items()]
+    check_columns(measured, timing, campaign.gyro_range_deg_s, table)
     others = {name: values for name, values in table.columns.items() if name not in (TIME, *found.values())}
     columns = {name: onto_grid(values, times, timing) for name, values in others.items() if np.isfinite(values).all()}
     manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, sources, where=where)
-    first, *further = (
-        Record(
-            file=sheet.file,
-            role=sheet.role,
-            unit=output.unit,
-            manoeuvre=manoeuvre,
-            measured=signal.measured,
-            rest=signal.rest,
-            noise=signal.noise,
-            pieces=(),
-            whole_pieces=(),
-            earliest=timing.earliest,
-            columns=columns,
-            repeat_of=sheet.repeat_of or "",
-            restart_s=sheet.restart_s,
-            irregularity=timing.irregularity,
-            output=output.name,
-            data=None if signal.data.all() else signal.data,
-            sensor=signal.sensor,
-            broken=signal.broken,
-            header=found[output],
-        )
-        for output, signal in signals.items()
+    record = Record(
+        file=sheet.file,
+        role=sheet.role,
+        manoeuvre=manoeuvre,
+        signals=tuple(each.signal for each in measured),
+        pieces=(),
+        whole_pieces=(),
+        earliest=timing.earliest,
+        columns=columns,
+        repeat_of=sheet.repeat_of or "",
+        restart_s=sheet.restart_s,
+        irregularity=timing.irregularity,
     )
-    tracks = {} if plant.from_rest else tracks_of(first, plant, table, signals, signal)
-    return with_window(started(replace(first, others=tuple(further)), plant, tracks, where), sheet.window_s, where)
+    tracks = {} if plant.from_rest else tracks_of(record, plant, table, lambda *what: column(*what).signal)
+    return with_window(started(record, plant, tracks, where), sheet.window_s, where)
 
 
 def manoeuvre_of(
@@ -117,24 +100,24 @@ def input_factor(header: str, unit: str, table: CsvTable) -> float:
     return table.factor(header, next((factor for end, factor in ends.items() if header.endswith(f"_{end}")), 1.0))
 
 
-def check_signals(signals: Mapping[Output, Signal], timing: Timing, range_deg_s: float | None, table: CsvTable) -> None:
+def check_columns(measured: Sequence[Column], timing: Timing, range_deg_s: float | None, table: CsvTable) -> None:
     """Refuse a signal that shows no motion, and a speed that is cut off by the range of the gyro.
 
     Saturated are 5 samples in a row within one step of the sensor of the range, but at most a hundredth of it.
     """
-    for output, signal in signals.items():
-        if is_constant(signal.values[timing.first :][signal.rows[timing.first :]]):
-            what = "speed" if output.unit in ("rad/s", "m/s") else output.name
+    for column in measured:
+        if is_constant(column.values[timing.first :][column.rows[timing.first :]]):
+            what = "speed" if column.signal.unit in ("rad/s", "m/s") else column.signal.output
             raise ArmidError(f"{table.file}: the measured {what} is constant after the start, a motion is expected")
     if range_deg_s is None:
         return
-    speed = next((signal for output, signal in signals.items() if output.unit == "rad/s"), None)
+    speed = next((column for column in measured if column.signal.unit == "rad/s"), None)
     if speed is None:
-        unit = next(iter(signals)).unit
+        unit = measured[0].signal.unit
         raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {unit}: a speed in deg/s or "
                          "rad/s is expected")  # fmt: skip
     gyro_range = range_deg_s * DEGREE
-    step = min(speed.sensor.step, gyro_range / 100)
+    step = min(speed.signal.sensor.step, gyro_range / 100)
     # the slack keeps a value that is one step below the range inside, whatever its last binary digit
     near = np.abs(speed.values) >= gyro_range - step * (1 + 1e-6)
     runs = np.convolve(near, np.ones(SATURATED_SAMPLES), mode="valid")
@@ -164,7 +147,7 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
         length = piece_length(record.restart_s, manoeuvre.interval, record.measured.size, where)
     fitted, trained = len(asked) > len(given), record.role == "train"
     spent = 0 if trained or not fitted or plant.records_one_speed else n_spent(length, manoeuvre.interval)
-    pieces: list[list[Piece]] = [[] for _ in record.each]
+    pieces: list[Piece] = []
     for start in range(0, record.measured.size - length + 1, length):
         if plant.records_one_speed:
             state = state_at(tracks, start)
@@ -176,30 +159,22 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
         else:
             state = ({}, {})
         cut = manoeuvre.part(start, length, state[0])
-        for one, found in zip(record.each, pieces, strict=True):
-            own, shown_start = slice(start, start + length), state[0] if fitted and trained else {}
-            data = None if one.data is None else one.data[own]
-            found.append(
-                Piece(cut, one.measured[own], slice(0, length), start, state[1], spent, shown_start, data=data)
-            )
+        pieces.append(Piece(cut, slice(0, length), start, state[1], spent, state[0] if fitted and trained else {}))
     # the first piece starts where the record does
-    from_there = replace(manoeuvre, constants=pieces[0][0].manoeuvre.constants)
-    first_one, *further = (replace(one, manoeuvre=from_there, whole_pieces=tuple(found))
-                           for one, found in zip(record.each, pieces, strict=True))  # fmt: skip
-    return replace(first_one, others=tuple(further))
+    from_there = replace(manoeuvre, constants=pieces[0].manoeuvre.constants)
+    return replace(record, manoeuvre=from_there, whole_pieces=tuple(pieces))
 
 
 def tracks_of(
-    record: Record, plant: Plant, table: CsvTable, signals: Mapping[Output, Signal],
-    read: Callable[[str, float, str], Signal],
-) -> dict[str, Track]:  # fmt: skip
+    record: Record, plant: Plant, table: CsvTable, read: Callable[[str, float, str], Signal]
+) -> dict[str, Track]:
     """Return the signals from which a start is taken: of a plant that records one speed by constant, else by output.
 
     read: what reads a column: header, factor, unit -> signal.
     """
     if not plant.records_one_speed:
-        return {output.name: track_of(signal) for output, signal in signals.items()}
-    (speed,) = signals.values()
+        return {signal.output: track_of(signal) for signal in record.signals}
+    (speed,) = record.signals
     declared = {c.name for c in plant.constants}
     header = position_of(table, record.unit)
     tracks = {SPEED: track_of(speed)} if SPEED in declared else {}

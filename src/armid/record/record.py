@@ -1,7 +1,9 @@
-"""One measurement with its manoeuvre: Record, and the Pieces in which it is simulated."""
+"""One file with its manoeuvre: Record, the Signals that it measured, and the Pieces in which it is simulated."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from armid.record.broken import Broken
 from armid.record.sensor import Mask, Sensor
 
 NOISE_FREE = 1e-6
-# Which samples of a piece: those of a window, or these of it that were measured.
+# Which samples of a piece: those of a window, or these of it that a sensor measured.
 Samples = slice | NDArray[np.intp]
 
 
@@ -81,39 +83,22 @@ class StartCorrection:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """What is simulated in one go and compared with its measurement, on one grid.
+    """What is simulated in one go, on one grid.
 
     window: the samples that fitness and errors see. start_index: sample of the record at which the piece begins.
     start_deviation: constant (`start_position`, `start_speed`) -> standard deviation of its measured value, SI; empty
     for a machine that starts from its declared state. n_spent: first samples that told the start of a record that is
     held out, so that they judge nothing. shown_start: constant -> its measured value, SI, where a fit estimates these
-    constants beside the parameters; correction: what does so, None before. data: which of its samples were measured,
-    (n_samples,), None: all; the others hold a straight line between these, which no fit and no error sees.
+    constants beside the parameters; correction: what does so, None before.
     """
 
     manoeuvre: Manoeuvre
-    measured: Array
     window: slice
     start_index: int = 0
     start_deviation: Mapping[str, float] = field(default_factory=dict)
     n_spent: int = 0
     shown_start: Mapping[str, float] = field(default_factory=dict)
     correction: StartCorrection | None = None
-    data: Mask | None = None
-
-    @property
-    def samples(self) -> Samples:
-        """The samples that fitness and errors see: those of the window that were measured."""
-        if self.data is None:
-            return self.window
-        return np.asarray(np.flatnonzero(self.data[self.window]) + self.window.start)
-
-    @property
-    def n_samples(self) -> int:
-        """How many samples fitness and errors see."""
-        if self.data is None:
-            return int(self.window.stop - self.window.start)
-        return int(self.data[self.window].sum())
 
     @property
     def duration(self) -> float:
@@ -122,34 +107,69 @@ class Piece:
 
     def until_window_end(self) -> "Piece":
         """Return the piece without the samples after its window: what an identification has to simulate."""
-        stop = int(self.window.stop)
-        data = None if self.data is None else self.data[:stop]
-        return replace(self, manoeuvre=self.manoeuvre.shortened(stop), measured=self.measured[:stop], data=data)
+        return replace(self, manoeuvre=self.manoeuvre.shortened(int(self.window.stop)))
+
+    def with_constants(self, constants: Mapping[str, float]) -> "Piece":
+        """Return the piece with other constants of its manoeuvre, SI."""
+        return replace(self, manoeuvre=replace(self.manoeuvre, constants={**self.manoeuvre.constants, **constants}))
+
+    def of(self, samples: NDArray[Any]) -> NDArray[Any]:
+        """Return its part of the samples of a whole record."""
+        return samples[self.start_index : self.start_index + self.manoeuvre.n_samples]
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One measured output of a record.
+
+    output: its name, "" for a plant's only one. unit: SI. measured: [unit], (n_samples,), on the grid of the record.
+    rest: samples before t = 0 [unit], as in the file. data: which samples were measured, (n_samples,), None: all; the
+    others hold a straight line between these, which no fit and no error sees. sensor: what the values tell of it.
+    broken: samples that are no data by what is wrong. header: of the column.
+    """
+
+    output: str
+    unit: str
+    measured: Array
+    rest: Array
+    noise: Noise
+    data: Mask | None = None
+    sensor: Sensor = field(default_factory=Sensor)
+    broken: tuple[Broken, ...] = ()
+    header: str = ""
+
+    def samples(self, piece: Piece) -> Samples:
+        """Return the samples of a piece that fitness and errors see: those of its window that were measured."""
+        if self.data is None:
+            return piece.window
+        return np.asarray(np.flatnonzero(piece.of(self.data)[piece.window]) + piece.window.start)
+
+    def seen(self, piece: Piece) -> Array:
+        """Return what was measured at these samples."""
+        return piece.of(self.measured)[self.samples(piece)]
+
+    def n_seen(self, piece: Piece) -> int:
+        """Return how many these are."""
+        return len(piece.of(self.measured)[self.samples(piece)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Record:
-    """Hold one measured output of one file: its grid, what was measured on it, and the pieces to simulate.
+    """Hold one file: its grid and manoeuvre, the signals that were measured on it, and the pieces to simulate.
 
-    file: name inside the campaign's folder. role: "train" or "holdout". unit: of the output, SI.
-    manoeuvre: of the whole record, on an even grid from t = 0 (a plant from rest) or from the first sample (an axis).
-    measured: recorded signal [unit], (n_samples,), on that grid. rest: samples before t = 0 [unit], as in the file.
-    pieces: cut to the window; one piece unless `restart_s` was given. whole_pieces: the same before the window.
-    earliest: first sample that may be in a window. columns: header -> the file's other columns on the grid, in the
-    unit of the header. repeat_of: file of the record whose manoeuvre this one repeats, or "".
-    irregularity: None where the file's times were even. output: name of the output, "" for a plant's only one.
-    others: records of the file's other outputs, with the same manoeuvres. data: which samples were measured,
-    (n_samples,), None: all. sensor: what the values tell of it. broken: samples that are no data by what is wrong.
-    header: of the column.
+    file: name inside the campaign's folder. role: "train" or "holdout". manoeuvre: of the whole record, on an even grid
+    from t = 0 (a plant from rest) or from the first sample (an axis). signals: of each output that the file holds, in
+    the order of the plant; `output`, `unit`, `measured`, `rest`, `noise` and what is counted are those of the first,
+    and `each` holds a record for each. pieces: cut to the window; one piece unless `restart_s` was given. whole_pieces:
+    the same before the window. earliest: first sample that may be in a window. columns: header -> the file's other
+    columns on the grid, in the unit of the header. repeat_of: file of the record whose manoeuvre this one repeats, or
+    "". irregularity: None where the file's times were even.
     """
 
     file: str
     role: str
-    unit: str
     manoeuvre: Manoeuvre
-    measured: Array
-    rest: Array
-    noise: Noise
+    signals: tuple[Signal, ...]
     pieces: tuple[Piece, ...]
     whole_pieces: tuple[Piece, ...]
     earliest: int = 0
@@ -157,31 +177,67 @@ class Record:
     repeat_of: str = ""
     restart_s: float | None = None
     irregularity: Irregularity | None = None
-    output: str = ""
-    others: tuple["Record", ...] = ()
-    data: Mask | None = None
-    sensor: Sensor = field(default_factory=Sensor)
-    broken: tuple[Broken, ...] = ()
-    header: str = ""
 
     def __repr__(self) -> str:
         return (f"<Record {self.file} ({self.role}): {len(self.measured)} samples of {self.manoeuvre.interval:g} s, "
                 f"noise {self.noise.rms:.3g} {self.unit}>")  # fmt: skip
 
-    @property
-    def filled(self) -> "Record":
-        """The record with the straight lines between its samples taken as measured."""
+    def with_signals(self, change: Callable[[Signal], Signal]) -> "Record":
+        """Return the record with each of its signals changed."""
+        return replace(self, signals=tuple(map(change, self.signals)))
 
-        def whole(pieces: tuple[Piece, ...]) -> tuple[Piece, ...]:
-            return tuple(replace(p, data=None) for p in pieces)
+    def with_measured(self, measured: Mapping[str, Array]) -> "Record":
+        """Return the record with other samples of some outputs, name -> (n_samples,)."""
+        return self.with_signals(lambda s: replace(s, measured=measured.get(s.output, s.measured)))
 
-        others = tuple(other.filled for other in self.others)
-        return replace(self, data=None, pieces=whole(self.pieces), whole_pieces=whole(self.whole_pieces), others=others)
+    def with_pieces(self, change: Callable[[Piece], Piece]) -> "Record":
+        """Return the record with each of its pieces changed."""
+        pieces, whole = (tuple(map(change, some)) for some in (self.pieces, self.whole_pieces))
+        return replace(self, pieces=pieces, whole_pieces=whole)
 
-    @property
+    @cached_property
     def each(self) -> tuple["Record", ...]:
-        """The records of all outputs of the file."""
-        return (self, *self.others)
+        """The record once for each of its signals, with that one alone."""
+        return tuple(replace(self, signals=(signal,)) for signal in self.signals)
+
+    @property
+    def output(self) -> str:
+        """Name of the output, "" for a plant's only one."""
+        return self.signals[0].output
+
+    @property
+    def unit(self) -> str:
+        """Unit of the output, SI."""
+        return self.signals[0].unit
+
+    @property
+    def measured(self) -> Array:
+        """What was measured [unit], (n_samples,), on the grid of the record."""
+        return self.signals[0].measured
+
+    @property
+    def rest(self) -> Array:
+        """Samples before t = 0 [unit], as in the file."""
+        return self.signals[0].rest
+
+    @property
+    def noise(self) -> Noise:
+        """What is known of the sensor's noise."""
+        return self.signals[0].noise
+
+    @property
+    def seen(self) -> Array:
+        """What fitness and errors see of what was measured, (n_samples,)."""
+        return np.concatenate([self.signals[0].seen(p) for p in self.pieces])
+
+    def seen_by_all(self, piece: Piece) -> Array:
+        """Return what they see of a piece, the signals one behind the other, (n_seen,)."""
+        return np.concatenate([signal.seen(piece) for signal in self.signals])
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """How many samples of each piece they see."""
+        return tuple(self.signals[0].n_seen(p) for p in self.pieces)
 
     @property
     def manoeuvre_file(self) -> str:
@@ -196,9 +252,10 @@ class Record:
     @property
     def spacing(self) -> float:
         """Time from one measured sample to the next [s]: the interval of the grid, or a multiple of it."""
-        if self.data is None:
+        data = self.signals[0].data
+        if data is None:
             return self.manoeuvre.interval
-        return self.manoeuvre.interval * float(np.median(np.diff(np.flatnonzero(self.data))))
+        return self.manoeuvre.interval * float(np.median(np.diff(np.flatnonzero(data))))
 
     @property
     def constants(self) -> Mapping[str, float]:
@@ -208,7 +265,7 @@ class Record:
     @property
     def n_samples(self) -> int:
         """Number of samples in the windows of all pieces that were measured."""
-        return sum(p.n_samples for p in self.pieces)
+        return sum(self.lengths)
 
     @property
     def duration(self) -> float:
@@ -217,8 +274,8 @@ class Record:
 
     @property
     def noises(self) -> dict[str, float]:
-        """Output -> rms of its noise [its unit], of all outputs of the file."""
-        return {one.output: one.noise.rms for one in self.each}
+        """Output -> rms of its noise [its unit]."""
+        return {signal.output: signal.noise.rms for signal in self.signals}
 
     @property
     def is_noise_free(self) -> bool:

@@ -236,20 +236,20 @@ def with_window(record: Record, window_s: Sequence[float] | None, where: str) ->
     A piece of a restarted record with fewer than 20 samples in the window is left out.
     """
     low, high = window_samples(record, window_s, where)
-    if is_constant(record.measured[low:high]):
-        what = "speed" if record.unit in ("rad/s", "m/s") else record.output
-        raise ArmidError(f"{where}: the {what} of {record.file} is constant in the window, a motion is expected")
+    for signal in record.signals:
+        if is_constant(signal.measured[low:high]):
+            what = "speed" if signal.unit in ("rad/s", "m/s") else signal.output
+            raise ArmidError(f"{where}: the {what} of {record.file} is constant in the window, a motion is expected")
     pieces = []
     for piece in record.whole_pieces:
         begin = max(low - piece.start_index, piece.n_spent)
-        end = min(high - piece.start_index, piece.measured.size)
+        end = min(high - piece.start_index, piece.manoeuvre.n_samples)
         if end - begin >= FEWEST_SAMPLES:
             pieces.append(replace(piece, window=slice(begin, end)))
     if not pieces:
         raise ArmidError(f"{where}: no piece of {record.file} has {FEWEST_SAMPLES} samples in the window, a longer "
                          "window or restart_s is expected")  # fmt: skip
-    others = tuple(with_window(other, window_s, where) for other in record.others)
-    return replace(record, pieces=tuple(pieces), others=others)
+    return replace(record, pieces=tuple(pieces))
 
 
 def window_samples(record: Record, window_s: Sequence[float] | None, where: str) -> tuple[int, int]:

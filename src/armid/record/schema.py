@@ -379,20 +379,3 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
     except ValueError as error:
         # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
         raise ArmidError(f"{where} is no valid TOML: {str(error)[:200]}") from error
-
-
-def toml(value: Any) -> str:
-    """Return a value as TOML has it on one line."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{toml(str(k))} = {toml(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(toml, value))}]"
-    plain = getattr(value, "item", lambda: value)()  # numpy's numbers have it
-    text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
-    if isinstance(value, str):
-        text = '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    try:
-        tomllib.loads(f"x = {text}")
-    except tomllib.TOMLDecodeError as error:
-        raise ArmidError(f"{text} cannot stand in a campaign: a text, a number, true or false is expected") from error
-    return text

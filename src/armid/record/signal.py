@@ -10,9 +10,9 @@ from armid.errors import ArmidError
 from armid.model import Array
 from armid.record.broken import Broken, after_sudden, in_runs, repeated_samples, wild_samples
 from armid.record.noise import FEWEST_REST_SAMPLES, difference_rms, noise_of, rest_between
-from armid.record.record import Noise, RecordWarning
+from armid.record.record import Noise, RecordWarning, Signal
 from armid.record.resample import FEWEST_SAMPLES, Timing, gap_samples, is_constant, moved_onto_grid
-from armid.record.sensor import Mask, Sensor, renewed, sensor_of
+from armid.record.sensor import Mask, renewed, sensor_of
 from armid.record.table import CsvTable
 
 ROUNDING = 1e-6
@@ -29,31 +29,26 @@ WRAPS = {"rad": (2.0 * np.pi,), "deg": (360.0,), "turns": (1.0,), "counts": (2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Signal:
-    """Hold one measured column.
+class Column:
+    """Hold one measured column of a file.
 
     values: (n_rows,), SI, NaN where a cell is empty. rows: which are data: new values of a sound sensor, (n_rows,).
-    measured, data: on the grid, and which samples of it were measured, both (n_samples,). rest: samples at rest.
+    signal: the column on the grid.
     """
 
     values: Array
     rows: Mask
-    measured: Array
-    data: Mask
-    rest: Array
-    noise: Noise
-    sensor: Sensor
-    broken: tuple[Broken, ...]
+    signal: Signal
 
 
-def signal_of(
-    table: CsvTable, header: str, factor: float, times: Array, timing: Timing, inputs: Sequence[Array] = (),
-    is_speed: bool = False, unwrap: bool = False, most_lost: float = 0.05,
-) -> Signal:  # fmt: skip
-    """Return a column as a signal, and warn of what of it is no data.
+def column_of(
+    table: CsvTable, header: str, unit: str, factor: float, times: Array, timing: Timing, inputs: Sequence[Array] = (),
+    unwrap: bool = False, most_lost: float = 0.05, output: str = "",
+) -> Column:  # fmt: skip
+    """Return a column of a file and its signal, and warn of what of it is no data.
 
-    factor: to SI, NaN for counts. inputs: the columns that drive the machine, (n_rows,) each. is_speed: whether 0 is a
-    standstill. unwrap: whether whole turns are taken out. most_lost: share of the samples that may be no data.
+    factor: to the SI unit, NaN for counts. inputs: the columns that drive the machine, (n_rows,) each. unwrap: whether
+    whole turns are taken out. most_lost: share of the samples that may be no data. output: whose signal it is.
     Raises ArmidError for a column with too few numbers or too many that are no data.
     """
     raw = table.numbers(header, gaps=True)
@@ -74,7 +69,7 @@ def signal_of(
     rows[new.at[wild & ~new.since(jumps)]] = False
     found["spikes"] &= ~rows
     new = New(values, rows, times, timing)
-    rest, noise = rest_and_noise(new, inputs, is_speed)
+    rest, noise = rest_and_noise(new, inputs, is_speed=unit in ("rad/s", "m/s"))
     moves = not is_constant(new.motion)
     repeated = (
         repeated_samples(new.values, noise.rms, noise.source == "rest", sensor, new.since(jumps)) if moves else {}
@@ -87,7 +82,9 @@ def signal_of(
     check_lost(table, header, faults, n_new, most_lost)
     check_number(table, header, rows, timing)
     measured, data = moved_onto_grid(values, times, timing, rows)
-    return Signal(values, rows, measured, data, rest, noise, sensor, (*gaps(times, timing), *faults))
+    signal = Signal(output, unit, measured, rest, noise, None if data.all() else data, sensor,
+                    (*gaps(times, timing), *faults), header)  # fmt: skip
+    return Column(values, rows, signal)
 
 
 class New:

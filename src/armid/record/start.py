@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armid.model import Array, Model, Plant
-from armid.record.signal import Signal
+from armid.record.record import Signal
 
 State = tuple[dict[str, float], dict[str, float]]
 # Of a record that is held out, the start comes from this share of its first samples, at most so long [s], at least so
@@ -32,7 +32,8 @@ class Track:
 
 def track_of(signal: Signal) -> Track:
     """Return a signal with the noise of the start that it tells."""
-    return Track(signal.measured, signal.noise.rms / float(np.sqrt(np.mean(signal.data))), signal.sensor.step)
+    measured = 1.0 if signal.data is None else float(np.mean(signal.data))
+    return Track(signal.measured, signal.noise.rms / float(np.sqrt(measured)), signal.sensor.step)
 
 
 def state_at(tracks: Mapping[str, Track], index: int) -> State:

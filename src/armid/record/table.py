@@ -7,19 +7,23 @@ A header is a quantity and its unit, `angular_velocity_deg_s`; a factor turns th
 """
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Output, Plant
 from armid.model.plant import SPEEDS
-from armid.record.dialect import COMMENTS, cells_of, check_names, columns_of, text_of
+from armid.record.dialect import COMMENTS, Cells, cells_of, check_names, columns_of, text_of
 from armid.record.record import RecordWarning
 from armid.units import DEGREE, TURN
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 LARGEST = 1e30
 LONGEST_HEADER = 1 << 16
@@ -107,35 +111,52 @@ def read_table(path: Path, file: str, counts_per_turn: float | None = None) -> C
                          "expected")  # fmt: skip
     if not text.strip():
         check_names([], 1, file)
-    columns: dict[str, Array] = {}
-    texts: dict[str, tuple[int, str]] = {}
     plain = None if wide else plain_columns(text)
-    lines: tuple[int, ...] = ()
-    header_line = 1
     if plain is not None:
         names, values = plain
         check_names(names, 1, file)
-        columns = {name: np.ascontiguousarray(column) for name, column in zip(names, values.T, strict=True)}
-    else:
-        cells = cells_of(text, wide, file)
-        lines, header_line = cells.lines, cells.header_line
-        for name, found in columns_of(cells) if cells.rows else ():
-            if isinstance(found, tuple):
-                texts[name] = found[0], f"{quoted(found[1])}, a finite number"
-            else:
-                columns[name] = found
-        if cells.assumed:
-            warnings.warn(f"{file}: read with {', '.join(cells.assumed)}", RecordWarning, stacklevel=2)
-    if not columns and not texts:
-        raise ArmidError(f"{file} holds no samples: rows of numbers are expected below the header")
-    table = CsvTable(file, path, columns, texts, lines, header_line, counts_per_turn)
-    for name, values in list(columns.items()):
+        return table_with(zip(names, map(np.ascontiguousarray, values.T), strict=True), file, path, (), 1,
+                          counts_per_turn)  # fmt: skip
+    cells = cells_of(text, wide, file)
+    if cells.assumed:
+        warnings.warn(f"{file}: read with {', '.join(cells.assumed)}", RecordWarning, stacklevel=2)
+    found = columns_of(cells) if cells.rows else ()
+    return table_with(found, file, path, cells.lines, cells.header_line, counts_per_turn)
+
+
+def table_of(frame: "DataFrame", file: str, counts_per_turn: float | None = None) -> CsvTable:
+    """Return a table of pandas as if it were read from the CSV file that holds its columns."""
+    names, lines = [str(name).strip() for name in frame.columns], tuple(range(2, len(frame) + 2))
+    check_names(names, 1, file)
+    found: list[tuple[str, Array | tuple[int, str]]] = []
+    for name, (_, column) in zip(names, frame.items(), strict=True):
+        if column.dtype in ("float64", "int64"):
+            found.append((name, column.to_numpy(dtype=np.float64)))
+        else:
+            cells = ["" if empty else str(cell).strip() for cell, empty in zip(column, column.isna(), strict=True)]
+            found += columns_of(Cells((name,), tuple((cell,) for cell in cells), lines, 1, ()))
+    return table_with(found if lines else (), file, Path(file), lines, 1, counts_per_turn)
+
+
+def table_with(
+    found: Iterable[tuple[str, Array | tuple[int, str]]], file: str, path: Path, lines: tuple[int, ...],
+    header_line: int, counts_per_turn: float | None,
+) -> CsvTable:  # fmt: skip
+    """Return the table of some columns, each its numbers, or line and text of a cell without one; refuse none."""
+    table = CsvTable(file, path, {}, {}, lines, header_line, counts_per_turn)
+    for name, values in found:
+        if isinstance(values, tuple):
+            table.texts[name] = values[0], f"{quoted(values[1])}, a finite number"
+            continue
         beyond = np.flatnonzero(np.abs(values) > LARGEST)
         if beyond.size:
             row = int(beyond[0])
             expected = f"a number within +-{LARGEST:g}" if np.isfinite(values[row]) else "a finite number"
-            texts[name] = table.line_of(row), f"{values[row]:g}, {expected}"
-            del columns[name]
+            table.texts[name] = table.line_of(row), f"{values[row]:g}, {expected}"
+        else:
+            table.columns[name] = values
+    if not table.headers:
+        raise ArmidError(f"{file} holds no samples: rows of numbers are expected below the header")
     return table
 
 

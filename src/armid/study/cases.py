@@ -13,10 +13,10 @@ import numpy as np
 
 from armid.engine import FINE, Schedule, calibrate, simulate
 from armid.errors import ArmidError, quoted
-from armid.model import Array, Manoeuvre, Model, Plant
+from armid.model import Manoeuvre, Model, Plant
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, SuiteProblem
-from armid.record import Campaign, Noise, Override, Piece, Record, read_campaign
+from armid.record import Campaign, Noise, Override, Piece, Record, Signal, read_campaign
 from armid.record.reader import NAME, campaign_path, record_constants
 from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
@@ -317,18 +317,11 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
             raise ArmidError(f"{name}: the simulation diverges at the truth, a motion is expected")
         if is_constant(run.output[0]):
             raise ArmidError(f"{name}: the machine does not move at the truth, a motion is expected")
-        record = Record(
-            file=name, role=stroke["role"], unit=model.plant.output_unit, manoeuvre=manoeuvre, measured=run.output[0],
-            rest=np.empty(0), noise=Noise(0.0, 0.0, 0.0, 1.0, n_samples, KNOWN), pieces=(), whole_pieces=(),
-            output=model.plant.outputs[0].name,
-        )  # fmt: skip
-        records.append(_with_signal(record, run.output[0]))
+        output, noise = model.plant.outputs[0], Noise(0.0, 0.0, 0.0, 1.0, n_samples, KNOWN)
+        signal = Signal(output.name, output.unit, run.output[0], np.empty(0), noise)
+        pieces = (Piece(manoeuvre, slice(0, n_samples)),)
+        records.append(Record(name, stroke["role"], manoeuvre, (signal,), pieces, pieces))
     return tuple(records)
-
-
-def _with_signal(record: Record, measured: Array) -> Record:
-    pieces = (Piece(record.manoeuvre, measured, slice(0, measured.size)),)
-    return replace(record, measured=measured, pieces=pieces, whole_pieces=pieces)
 
 
 def in_window(record: Record, window: Sequence[float] | str) -> Record:
@@ -350,8 +343,9 @@ def noisy_records(records: Sequence[Record], settings: Mapping[str, Any]) -> tup
     rng = np.random.default_rng(np.frombuffer(hashlib.sha256(words.encode()).digest(), dtype="<u4"))
     noisy = []
     for record in records:
-        rms = noise_rms(settings, record.unit)
-        known = Noise(rms, 0.0, 0.0, 1.0, record.measured.size, KNOWN)
-        signal = record.measured + rms * rng.standard_normal(record.measured.size)
-        noisy.append(_with_signal(replace(record, noise=known), signal))
+        (signal,) = record.signals
+        rms = noise_rms(settings, signal.unit)
+        known = Noise(rms, 0.0, 0.0, 1.0, signal.measured.size, KNOWN)
+        measured = signal.measured + rms * rng.standard_normal(signal.measured.size)
+        noisy.append(replace(record, signals=(replace(signal, measured=measured, noise=known),)))
     return tuple(noisy)

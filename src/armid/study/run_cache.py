@@ -10,7 +10,7 @@ from typing import Any
 from armid.errors import ArmidError
 from armid.estimation.least_squares import with_fitted_starts
 from armid.model import Model
-from armid.problem.problem import Replay, replay_of
+from armid.problem.problem import Replay, ready_record
 from armid.problem.space import Space, space_of
 from armid.problem.suite import VERSION, suite
 from armid.record import Campaign, Record
@@ -67,8 +67,9 @@ class RunCache:
         accuracy = None if settings["accuracy"] == "auto" else settings["accuracy"]
         if level:
             # the accuracy that is enough depends on how loud the noise is, not on how it turns out
-            records = [replace(r, noise=replace(r.noise, rms=noise_rms(settings, r.unit))) for r in records]
-        replays = tuple(r for record in records for r in replay_of(record, model, space, accuracy).each)
+            records = [r.with_signals(lambda s: replace(s, noise=replace(s.noise, rms=noise_rms(settings, s.unit))))
+                       for r in records]  # fmt: skip
+        replays = tuple(r for record in records for r in ready_record(record, model, space, accuracy).each)
         train = iter(with_fitted_starts(tuple(r for r in replays if r.record.role == "train"), space))
         replays = tuple(next(train) if r.record.role == "train" else r for r in replays)
         return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), replays)
@@ -102,6 +103,5 @@ class RunCache:
 
 def _measured_again(replay: Replay, record: Record) -> Replay:
     """Return a replay of the same manoeuvre with another measurement, on the schedule that it has."""
-    pieces = tuple(p.until_window_end() for p in record.pieces)
-    assert [p.window for p in replay.pieces] == [p.window for p in pieces]
-    return replace(replay, record=record, pieces=pieces)
+    assert [p.window for p in replay.pieces] == [p.window for p in record.pieces]
+    return replay.changed(record=record)

@@ -26,6 +26,7 @@ from armid.errors import ArmidError, MachineError, StudyError, caused_by, quoted
 from armid.estimation.identify import INTERRUPTED, Identification, identified, versions_of
 from armid.model import Model
 from armid.problem.fitness import fitness_of_name
+from armid.problem.problem import by_record
 from armid.problem.suite import SuiteProblem, first_of
 from armid.progress import announced
 from armid.record import Campaign
@@ -345,7 +346,8 @@ class Study:
         case, replays = cache.replays(settings)
         train, holdout = (tuple(r for r in replays if r.record.role == role) for role in ("train", "holdout"))
         model, fitness = train[0].model, fitness_of_name(settings["fitness"], cache.registry.fitness)
-        campaign = Campaign(settings["case"], cache.folder, model.plant, (), tuple(r.record for r in replays), {}, {})
+        records = tuple(ready.record for ready in by_record(replays))
+        campaign = Campaign(settings["case"], cache.folder, model.plant, (), records, {}, {})
         found = identified(
             campaign, train, holdout, case.space, fitness, identifier, settings["budget"], settings["seed"]
         )

@@ -32,11 +32,10 @@ class OfParameter:
 
     def moved(self, values: dict[str, float], records: WhiteRecords, value: float) -> WhiteRecords:
         """Return records as they would be in the middle of the campaign; values: of the parameters, about which, SI."""
-        files, found = list(dict.fromkeys(r.file for r in records.data.records)), records
+        firsts, found = [i for i, replay in enumerate(records.replays) if replay.index == 0], records
         at, names = records.shares(free_values(records, values)), records.space.free_names
-        for place, file in enumerate(files):
-            index = next(i for i, r in enumerate(records.data.records) if r.file == file)
-            share, there, z = value * LARGEST * (place / (len(files) - 1.0) - 0.5), records, at
+        for place, index in enumerate(firsts):
+            share, there, z = value * LARGEST * (place / (len(firsts) - 1.0) - 0.5), records, at
             if self.product is not None:
                 there = replace(records, replays=moved_replays(records.replays, {self.product.names[0]: share}))
             else:
@@ -48,7 +47,7 @@ class OfParameter:
 
 def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
     """Return the drifts of parameters and constants, none where there are few records."""
-    if len({r.file for r in fit.records.data.records}) < FEWEST:
+    if len(fit.records.data.records) < FEWEST:
         return []
     own = [OfParameter(name) for name in fit.values if library.owner(name) is None]
     own += [OfParameter(p.public, p) for p in fit.products(library.tolerances)]
@@ -87,6 +86,5 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
 
 def order_of(records: WhiteRecords) -> Array:
     """Return the place of the file of each sample in the order of the campaign, from -1/2 to 1/2, (n_samples,)."""
-    files = list(dict.fromkeys(r.file for r in records.data.records))
-    places = np.array([files.index(r.file) for r in records.data.records]) / (len(files) - 1.0) - 0.5
-    return np.repeat(places, np.diff(records.data.edges))
+    n_samples = [sum(one.n_samples for one in r.each) for r in records.data.records]
+    return np.repeat(np.arange(len(n_samples)) / (len(n_samples) - 1.0) - 0.5, n_samples)

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.inference.whitening import WhiteRecords, with_samples
+from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model, Plant
-from armid.problem.problem import Replay, signals_of
+from armid.problem.problem import ReadyRecord, Replay, signals_of, with_each
+from armid.problem.starts import with_shown_starts
 from armid.record import Piece, Record
 
 # Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),
@@ -40,30 +41,14 @@ class Fault:
         units = {"late": "s", "clock": "1", "offset": record.unit, "drift": f"{record.unit}/s", "gain": "1"}
         return units.get(self.kind) or next((c.unit for c in plant.constants if c.name == self.constant), "1")
 
-    def touches(self, record: Record, other: Record) -> bool:
-        """Tell whether what is wrong in one record is so in another: its own sensor, or all of its file."""
-        return other.file == record.file and (self.kind not in OF_SENSOR or other.output == record.output)
+    def touches(self, output: str, other: str) -> bool:
+        """Tell whether what is wrong in one output of a record is so in another."""
+        return self.kind not in OF_SENSOR or other == output
 
-    def undone(self, record: Record, value: float, plant: Plant) -> Record:
-        measured = self.measured(record.measured, record, value)
-        pieces, whole = (tuple(self.undone_piece(p, measured, value, plant) for p in some)
-                         for some in (record.pieces, record.whole_pieces))  # fmt: skip
-        return replace(record, measured=measured, pieces=pieces, whole_pieces=whole)
-
-    def trimmed(self, record: Record, value: float, plant: Plant, faulty: Record | None = None) -> Record:
-        """Return a file without the fault, and without the samples that were not measured at their new time.
-
-        faulty: the record of that of its outputs in which the fault is, None: the first.
-        """
-        each = list(record.each)
-        for i, one in enumerate(record.each):
-            if self.touches(faulty or record, one):
-                there, (first, last) = self.undone(one, value, plant), self.lost(one, value)
-                ends = [(first - p.start_index, one.measured.size - last - p.start_index) for p in there.pieces]
-                pieces = [replace(p, window=slice(max(p.window.start, low), min(p.window.stop, high)))
-                          for p, (low, high) in zip(there.pieces, ends, strict=True)]  # fmt: skip
-                each[i] = replace(there, pieces=tuple(p for p in pieces if p.n_samples > 0))
-        return replace(each[0], others=tuple(each[1:]))
+    def undone(self, record: Record, value: float, plant: Plant, output: str = "") -> Record:
+        """Return a record without the fault; output: whose sensor it is."""
+        measured = {one.output: self.measured(one, value) for one in record.each if self.touches(output, one.output)}
+        return record.with_measured(measured).with_pieces(lambda piece: self.undone_piece(piece, value, plant))
 
     def lost(self, record: Record, value: float) -> tuple[int, int]:
         """Return how many samples at either end of a record have no measured value once its times are mended."""
@@ -91,23 +76,21 @@ class Fault:
         own = np.arange(record.measured.size, dtype=np.float64)
         return own + value / record.manoeuvre.interval if self.kind == "late" else own * (1.0 + value)
 
-    def undone_piece(self, piece: Piece, measured: Array, value: float, plant: Plant) -> Piece:
-        """Return a piece without the fault; measured: the whole record without it."""
+    def undone_piece(self, piece: Piece, value: float, plant: Plant) -> Piece:
         if not self.constant:
-            return replace(piece, measured=measured[piece.start_index :][: piece.measured.size])
+            return piece
         given = {c.name: c.value for c in plant.constants} | dict(piece.manoeuvre.constants)
-        changed = value if self.kind == "label" else given[self.constant] + value
-        constants = {**piece.manoeuvre.constants, self.constant: changed}
-        return replace(piece, manoeuvre=replace(piece.manoeuvre, constants=constants))
+        return piece.with_constants({self.constant: value if self.kind == "label" else given[self.constant] + value})
 
-    def measured(self, signal: Array, record: Record, value: float) -> Array:
+    def measured(self, record: Record, value: float) -> Array:
+        """Return what was measured without the fault, (n_samples,)."""
         if self.kind in OF_TIMES:
-            return resampled(signal, self.places(record, value))
+            return resampled(record.measured, self.places(record, value))
         if self.kind == "gain":
-            return signal / (1.0 + value)
+            return record.measured / (1.0 + value)
         if self.constant:
-            return signal
-        return signal - value * (np.maximum(record.times, 0.0) if self.kind == "drift" else 1.0)
+            return record.measured
+        return record.measured - value * (np.maximum(record.times, 0.0) if self.kind == "drift" else 1.0)
 
 
 def resampled(signal: Array, places: Array) -> Array:
@@ -132,7 +115,7 @@ def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array]:
 
 def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
     """Yield what may be wrong in a record; faults of a whole file belong to its first output."""
-    model, record = base.model, base.data.records[index]
+    model, record = base.model, base.data.each[index]
     yield from (Fault(kind) for kind in OF_SENSOR)
     if index != of_file(base, index)[0]:
         return
@@ -149,51 +132,37 @@ def leaves_of(model: Model, key: str) -> set[str]:
 
 
 def with_record(base: WhiteRecords, index: int, fault: Fault, value: float) -> WhiteRecords:
-    """Return a problem in which one record, or its whole file, is replaced by itself without a fault."""
-    faulty, edges = base.data.records[index], base.data.edges
-    sound, records, replays = base.data.sound.copy(), list(base.data.records), list(base.replays)
-    inside = of_file(base, index)
-    for i in inside:
-        old = records[i]
-        if not fault.touches(faulty, old):
-            continue
-        first, last = fault.lost(old, value)
-        sound[edges[i] : edges[i] + first] = sound[edges[i + 1] - last : edges[i + 1]] = 0.0
-        records[i] = fault.undone(old, value, base.model.plant)
-        pieces = tuple(fault.undone_piece(p, records[i].measured, value, base.model.plant) for p in replays[i].pieces)
-        replays[i] = replace(replays[i], record=records[i], pieces=pieces)
-    data = replace(base.data, records=tuple(records), sound=sound)
-    return replace(base, replays=with_shared_starts(replays, inside), data=data)
+    """Return a problem in which one record is replaced by itself without a fault; index: of the signal that has it."""
+    data, ready, plant = base.data, base.replays[index].ready, base.model.plant
+    sound, output = data.sound.copy(), data.each[index].output
+    for i in of_file(base, index):
+        if fault.touches(output, data.each[i].output):
+            first, last = fault.lost(data.each[i], value)
+            sound[data.edges[i] : data.edges[i] + first] = sound[data.edges[i + 1] - last : data.edges[i + 1]] = 0.0
+    records = [fault.undone(r, value, plant, output) if r.file == ready.record.file else r for r in data.records]
+    record = next(r for r in records if r.file == ready.record.file)
+    pieces = tuple(fault.undone_piece(p, value, plant) for p in ready.pieces)
+    data = replace(data, records=tuple(records), sound=sound)
+    return replace(base, replays=replaced(base, replace(ready, record=record, pieces=pieces), index), data=data)
 
 
 def with_measured(base: WhiteRecords, index: int, changes: Sequence[Array]) -> WhiteRecords:
-    """Return a problem in which the outputs of the file of one record were measured so much larger."""
-    replays, inside = list(base.replays), of_file(base, index)
-    for i, change in zip(inside, changes, strict=True):
-        replays[i] = with_samples(replays[i], replays[i].measured + change)
-    return replace(base, replays=with_shared_starts(replays, inside))
+    """Return a problem in which the signals of one record were measured so much larger."""
+    ready = base.replays[index].ready
+    for replay, change in zip(ready.each, changes, strict=True):
+        ready = replace(replay, ready=ready).measuring(replay.measured + change).ready
+    return replace(base, replays=replaced(base, ready, index))
 
 
-def with_shared_starts(replays: Sequence[Replay], inside: Sequence[int]) -> tuple[Replay, ...]:
-    """Return replays; outputs of one file share their manoeuvre and a start fitted to all of them.
-
-    A simulation is shared by its manoeuvres, and a start is corrected by what all outputs show.
-    """
-    found = list(replays)
-    for i in inside:
-        pieces = []
-        for several in zip(*(replays[k].pieces for k in inside), strict=True):
-            piece = several[inside.index(i)]
-            shown = np.concatenate([p.measured[p.samples] for p in several])
-            correction = None if piece.correction is None else replace(piece.correction, measured=shown)
-            pieces.append(replace(piece, manoeuvre=several[0].manoeuvre, correction=correction))
-        found[i] = replace(found[i], pieces=tuple(pieces))
-    return tuple(found)
+def replaced(base: WhiteRecords, ready: ReadyRecord, index: int) -> tuple[Replay, ...]:
+    """Return the replays with one record replaced, whose fitted starts go by what it shows."""
+    old, new = base.replays[index].ready, with_shown_starts(ready)
+    return with_each(base.replays, lambda one: new if one is old else one)
 
 
 def of_file(base: WhiteRecords, index: int) -> list[int]:
-    """Return the records that are outputs of the same file as one."""
-    return [i for i, r in enumerate(base.data.records) if r.file == base.data.records[index].file]
+    """Return which signals are of the same record as one."""
+    return [i for i, r in enumerate(base.replays) if r.ready is base.replays[index].ready]
 
 
 def residual_of(posed: WhiteRecords, index: int, z: Array) -> Array:
@@ -217,9 +186,10 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
     """
     found = []
     for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
-        replay, record = base.replays[i], base.data.records[i]
+        replay, record = base.replays[i], base.data.each[i]
         step = record.manoeuvre.interval
-        samples = np.concatenate([p.start_index + np.arange(p.measured.size)[p.samples] for p in replay.pieces])
+        samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
+                                  for p, own in zip(replay.pieces, replay.samples, strict=True)])  # fmt: skip
         found.append(-np.gradient(simulated, record.spacing) * (1.0 if fault.kind == "late" else step * samples))
     return found
 
@@ -229,7 +199,7 @@ def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: flo
     if fault.kind in OF_TIMES:
         moved = with_measured(base, index, delayed(base, index, z, fault))
         return residual_of(moved, index, z) - residual_of(base, index, z)
-    step = STEP * fault.largest(base.data.records[index])
+    step = STEP * fault.largest(base.data.each[index])
     sides = [residual_of(with_record(base, index, fault, value + s), index, z) for s in (step, -step)]
     return np.asarray(sides[1] - sides[0]) / (2.0 * step)
 

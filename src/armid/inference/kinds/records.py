@@ -31,13 +31,13 @@ class OfRecord:
     def moved(self, records: WhiteRecords, value: float) -> WhiteRecords:
         """Return the records without the fault; value: in the largest plausible size, of a label 1 for the other."""
         if self.fault.kind == "label":
-            given = records.data.records[self.index].constants[self.fault.constant]
+            given = records.data.each[self.index].constants[self.fault.constant]
             return with_record(records, self.index, self.fault, 1.0 - given) if value > 0.5 else records
         return with_record(records, self.index, self.fault, value * self.largest)
 
     def unknown(self, name: str, records: WhiteRecords) -> Unknown:
         """Return the size as an unknown; samples that were not measured at their new times must not speak for it."""
-        record = records.data.records[self.index]
+        record = records.data.each[self.index]
         return Unknown(name, self.moved, lambda value: self.fault.spent(record, value * self.largest),
                        self.column)  # fmt: skip
 
@@ -48,10 +48,10 @@ class OfRecord:
 
 def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
     """Return what may be wrong in one of several records; a single record has nothing to compare it with."""
-    if len({r.file for r in records.data.records}) < 2:
+    if len(records.data.records) < 2:
         return []
     found = []
-    for index, record in enumerate(records.data.records):
+    for index, record in enumerate(records.data.each):
         for fault in faults_of(records, index):
             largest = 1.0 if fault.kind == "label" else fault.largest(record)
             place = f"{record.file}:{record.output}" if fault.kind in ("offset", "drift", "gain") else record.file

@@ -74,12 +74,12 @@ def signals_without_form(fit: Fit, library: Library) -> Signals:
 def places_of(whole: list[Segment], fit: Fit) -> Array:
     """Return where the samples of the segments, outputs of a piece one behind the other, stand in the residual."""
     data = fit.records.data
-    start = {id(replay): int(edge) for replay, edge in zip(fit.records.replays, data.edges, strict=False)}
+    start = {replay: int(edge) for replay, edge in zip(fit.records.replays, data.edges, strict=False)}
     found = []
     for segment in whole:
         for replay in segment.replays:
-            first = start[id(replay)] + sum(p.n_samples for p in replay.pieces[: segment.index])
-            found.append(first + np.arange(replay.pieces[segment.index].n_samples))
+            first = start[replay] + sum(replay.lengths[: segment.index])
+            found.append(first + np.arange(replay.lengths[segment.index]))
     return np.concatenate(found)
 
 
