@@ -118,7 +118,7 @@ def made(model, manoeuvre, window, rng, file):
 def fitted(name, model, records, start=None):
     space = space_of(model)
     calibrations = (Calibration(Schedule(2), 1e-6, True),)
-    ready = tuple(Replay(ReadyRecord(r, model, r.pieces, calibrations)) for r in records)
+    ready = tuple(Replay(ReadyRecord(r, model, calibrations)) for r in records)
     x = estimate(ready, space) if start is None else refine(ready, space, start)
     problem = weighted_records(ready, space)
     return Rival(name, problem, problem.shares(x), float(problem.chi2(problem.shares(x))[0]))

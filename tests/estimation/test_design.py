@@ -236,7 +236,8 @@ def test_the_best_offer_holds_in_60_noises(bought, paper_arm, arm, arm_space):
     best = ranked("volume")[0]
     like = told[0]
     (piece,) = like.pieces
-    new = like.changed(pieces=(replace(piece, manoeuvre=best.feasible.manoeuvre),))
+    piece = replace(piece, manoeuvre=best.feasible.manoeuvre)
+    new = like.changed(record=replace(like.record, pieces=(piece,)))
     rng, found = np.random.default_rng(2), []
     clean = [r.signal(TRUTH[np.newaxis])[0] for r in (like, new)]
     for _ in range(60):

@@ -207,7 +207,7 @@ def axis_replay(rng, start_noise):
         piece = Piece(manoeuvre, slice(0, 1501), start_deviation={"start_speed": start_noise})
         signal = Signal("", "m/s", measured, np.empty(0), noise)
         record = Record("a.csv", "train", manoeuvre, (signal,), (piece,), (piece,))
-        return Replay(ReadyRecord(record, model, (piece,), (calibration,)))
+        return Replay(ReadyRecord(record, model, (calibration,)))
 
     clean = replay(true, np.zeros(1501)).signal(np.array([[MASS, SLOPE]]))[0]
     return replay(told, clean + AXIS_NOISE * rng.normal(size=1501)), space
@@ -231,7 +231,7 @@ def test_intervals_cover_the_truth_in_spite_of_a_noisy_start():
 
 def surely_started(replay):
     """The same record, said to start from a state that is known: no noise of the start is reckoned with."""
-    return replay.changed(pieces=tuple(replace(piece, start_deviation={}) for piece in replay.pieces))
+    return replay.changed(record=replay.record.with_pieces(lambda piece: replace(piece, start_deviation={})))
 
 
 @pytest.fixture(scope="module")

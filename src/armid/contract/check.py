@@ -79,9 +79,9 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
 
 def ready_at(candidate: Array, record: Record, model: Model) -> ReadyRecord:
     """Make a record ready to be simulated with one candidate; to calibrate the whole box takes far longer."""
-    pieces, accuracy = tuple(p.until_window_end() for p in record.pieces), accuracy_against(record.noises, model)
-    calibrations = (calibrate(model, p.manoeuvre, candidate, accuracy, spans=False) for p in pieces)
-    return ReadyRecord(record, model, pieces, tuple(calibrations))
+    record, accuracy = record.until_window_end(), accuracy_against(record.noises, model)
+    calibrations = (calibrate(model, p.manoeuvre, candidate, accuracy, spans=False) for p in record.pieces)
+    return ReadyRecord(record, model, tuple(calibrations))
 
 
 def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:

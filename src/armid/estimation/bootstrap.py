@@ -150,10 +150,10 @@ class Task:
         """Return noise without the part that fitted starts take up."""
         parts = np.split(noise, self.ends, axis=1)
         left = [part.copy() for part in parts]
-        first = [np.cumsum([0, *r.lengths]) for r in self.replays]
+        first = [np.cumsum([0, *r.record.lengths]) for r in self.replays]
         for ready, outputs in by_record(self.replays).items():
             places = {r.place: self.replays.index(r) for r in outputs}
-            for k, correction in enumerate(piece.correction for piece in ready.pieces):
+            for k, correction in enumerate(piece.correction for piece in ready.record.pieces):
                 if correction is None or not places.keys() >= set(correction.places):
                     continue
                 rows = {place: slice(first[i][k], first[i][k + 1]) for place, i in places.items()}

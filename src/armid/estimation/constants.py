@@ -58,8 +58,7 @@ def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> R
 
 def moved_replays(replays: Sequence[Replay], shares: Mapping[str, float]) -> tuple[Replay, ...]:
     """Return replays with constants moved."""
-    return with_each(replays, lambda ready: replace(
-        ready, pieces=tuple(moved_piece(p, ready.model.plant, shares) for p in ready.pieces)))  # fmt: skip
+    return with_each(replays, lambda r: replace(r, record=moved_record(r.record, r.model.plant, shares)))
 
 
 def moved_piece(piece: Piece, plant: Plant, shares: Mapping[str, float]) -> Piece:

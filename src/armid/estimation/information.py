@@ -173,10 +173,10 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
     """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,)."""
     candidate = records.whole(z[np.newaxis])
     for ready, outputs in by_record(records.replays).items():
-        rows = dict.fromkeys(outputs, 0)
+        edges = {r: np.cumsum([0, *r.record.lengths]) for r in outputs}
         # a speed held for a second is the size of a position
         move = 1e-4 * ready.model.plant.scales.speed
-        for index, (piece, calibration) in enumerate(zip(ready.pieces, ready.calibrations, strict=True)):
+        for index, (piece, calibration) in enumerate(zip(ready.record.pieces, ready.calibrations, strict=True)):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
                 start = piece.manoeuvre.constants.get(name, 0.0)
                 either = (piece.with_constants({name: start + side}).manoeuvre for side in (move, -move))
@@ -185,10 +185,10 @@ def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
                 changes = [np.zeros(r.record.n_samples) for r in records.replays]
                 slopes = (above - below) / (2.0 * move)
                 for change, r in zip(changes, records.replays, strict=True):
-                    if r in outputs:
-                        change[rows[r] : rows[r] + r.lengths[index]] = deviation * slopes[r.place, r.samples[index]]
+                    if r in edges:
+                        own = deviation * slopes[r.place, r.record.samples[index]]
+                        change[edges[r][index] : edges[r][index + 1]] = own
                 yield records.weighted(changes)
-            rows = {r: row + r.lengths[index] for r, row in rows.items()}
 
 
 def inverse(matrix: Array) -> Array:

@@ -114,7 +114,7 @@ class Trial:
 
     def problem(self, records: Sequence[Record]) -> WeightedRecords:
         rough = Calibration(Schedule(SUBSTEPS), np.nan, True)
-        whole = [ReadyRecord(r, self.model, r.pieces, (rough,) * len(r.pieces)) for r in records]
+        whole = [ReadyRecord(r, self.model, (rough,) * len(r.pieces)) for r in records]
         ready = tuple(one for each in whole for one in each.each)
         # of an angle or a position the zero says nothing
         moved = [r.measured - (np.mean(r.measured) if r.record.unit in ("rad", "m") else 0.0) for r in ready]

@@ -129,7 +129,8 @@ class Residuals:
         names = variable_names(self.model)
         parts: dict[str, list[Array]] = {n: [] for n in names}
         for replay in self.replays:
-            for piece, calibration, samples in zip(replay.pieces, replay.calibrations, replay.samples, strict=True):
+            triples = zip(replay.pieces, replay.calibrations, replay.record.samples, strict=True)
+            for piece, calibration, samples in triples:
                 found = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
                 for n in names:
                     parts[n].append(found[n][samples])
@@ -140,7 +141,7 @@ class Residuals:
         """Samples before and after each one-way switch of the plant, name -> (n_samples,); empty without a switch."""
         found: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
-            runs = (zip(r.pieces, r.samples, r.ready.runs(self.candidate[np.newaxis]), strict=True)
+            runs = (zip(r.pieces, r.record.samples, r.ready.runs(self.candidate[np.newaxis]), strict=True)
                     for r in self.replays)  # fmt: skip
             after = np.concatenate([piece.manoeuvre.times()[samples] >= run.switch_times[name][0]
                                     for piece, samples, run in chain.from_iterable(runs)])  # fmt: skip

@@ -284,7 +284,7 @@ def scheduled_replays(records: Sequence[Record], model: Model, known: Sequence[S
     ready: list[Replay] = []
     for record in records:
         calibrations = finest(*(s.by_file[record.file] for s in known))
-        ready += ReadyRecord(record, model, tuple(p.until_window_end() for p in record.pieces), calibrations).each
+        ready += ReadyRecord(record.until_window_end(), model, calibrations).each
     return tuple(ready)
 
 
@@ -414,12 +414,12 @@ def calibrated_replays(
             allowed = np.full(len(outputs), np.inf)
             for signal in record.signals:
                 allowed[outputs.index(signal.output) if signal.output else 0] = np.sqrt(hidden) * next(levels)
-        pieces = tuple(p.until_window_end() for p in record.pieces)
-        likenesses = [p.manoeuvre.interval if on_one else p.manoeuvre.likeness() for p in pieces]
-        for likeness, piece in zip(likenesses, pieces, strict=True):
+        record = record.until_window_end()  # noqa: PLW2901
+        likenesses = [p.manoeuvre.interval if on_one else p.manoeuvre.likeness() for p in record.pieces]
+        for likeness, piece in zip(likenesses, record.pieces, strict=True):
             if likeness not in known:
                 known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed)
-        ready += ReadyRecord(record, model, pieces, tuple(known[likeness] for likeness in likenesses)).each
+        ready += ReadyRecord(record, model, tuple(known[likeness] for likeness in likenesses)).each
     return tuple(ready)
 
 

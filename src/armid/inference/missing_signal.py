@@ -136,7 +136,7 @@ def segments(
     level_of = dict(zip(replays, levels, strict=True))
     whole = [segment_of(outputs, [level_of[r] for r in outputs], i, k, space, x)
              for i, (ready, outputs) in enumerate(by_record(replays).items())
-             for k in range(len(ready.pieces))]  # fmt: skip
+             for k in range(len(ready.record.pieces))]  # fmt: skip
     known = dict(zip(space.names, space.complete(x[np.newaxis])[0], strict=True))
     held = {e.name for e in model.effects}
     probes = [p for p in map(bump_at, ports) if p.name not in held]
@@ -161,7 +161,8 @@ def segment_of(
     replays: Sequence[Replay], levels: Sequence[float], group: int, index: int, space: Space, x: Array
 ) -> Segment:
     one, replay = slice(index, index + 1), replays[0]
-    alone = with_each(replays, lambda r: replace(r, pieces=r.pieces[one], calibrations=r.calibrations[one]))
+    alone = with_each(replays, lambda r: replace(
+        r, record=replace(r.record, pieces=r.record.pieces[one]), calibrations=r.calibrations[one]))  # fmt: skip
     records = WeightedRecords(alone, space, (1.0,) * len(alone))
     residual, jacobian = records.residual_and_slopes(records.shares(x))
     level = np.repeat(levels, [len(r.measured) for r in alone])
@@ -219,7 +220,7 @@ class Probe:
         run = self.run(segment, size, segment.knots, float(segment.knots[1] - segment.knots[0]))
         pairs, correction = zip(segment.replays, segment.levels, strict=True), segment.piece.correction
         outputs = run.outputs if correction is None else correction.corrected(run.outputs)
-        seen = ((outputs[r.place][:, r.samples[segment.index]], level) for r, level in pairs)
+        seen = ((outputs[r.place][:, r.record.samples[segment.index]], level) for r, level in pairs)
         return np.concatenate([(output[1:] - output[0]).T / size / level for output, level in seen])
 
 

@@ -201,10 +201,10 @@ def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array,
 
     def begun(ready: ReadyRecord) -> ReadyRecord:
         pieces = []
-        for mine, theirs in zip(ready.pieces, pieces_of[ready.record.file], strict=True):
+        for mine, theirs in zip(ready.record.pieces, pieces_of[ready.record.file], strict=True):
             own = {n: theirs.manoeuvre.constants[n] for n in names if n in theirs.manoeuvre.constants}
             pieces.append(replace(mine.with_constants(own), correction=theirs.correction))
-        return with_shown_starts(replace(ready, pieces=tuple(pieces)))
+        return with_shown_starts(replace(ready, record=replace(ready.record, pieces=tuple(pieces))))
 
     return replace(base, replays=with_each(base.replays, begun))
 

@@ -31,8 +31,8 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
     for key in library.candidates:
         if key.name.startswith(ROUGHLY) and key not in fit.active:
             records = library.problem((*fit.active, key), fit.values)
-            there = replace(records, replays=with_each(
-                records.replays, lambda ready: replace(ready, pieces=pieces[ready.record.file])))  # fmt: skip
+            there = replace(records, replays=with_each(records.replays, lambda r: replace(
+                r, record=replace(r.record, pieces=pieces[r.record.file]))))  # fmt: skip
             own[key.name.removeprefix(ROUGHLY)] = slope(fit, there, f"{key.compiled}.error", 1.0)
     if not own:
         return ()

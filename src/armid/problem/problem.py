@@ -15,28 +15,26 @@ from armid.problem.fitness import Fitness, joined, record_weights
 from armid.problem.meter import Meter, Metered
 from armid.problem.space import Space
 from armid.record import Piece, Record
-from armid.record.record import Samples
 
 
 @dataclass(frozen=True, eq=False)
 class ReadyRecord:
-    """Simulate the pieces of one record, each on its own calibrated schedule."""
+    """Simulate the pieces of one record, each until the end of its window, on its own calibrated schedule."""
 
     record: Record
     model: Model
-    pieces: tuple[Piece, ...]
     calibrations: tuple[Calibration, ...]
     threads: int = 1
 
     def runs(self, candidates: Array) -> list[Simulation]:
         """Return the simulation of each piece with whole candidates, its start corrected where it is fitted."""
         runs = [prepared.run(candidates, self.threads) for prepared in self.prepared]
-        pairs = [(run, piece.correction) for run, piece in zip(runs, self.pieces, strict=True)]
+        pairs = [(run, piece.correction) for run, piece in zip(runs, self.record.pieces, strict=True)]
         return [run if c is None else replace(run, outputs=c.corrected(run.outputs)) for run, c in pairs]
 
     @cached_property
     def prepared(self) -> tuple[Prepared, ...]:
-        pairs = zip(self.pieces, self.calibrations, strict=True)
+        pairs = zip(self.record.pieces, self.calibrations, strict=True)
         return tuple(prepare(self.model, piece.manoeuvre, c.schedule) for piece, c in pairs)
 
     @property
@@ -63,7 +61,7 @@ class Replay:
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
-        return self.ready.pieces
+        return self.ready.record.pieces
 
     @property
     def calibrations(self) -> tuple[Calibration, ...]:
@@ -76,23 +74,13 @@ class Replay:
     def measuring(self, values: Array) -> "Replay":
         """Return a replay of which other values were measured, (n_samples,)."""
         measured, first = self.record.measured.copy(), 0
-        for piece, samples, n in zip(self.pieces, self.samples, self.lengths, strict=True):
+        for piece, samples, n in zip(self.pieces, self.record.samples, self.record.lengths, strict=True):
             piece.of(measured)[samples] = values[first : first + n]
             first += n
         return self.changed(record=self.ready.record.with_measured({self.record.output: measured}))
 
-    @cached_property
-    def samples(self) -> list[Samples]:
-        """Which samples of each piece are compared."""
-        return [self.record.signals[0].samples(piece) for piece in self.pieces]
-
-    @property
-    def lengths(self) -> tuple[int, ...]:
-        """How many samples of each piece these are."""
-        return tuple(self.record.signals[0].n_seen(piece) for piece in self.pieces)
-
     def seen(self, runs: Sequence[Simulation]) -> Array:
-        triples = zip(self.pieces, self.samples, (run.outputs[self.place] for run in runs), strict=True)
+        triples = zip(self.pieces, self.record.samples, (run.outputs[self.place] for run in runs), strict=True)
         parts = [signal if isinstance(samples, slice) and not piece.window.start else signal[:, samples]
                  for piece, samples, signal in triples]  # fmt: skip
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
@@ -113,11 +101,11 @@ class Replay:
 
     @property
     def measured(self) -> Array:
-        return np.concatenate([self.record.signals[0].seen(p) for p in self.pieces])
+        return self.record.seen
 
     @property
     def times(self) -> Array:
-        pairs = zip(self.pieces, self.samples, strict=True)
+        pairs = zip(self.pieces, self.record.samples, strict=True)
         return np.concatenate([p.manoeuvre.times()[samples] for p, samples in pairs])
 
     def engine_error_at(self, candidate: Array) -> float:
@@ -152,15 +140,13 @@ def ready_record(
     """
     spread = space.complete(probes(space.low[space.free], space.high[space.free]))
     wanted = accuracy or accuracy_against(record.noises, model)
-    pieces = tuple(p.until_window_end() for p in record.pieces)
-    known = {} if known is None else known
-    calibrations = []
-    for piece in pieces:
+    record, known, calibrations = record.until_window_end(), {} if known is None else known, []
+    for piece in record.pieces:
         key = (wanted, *piece.manoeuvre.likeness())
         if key not in known:
             known[key] = calibrate(model, piece.manoeuvre, spread, wanted, spans)
         calibrations.append(known[key])
-    return ReadyRecord(record, model, pieces, tuple(calibrations), threads)
+    return ReadyRecord(record, model, tuple(calibrations), threads)
 
 
 def replays(

@@ -42,8 +42,8 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
     """
 
     def started(ready: ReadyRecord) -> ReadyRecord:
-        pieces = tuple(Start(ready, k).fitted(candidate) for k in range(len(ready.pieces)))
-        return replace(ready, record=replace(ready.record, pieces=pieces), pieces=pieces)
+        pieces = tuple(Start(ready, k).fitted(candidate) for k in range(len(ready.record.pieces)))
+        return replace(ready, record=replace(ready.record, pieces=pieces))
 
     return with_each(replays, started)
 
@@ -56,7 +56,7 @@ def with_shown_starts(ready: ReadyRecord) -> ReadyRecord:
             return piece
         return replace(piece, correction=replace(piece.correction, measured=ready.record.seen_by_all(piece)))
 
-    return replace(ready, pieces=tuple(map(shown, ready.pieces)))
+    return replace(ready, record=ready.record.with_pieces(shown))
 
 
 def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
@@ -64,7 +64,7 @@ def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
     spread = space.complete(probes(space.low[space.free], space.high[space.free], N_PROBES))
     chi2 = np.zeros(len(spread))
     for ready in by_record(replays):
-        for k in range(len(ready.pieces)):
+        for k in range(len(ready.record.pieces)):
             start = Start(ready, k)
             signals, answers = start.linear(start.constants, spread)
             residual, slopes = start.residual(signals), start.seen_slopes(answers)
@@ -86,7 +86,7 @@ class Start:
 
     @property
     def piece(self) -> Piece:
-        return self.ready.pieces[self.index]
+        return self.ready.record.pieces[self.index]
 
     @property
     def names(self) -> list[str]:

@@ -195,6 +195,10 @@ class Record:
         pieces, whole = (tuple(map(change, some)) for some in (self.pieces, self.whole_pieces))
         return replace(self, pieces=pieces, whole_pieces=whole)
 
+    def until_window_end(self) -> "Record":
+        """Return the record with its pieces cut: what an identification has to simulate."""
+        return self.with_pieces(Piece.until_window_end)
+
     @cached_property
     def each(self) -> tuple["Record", ...]:
         """The record once for each of its signals, with that one alone."""
@@ -233,6 +237,11 @@ class Record:
     def seen_by_all(self, piece: Piece) -> Array:
         """Return what they see of a piece, the signals one behind the other, (n_seen,)."""
         return np.concatenate([signal.seen(piece) for signal in self.signals])
+
+    @cached_property
+    def samples(self) -> list[Samples]:
+        """Which samples of each piece they see."""
+        return [self.signals[0].samples(piece) for piece in self.pieces]
 
     @property
     def lengths(self) -> tuple[int, ...]:

@@ -104,4 +104,4 @@ class RunCache:
 def _measured_again(replay: Replay, record: Record) -> Replay:
     """Return a replay of the same manoeuvre with another measurement, on the schedule that it has."""
     assert [p.window for p in replay.pieces] == [p.window for p in record.pieces]
-    return replay.changed(record=record)
+    return replay.changed(record=record.until_window_end())

@@ -139,11 +139,9 @@ def with_record(base: WhiteRecords, index: int, fault: Fault, value: float) -> W
         if fault.touches(output, data.each[i].output):
             first, last = fault.lost(data.each[i], value)
             sound[data.edges[i] : data.edges[i] + first] = sound[data.edges[i + 1] - last : data.edges[i + 1]] = 0.0
-    records = [fault.undone(r, value, plant, output) if r.file == ready.record.file else r for r in data.records]
-    record = next(r for r in records if r.file == ready.record.file)
-    pieces = tuple(fault.undone_piece(p, value, plant) for p in ready.pieces)
-    data = replace(data, records=tuple(records), sound=sound)
-    return replace(base, replays=replaced(base, replace(ready, record=record, pieces=pieces), index), data=data)
+    undone = [fault.undone(r, value, plant, output) if r.file == ready.record.file else r for r in data.records]
+    new = replace(ready, record=fault.undone(ready.record, value, plant, output))
+    return replace(base, replays=replaced(base, new, index), data=replace(data, records=tuple(undone), sound=sound))
 
 
 def with_measured(base: WhiteRecords, index: int, changes: Sequence[Array]) -> WhiteRecords:
@@ -189,7 +187,7 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
         replay, record = base.replays[i], base.data.each[i]
         step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
-                                  for p, own in zip(replay.pieces, replay.samples, strict=True)])  # fmt: skip
+                                  for p, own in zip(replay.pieces, replay.record.samples, strict=True)])  # fmt: skip
         found.append(-np.gradient(simulated, record.spacing) * (1.0 if fault.kind == "late" else step * samples))
     return found
 

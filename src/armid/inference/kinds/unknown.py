@@ -78,8 +78,8 @@ def places_of(whole: list[Segment], fit: Fit) -> Array:
     found = []
     for segment in whole:
         for replay in segment.replays:
-            first = start[replay] + sum(replay.lengths[: segment.index])
-            found.append(first + np.arange(replay.lengths[segment.index]))
+            first = start[replay] + sum(replay.record.lengths[: segment.index])
+            found.append(first + np.arange(replay.record.lengths[segment.index]))
     return np.concatenate(found)
 
 
