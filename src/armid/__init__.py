@@ -28,7 +28,7 @@ WHERE = {
     "armid.estimation.information": ("Information", "information_at", "sensitivities"),
     "armid.estimation.least_squares": ("estimate", "refine"),
     "armid.estimation.profile": ("Profile",),
-    "armid.estimation.simulated": ("SimulatedCampaign",),
+    "armid.problem.simulated": ("SimulatedCampaign",),
     "armid.loop": ("ClosedLoop", "report_of"),
     "armid.registry": ("Registry", "load_registry"),
     "armid.study.results": ("StudyResults", "load_study"),

@@ -467,7 +467,7 @@ def simulate(
     """
     from armid.engine import Schedule
     from armid.engine import simulate as run
-    from armid.estimation.simulated import SimulatedCampaign, candidate_of, simulated_table
+    from armid.problem.simulated import SimulatedCampaign, candidate_of, simulated_table
 
     of_model = (manoeuvre, population, schedule)
     if isinstance(model, Model):

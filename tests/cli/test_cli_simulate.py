@@ -124,7 +124,7 @@ def test_nothing_half_written_stays(run, paper_arm_folder, tmp_path, monkeypatch
     if folder_is_there:
         out.mkdir()
         (out / "lower.csv").write_text("of yesterday\n")
-    monkeypatch.setattr("armid.estimation.simulated.write_table", failing)
+    monkeypatch.setattr("armid.problem.simulated.write_table", failing)
     ran = run("simulate", paper_arm_folder, "--out", out)
     assert ran.code == 2
     assert "raise.csv cannot be used: No space left on device" in ran.err

@@ -7,10 +7,11 @@ import pytest
 
 from armid.estimation import bootstrap as bootstraps
 from armid.estimation import identify as identifications
-from armid.estimation.bootstrap import Scatter, Task, bootstrap, coloured, refined
+from armid.estimation.bootstrap import Scatter, Task, bootstrap, refined
 from armid.estimation.identify import identify
 from armid.estimation.identify_document import answer, details_of, parameter_table, remarks, result_of
-from armid.estimation.information import Level, information_at
+from armid.estimation.information import information_at
+from armid.estimation.noise_model import Level, coloured
 from armid.identifiers import IDENTIFIERS
 from armid.problem.fitness import FITNESS, Fitness
 from armid.record import Noise

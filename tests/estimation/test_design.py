@@ -20,8 +20,9 @@ from armid.estimation.design import (
     offers,
     words,
 )
-from armid.estimation.information import Level, information_at
+from armid.estimation.information import information_at
 from armid.estimation.least_squares import refine
+from armid.estimation.noise_model import Level
 from armid.model import ManoeuvreKey, Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of

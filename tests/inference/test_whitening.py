@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
+from armid.estimation.noise_model import coloured_level, white_level, yule_walker
 from armid.inference.checks import motion_phases, time_in_words
-from armid.inference.whitening import coloured_level, white_level, yule_walker
 from armid.record.noise import memory_of
 
 TERMS = np.array([1.5, -0.7])

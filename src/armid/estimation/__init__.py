@@ -3,6 +3,7 @@
 identify        search the free parameters, judge the best candidate on train and holdout
 least_squares   the least-squares problem, its Jacobian, Levenberg-Marquardt, starts
 information     sensitivities, Fisher information, intervals
+noise_model     the noise of a record as fits take it: white, coloured, or told by the residual
 bootstrap       intervals of a fitness that is not a sum of squares
 constants       constants within tolerances: what they do to the records, what they leave undetermined
 profile         profile likelihood
@@ -10,7 +11,6 @@ design          what one more record would buy
 advice          which record would tell rival models apart
 screen          signs, units, clocks and manoeuvres that look wrong, before anything is identified
 mends           the mistakes that it looks for, and what undoes each
-simulated       one candidate simulated through every record of a campaign
 examine         all of these for one campaign; groups of parameters that move together
 
 What is shown of the results: figures, identify_document, identifiability_document.

@@ -13,11 +13,11 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 from scipy.stats import skew
 
-from armid.estimation.information import NORMAL_95, Information, Level, start_changes
+from armid.estimation.information import NORMAL_95, Information, start_changes
 from armid.estimation.least_squares import WeightedRecords
+from armid.estimation.noise_model import coloured
 from armid.model import Array
 from armid.problem.fitness import Fitness
 from armid.problem.problem import (
@@ -182,16 +182,6 @@ class Task:
                 found[begin + i] = fitness_of(self.fitness, self.replays, np.split(row, self.ends),
                                               [s[i] for s in signals], self.weights, self.sizes)  # fmt: skip
         return found
-
-
-def coloured(rng: np.random.Generator, shape: tuple[int, int], level: Level) -> Array:
-    """Return normal noise of a level, correlated from sample to sample as its effective fraction says."""
-    white = rng.standard_normal(shape)
-    memory = (1.0 - level.effective_fraction) / (1.0 + level.effective_fraction)
-    if memory > 0.0:
-        white[:, 1:] *= np.sqrt(1.0 - memory**2)
-        white = np.asarray(lfilter([1.0], [1.0, -memory], white, axis=1))
-    return level.rms * white
 
 
 def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Callable[[Refined], bool]) -> Scatter:

@@ -9,8 +9,9 @@ import numpy as np
 
 from armid.engine import Schedule, simulate
 from armid.engine.simulate import Simulation
-from armid.estimation.information import Level, inverse
+from armid.estimation.information import inverse
 from armid.estimation.least_squares import slopes_of, stencil
+from armid.estimation.noise_model import Level
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Model, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space

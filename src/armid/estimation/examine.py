@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import columns_of, common_factors, products
 from armid.estimation.design import SHRINKAGE, VOLUME, WORST, Motions, Offer, expected_levels, manoeuvre_grid, offers
-from armid.estimation.information import (
-    SINGULAR,
-    Information,
-    information_at,
-    information_of,
-    level_weights,
-    levels_of,
-    normalised,
-)
+from armid.estimation.information import SINGULAR, Information, information_at, information_of, normalised
 from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine, with_fitted_starts
+from armid.estimation.noise_model import level_weights, levels_of
 from armid.estimation.profile import Profile, profiles
 from armid.model import Array, Model
 from armid.problem.problem import Replay, replays

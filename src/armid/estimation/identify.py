@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError, quoted
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
-from armid.estimation.information import MISFIT, Information, collinear, information_at, level_of
+from armid.estimation.information import Information, collinear, information_at
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.mends import Suspicion
+from armid.estimation.noise_model import MISFIT, level_of
 from armid.identifiers import Identifier, run
 from armid.model import Array, Model
 from armid.problem.fitness import Fitness, chi_square, mean_square

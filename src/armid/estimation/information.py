@@ -2,47 +2,22 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc
 
 from armid.engine import simulate
-from armid.errors import ArmidError
 from armid.estimation.least_squares import LEAST, LeastSquaresProblem, WeightedRecords, step_in_box
+from armid.estimation.noise_model import Level, level_of, level_weights
 from armid.model import Array
 from armid.problem.problem import Replay, by_record
 from armid.problem.space import Space
-from armid.record.noise import correlation_sum, new_share
-from armid.record.record import NOISE_FREE, Noise
 
 NORMAL_95 = 1.959963984540054
 # Directions whose information is below this share of the strongest cannot be told from nothing.
 SINGULAR = 1e-13
-# A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
-# engine it is the engine's.
-MISFIT, ENGINE_ERRORS = 2.0, 3.0
-# Chance below which a residual is no noise; independent samples in the blocks whose means are looked at.
-CHANCE, BLOCKS = 1e-3, (8, 32)
 # Parameters of a larger correlation than this cannot be told apart well.
 CORRELATED = 0.95
-# What is assumed for a record without noise, as a share of its rms speed.
-ASSUMED = 1e-3
-
-
-@dataclass(frozen=True)
-class Level:
-    """How far a record scatters about the model.
-
-    rms: [unit of the record]; effective_fraction: independent samples per sample; from_residual: the residual was far
-    above the noise, so that it, with its correlation in time, is what scatters; assumed: nothing was measured.
-    """
-
-    rms: float
-    effective_fraction: float
-    from_residual: bool = False
-    assumed: bool = False
 
 
 @dataclass(frozen=True)
@@ -221,66 +196,3 @@ def collinear(information: Information) -> list[tuple[str, str, float]]:
     names, correlation = information.names, information.correlation
     pairs = [(names[i], names[j], float(correlation[i, j])) for i in range(len(names)) for j in range(i)]
     return sorted((pair for pair in pairs if abs(pair[2]) > CORRELATED), key=lambda pair: -abs(pair[2]))
-
-
-def level_of(replay: Replay, space: Space, x: Array) -> Level:
-    noise = replay.record.noise
-    candidate = space.complete(x[np.newaxis])
-    residual = replay.measured - replay.signal(candidate)[0]
-    rms = float(np.sqrt(np.mean(residual**2)))
-    known = Level(noise.rms, noise.effective_fraction)
-    if not np.isfinite(rms) or rms <= ENGINE_ERRORS * replay.engine_error_at(candidate[0]):
-        return known
-    if not is_noise(residual, noise):
-        return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
-    # differences tell the least that the noise can be, and nothing of its colour
-    return known if noise.source == "rest" else Level(max(rms, noise.rms), new_share(residual))
-
-
-def is_noise(residual: Array, noise: Noise) -> bool:
-    """Tell whether a residual, (n_samples,), may be the noise of its record and nothing more.
-
-    By F tests, in independent samples: its mean square against that of the rest; the means of its blocks, where a
-    smooth misfit far below the noise of a sample stands out, against its own mean square. Noise from differences is a
-    lower bound that knows no correlation: there only a mean square of more than twice that is a misfit.
-    """
-    if noise.rms == 0.0:
-        return not residual.any()
-    square, share = float(np.mean(residual**2)), noise.effective_fraction
-    ratio, known = square / noise.rms**2, noise.n_samples * share
-    if noise.source != "rest":
-        # how well the noise itself is known: its mean square scatters by 2/n_eff
-        return bool(ratio <= MISFIT * (1.0 + 3.0 * np.sqrt(2.0 / known)))
-    tests = [(ratio, residual.size * share, known)]
-    for length in (ceil(n / share) for n in BLOCKS):
-        blocks = residual[: residual.size // length * length].reshape(-1, length).mean(axis=1)
-        if blocks.size:
-            spread = float(np.mean(blocks**2)) * length * share / square
-            # of white noise nothing else has to be known
-            tests.append((spread, blocks.size, residual.size if share == 1.0 else known))
-    # scipy.stats would take longer to load than an identification
-    return all(float(fdtrc(above, below, value)) > CHANCE for value, above, below in tests)
-
-
-def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | None = None) -> tuple[Level, ...]:
-    """Return the level of each record at a candidate: its noise, or its residual where that is far above the noise.
-
-    Without noise there is nothing to weigh a change against: then white noise of 0.1 % of the record's rms speed is
-    assumed, and the level says so. noise: rms to assume for every record in place of all that.
-    """
-    if noise is not None:
-        if len({r.place for r in replays}) > 1:
-            raise ArmidError(f"a noise of {noise:g} was given, but records hold several outputs: none is expected")
-        return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
-    found = []
-    for replay in replays:
-        level = level_of(replay, space, x)
-        if replay.record.is_noise_free and level.rms <= NOISE_FREE * float(np.max(np.abs(replay.measured))):
-            level = Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
-        found.append(level)
-    return tuple(found)
-
-
-def level_weights(levels: Sequence[Level]) -> tuple[float, ...]:
-    """Return sqrt(effective fraction)/rms of each level, so that weighted squares sum to chi2 of effective samples."""
-    return tuple(float(np.sqrt(level.effective_fraction)) / level.rms for level in levels)

@@ -1,8 +1,7 @@
 """The train records as whitened residuals: what every fit and every test of the loop looks at.
 
-Coloured noise (a 40 Hz gyro sampled at 1 kHz) holds far fewer independent samples than samples. An autoregression of
-the sensor's signal at rest, pooled over the records and applied to residuals and sensitivities alike, turns it white
-with a standard deviation of 1: every test then counts samples.
+`NoiseModel` of estimation/noise_model.py turns noise white, of residuals and sensitivities alike, with a standard
+deviation of 1: every test then counts samples.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,132 +11,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular, toeplitz
-from scipy.signal import lfilter
 
-from armid.estimation.information import MISFIT
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
+from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels
 from armid.model import Array, Plant
 from armid.problem.problem import signals_of
 from armid.record import Record
 from armid.record.noise import correlation_sum, new_share
-
-# The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
-LEAST_NOISE = 5e-5
-MOST_TERMS, FEWEST_FOR_COLOUR, LAGS = 8, 50, 500
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseLevel:
-    """Hold the noise of the records of one sensor.
-
-    rms: [unit of the records]. terms: autoregression e_t = w_t - sum a_k w_(t-k), (n_terms,), empty for white noise.
-    innovation: rms of e_t. head: turns the first n_terms samples white, (n_terms, n_terms).
-    n_samples: samples at rest from which it is known, 0 where none were recorded: then `rms` comes from differences of
-    the motion, and is a lower bound rather than a measurement. n_slow, n_power: of these, how many count as independent
-    for slow signals, n/(1 + 2 sum rho), and for a mean square, n/(1 + 2 sum rho^2).
-    """
-
-    rms: float
-    terms: Array
-    innovation: float
-    head: Array
-    n_samples: int
-    n_slow: float
-    n_power: float
-
-    @property
-    def is_white(self) -> bool:
-        return not len(self.terms)
-
-    @property
-    def known(self) -> bool:
-        return self.n_samples > 0
-
-    def white(self, values: Array, lengths: Sequence[int]) -> Array:
-        """Return signals so filtered that the noise in them is white with a standard deviation of 1.
-
-        The first samples of each piece go through the inverse Cholesky factor of their covariance.
-        values: [unit of the records], shape (..., n_samples), pieces end to end; lengths: of the pieces.
-        """
-        if self.is_white:
-            return np.asarray(values / self.innovation)
-        n, pieces = len(self.terms), []
-        for start, end in pairwise(np.cumsum([0, *lengths])):
-            piece = values[..., start:end]
-            filtered = lfilter(np.concatenate([[1.0], -self.terms]), [1.0], piece, axis=-1) / self.innovation
-            filtered[..., :n] = piece[..., :n] @ self.head.T
-            pieces.append(filtered)
-        return np.concatenate(pieces, axis=-1)
-
-
-def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> tuple[NoiseLevel, ...]:
-    """Return the noise of each record: pooled over the rests of all records of one output and sampling interval.
-
-    plant: the sizes of its outputs give the floor below which the engine's error would count as a discrepancy. others:
-    records of the same sensors whose rests count too.
-    """
-    sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
-    sensors = [(r.output, r.manoeuvre.interval) for r in records]
-    pooled = {
-        (output, t): pooled_level([r for r in (*records, *others) if (r.output, r.manoeuvre.interval) == (output, t)],
-                                  LEAST_NOISE * sizes[output]) for output, t in set(sensors)
-    }  # fmt: skip
-    return tuple(pooled[sensor] for sensor in sensors)
-
-
-def pooled_level(records: Sequence[Record], floor: float) -> NoiseLevel:
-    rested = [r for r in records if r.noise.source == "rest"]
-    if not rested:
-        return white_level(max(float(np.median([r.noise.rms for r in records])), floor), 0)
-    rests = [r.rest - np.mean(r.rest) for r in rested]
-    n = sum(len(r) - 1 for r in rests)
-    # Quantisation alone has noise that a rest on one step does not show: the record's own figure knows of it.
-    rms = max(np.sqrt(sum(float(r @ r) for r in rests) / n), min(r.noise.rms for r in rested), floor)
-    return coloured_level(rests, rms, n) if n >= FEWEST_FOR_COLOUR else white_level(rms, n)
-
-
-def white_level(rms: float, n_samples: int) -> NoiseLevel:
-    return NoiseLevel(float(rms), np.empty(0), float(rms), np.empty((0, 0)), n_samples, n_samples, n_samples)
-
-
-def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseLevel:
-    """Return the autoregression of pooled rests with the order that the Bayesian criterion asks for.
-
-    Yule-Walker on the pooled, biased autocovariance: stable for any data (Brockwell and Davis, section 8.1).
-    """
-    total = sum(len(r) for r in rests)
-    covariance = np.array([sum(float(r[lag:] @ r[: len(r) - lag]) for r in rests) / total
-                           for lag in range(MOST_TERMS + 1)])  # fmt: skip
-    if covariance[0] <= 0.0:
-        return white_level(rms, n)
-    fits = [yule_walker(covariance, order) for order in range(MOST_TERMS + 1)]
-    scores = [n * np.log(variance) + order * np.log(n) for order, (_, variance) in enumerate(fits)]
-    order = int(np.argmin(scores))
-    if order == 0:
-        return white_level(rms, n)
-    terms, variance = fits[order]
-    correlation = list(covariance[: order + 1] / covariance[0])
-    while len(correlation) <= LAGS:
-        correlation.append(float(terms @ np.array(correlation[: -order - 1 : -1])))
-    rho = np.array(correlation[1:])
-    slow, power = n / max(1.0 + 2.0 * rho.sum(), 1.0), n / (1.0 + 2.0 * float(rho @ rho))
-    # Each mean that was taken out took more than one sample's worth of slow noise with it.
-    rms *= float(np.sqrt(1.0 / max(1.0 - len(rests) / slow, 0.5)))
-    # Scaled so that the rest has the rms that is reported; degrees of freedom went into the terms.
-    scale = rms**2 / covariance[0]
-    innovation = float(np.sqrt(variance * scale * n / (n - order)))
-    factor = cholesky(toeplitz(covariance[:order] * scale), lower=True)
-    head = solve_triangular(factor, np.eye(order), lower=True)
-    return NoiseLevel(float(rms), terms, innovation, head, n, slow, power)
-
-
-def yule_walker(covariance: Array, order: int) -> tuple[Array, float]:
-    """Return the terms of an autoregression and the variance of its innovations."""
-    if order == 0:
-        return np.empty(0), float(covariance[0])
-    terms = np.linalg.solve(toeplitz(covariance[:order]), covariance[1 : order + 1])
-    return np.asarray(terms, dtype=np.float64), float(covariance[0] - terms @ covariance[1 : order + 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +51,7 @@ class WhitenedData:
     """
 
     records: tuple[Record, ...]
-    levels: tuple[NoiseLevel, ...]
+    levels: tuple[NoiseModel, ...]
     sound: Array
     estimates: Estimates | None = None
     cover: Cover | None = None
@@ -227,7 +107,7 @@ class WhitenedData:
     def trust(self, residual: Array) -> Array:
         """Return the weight of each sample in intervals: 1, or n_eff/chi2 in records whose residual tells of more.
 
-        Where the residual is more than noise its own size and correlation in time count (as in `information.level_of`).
+        Where the residual is more than noise its own size and correlation in time count (as in `noise_model.level_of`).
         """
         found = []
         for level, part in zip(self.levels, self.by_record(residual), strict=True):

@@ -1,0 +1,239 @@
+"""The noise of a record as fits take it: `NoiseModel` in the loop, `Level` outside it.
+
+Coloured noise (a 40 Hz gyro sampled at 1 kHz) holds far fewer independent samples than samples. A `NoiseModel` is an
+autoregression of the sensor's signal at rest, pooled over the records. A `Level` counts independent samples.
+What a single column tells of its noise when it is read stands in record/noise.py.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular, toeplitz
+from scipy.special import fdtrc
+
+from armid.errors import ArmidError
+from armid.model import Array, Plant
+from armid.problem.problem import Replay
+from armid.problem.space import Space
+from armid.record import Noise, Record
+from armid.record.noise import correlation_sum, new_share
+from armid.record.record import NOISE_FREE
+
+# The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
+LEAST_NOISE = 5e-5
+MOST_TERMS, FEWEST_FOR_COLOUR, LAGS = 8, 50, 500
+# A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
+# engine it is the engine's.
+MISFIT, ENGINE_ERRORS = 2.0, 3.0
+# Chance below which a residual is no noise; independent samples in the blocks whose means are looked at.
+CHANCE, BLOCKS = 1e-3, (8, 32)
+# What is assumed for a record without noise, as a share of its rms speed.
+ASSUMED = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseModel:
+    """Hold the noise of the records of one sensor.
+
+    rms: [unit of the records]. terms: autoregression e_t = w_t - sum a_k w_(t-k), (n_terms,), empty for white noise.
+    innovation: rms of e_t. head: turns the first n_terms samples white, (n_terms, n_terms).
+    n_samples: samples at rest from which it is known, 0 where none were recorded: then `rms` comes from differences of
+    the motion, and is a lower bound rather than a measurement. n_slow, n_power: of these, how many count as independent
+    for slow signals, n/(1 + 2 sum rho), and for a mean square, n/(1 + 2 sum rho^2).
+    """
+
+    rms: float
+    terms: Array
+    innovation: float
+    head: Array
+    n_samples: int
+    n_slow: float
+    n_power: float
+
+    @property
+    def is_white(self) -> bool:
+        return not len(self.terms)
+
+    @property
+    def known(self) -> bool:
+        return self.n_samples > 0
+
+    def white(self, values: Array, lengths: Sequence[int]) -> Array:
+        """Return signals so filtered that the noise in them is white with a standard deviation of 1.
+
+        The first samples of each piece go through the inverse Cholesky factor of their covariance.
+        values: [unit of the records], shape (..., n_samples), pieces end to end; lengths: of the pieces.
+        """
+        if self.is_white:
+            return np.asarray(values / self.innovation)
+        # a command that fits nothing never comes here, and scipy.signal is slow to load
+        from scipy.signal import lfilter
+
+        n, pieces = len(self.terms), []
+        for start, end in pairwise(np.cumsum([0, *lengths])):
+            piece = values[..., start:end]
+            filtered = lfilter(np.concatenate([[1.0], -self.terms]), [1.0], piece, axis=-1) / self.innovation
+            filtered[..., :n] = piece[..., :n] @ self.head.T
+            pieces.append(filtered)
+        return np.concatenate(pieces, axis=-1)
+
+
+def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> tuple[NoiseModel, ...]:
+    """Return the noise of each record: pooled over the rests of all records of one output and sampling interval.
+
+    plant: the sizes of its outputs give the floor below which the engine's error would count as a discrepancy. others:
+    records of the same sensors whose rests count too.
+    """
+    sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
+    sensors = [(r.output, r.manoeuvre.interval) for r in records]
+    pooled = {
+        (output, t): pooled_level([r for r in (*records, *others) if (r.output, r.manoeuvre.interval) == (output, t)],
+                                  LEAST_NOISE * sizes[output]) for output, t in set(sensors)
+    }  # fmt: skip
+    return tuple(pooled[sensor] for sensor in sensors)
+
+
+def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:
+    rested = [r for r in records if r.noise.source == "rest"]
+    if not rested:
+        return white_level(max(float(np.median([r.noise.rms for r in records])), floor), 0)
+    rests = [r.rest - np.mean(r.rest) for r in rested]
+    n = sum(len(r) - 1 for r in rests)
+    # Quantisation alone has noise that a rest on one step does not show: the record's own figure knows of it.
+    rms = max(np.sqrt(sum(float(r @ r) for r in rests) / n), min(r.noise.rms for r in rested), floor)
+    return coloured_level(rests, rms, n) if n >= FEWEST_FOR_COLOUR else white_level(rms, n)
+
+
+def white_level(rms: float, n_samples: int) -> NoiseModel:
+    return NoiseModel(float(rms), np.empty(0), float(rms), np.empty((0, 0)), n_samples, n_samples, n_samples)
+
+
+def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseModel:
+    """Return the autoregression of pooled rests with the order that the Bayesian criterion asks for.
+
+    Yule-Walker on the pooled, biased autocovariance: stable for any data (Brockwell and Davis, section 8.1).
+    """
+    total = sum(len(r) for r in rests)
+    covariance = np.array([sum(float(r[lag:] @ r[: len(r) - lag]) for r in rests) / total
+                           for lag in range(MOST_TERMS + 1)])  # fmt: skip
+    if covariance[0] <= 0.0:
+        return white_level(rms, n)
+    fits = [yule_walker(covariance, order) for order in range(MOST_TERMS + 1)]
+    scores = [n * np.log(variance) + order * np.log(n) for order, (_, variance) in enumerate(fits)]
+    order = int(np.argmin(scores))
+    if order == 0:
+        return white_level(rms, n)
+    terms, variance = fits[order]
+    correlation = list(covariance[: order + 1] / covariance[0])
+    while len(correlation) <= LAGS:
+        correlation.append(float(terms @ np.array(correlation[: -order - 1 : -1])))
+    rho = np.array(correlation[1:])
+    slow, power = n / max(1.0 + 2.0 * rho.sum(), 1.0), n / (1.0 + 2.0 * float(rho @ rho))
+    # Each mean that was taken out took more than one sample's worth of slow noise with it.
+    rms *= float(np.sqrt(1.0 / max(1.0 - len(rests) / slow, 0.5)))
+    # Scaled so that the rest has the rms that is reported; degrees of freedom went into the terms.
+    scale = rms**2 / covariance[0]
+    innovation = float(np.sqrt(variance * scale * n / (n - order)))
+    factor = cholesky(toeplitz(covariance[:order] * scale), lower=True)
+    head = solve_triangular(factor, np.eye(order), lower=True)
+    return NoiseModel(float(rms), terms, innovation, head, n, slow, power)
+
+
+def yule_walker(covariance: Array, order: int) -> tuple[Array, float]:
+    """Return the terms of an autoregression and the variance of its innovations."""
+    if order == 0:
+        return np.empty(0), float(covariance[0])
+    terms = np.linalg.solve(toeplitz(covariance[:order]), covariance[1 : order + 1])
+    return np.asarray(terms, dtype=np.float64), float(covariance[0] - terms @ covariance[1 : order + 1])
+
+
+@dataclass(frozen=True)
+class Level:
+    """How far a record scatters about the model.
+
+    rms: [unit of the record]; effective_fraction: independent samples per sample; from_residual: the residual was far
+    above the noise, so that it, with its correlation in time, is what scatters; assumed: nothing was measured.
+    """
+
+    rms: float
+    effective_fraction: float
+    from_residual: bool = False
+    assumed: bool = False
+
+
+def level_of(replay: Replay, space: Space, x: Array) -> Level:
+    noise = replay.record.noise
+    candidate = space.complete(x[np.newaxis])
+    residual = replay.measured - replay.signal(candidate)[0]
+    rms = float(np.sqrt(np.mean(residual**2)))
+    known = Level(noise.rms, noise.effective_fraction)
+    if not np.isfinite(rms) or rms <= ENGINE_ERRORS * replay.engine_error_at(candidate[0]):
+        return known
+    if not is_noise(residual, noise):
+        return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
+    # differences tell the least that the noise can be, and nothing of its colour
+    return known if noise.source == "rest" else Level(max(rms, noise.rms), new_share(residual))
+
+
+def is_noise(residual: Array, noise: Noise) -> bool:
+    """Tell whether a residual, (n_samples,), may be the noise of its record and nothing more.
+
+    By F tests, in independent samples: its mean square against that of the rest; the means of its blocks, where a
+    smooth misfit far below the noise of a sample stands out, against its own mean square. Noise from differences is a
+    lower bound that knows no correlation: there only a mean square of more than twice that is a misfit.
+    """
+    if noise.rms == 0.0:
+        return not residual.any()
+    square, share = float(np.mean(residual**2)), noise.effective_fraction
+    ratio, known = square / noise.rms**2, noise.n_samples * share
+    if noise.source != "rest":
+        # how well the noise itself is known: its mean square scatters by 2/n_eff
+        return bool(ratio <= MISFIT * (1.0 + 3.0 * np.sqrt(2.0 / known)))
+    tests = [(ratio, residual.size * share, known)]
+    for length in (ceil(n / share) for n in BLOCKS):
+        blocks = residual[: residual.size // length * length].reshape(-1, length).mean(axis=1)
+        if blocks.size:
+            spread = float(np.mean(blocks**2)) * length * share / square
+            # of white noise nothing else has to be known
+            tests.append((spread, blocks.size, residual.size if share == 1.0 else known))
+    # scipy.stats would take longer to load than an identification
+    return all(float(fdtrc(above, below, value)) > CHANCE for value, above, below in tests)
+
+
+def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | None = None) -> tuple[Level, ...]:
+    """Return the level of each record at a candidate: its noise, or its residual where that is far above the noise.
+
+    Without noise there is nothing to weigh a change against: then white noise of 0.1 % of the record's rms speed is
+    assumed, and the level says so. noise: rms to assume for every record in place of all that.
+    """
+    if noise is not None:
+        if len({r.place for r in replays}) > 1:
+            raise ArmidError(f"a noise of {noise:g} was given, but records hold several outputs: none is expected")
+        return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
+    found = []
+    for replay in replays:
+        level = level_of(replay, space, x)
+        if replay.record.is_noise_free and level.rms <= NOISE_FREE * float(np.max(np.abs(replay.measured))):
+            level = Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
+        found.append(level)
+    return tuple(found)
+
+
+def level_weights(levels: Sequence[Level]) -> tuple[float, ...]:
+    """Return sqrt(effective fraction)/rms of each level, so that weighted squares sum to chi2 of effective samples."""
+    return tuple(float(np.sqrt(level.effective_fraction)) / level.rms for level in levels)
+
+
+def coloured(rng: np.random.Generator, shape: tuple[int, int], level: Level) -> Array:
+    """Return normal noise of a level, correlated from sample to sample as its effective fraction says."""
+    from scipy.signal import lfilter
+
+    white = rng.standard_normal(shape)
+    memory = (1.0 - level.effective_fraction) / (1.0 + level.effective_fraction)
+    if memory > 0.0:
+        white[:, 1:] *= np.sqrt(1.0 - memory**2)
+        white = np.asarray(lfilter([1.0], [1.0, -memory], white, axis=1))
+    return level.rms * white
