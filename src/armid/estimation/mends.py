@@ -1,6 +1,6 @@
 """Mistakes that records may contain, each with what undoes it: sign, unit, clock, zero, manoeuvre."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -87,10 +87,11 @@ def mends(plant: Plant, record: Record, shift: int) -> Iterator[Mend]:
     for a, b in combinations(record.signals, 2):
         if a.unit == b.unit:
             words = f"its {a.output} and {b.output} look exchanged: the other way round"
-            yield Mend("exchanged", np.nan, words, partial(with_outputs_exchanged, plant=plant, a=a.output, b=b.output))
+            other_way = of_signals(plant, [a.output, b.output], lambda x, y: [y, x])
+            yield Mend("exchanged", np.nan, words, other_way)
             for one, other in ((a, b), (b, a)):
                 words = f"{one.output} looks counted from the ground, {other.output} being in it: without"
-                less = partial(with_other_taken_off, plant=plant, output=one.output, other=other.output)
+                less = of_signals(plant, [one.output, other.output], lambda x, y: [x - y, y])
                 yield Mend("absolute", np.nan, words, less)
     yield from mends_of_keys(plant, record)
     if shift:
@@ -105,7 +106,7 @@ def mends_of_sizes(plant: Plant, record: Record) -> Iterator[Mend]:
             if kind != ANGULAR or one.unit.startswith("rad"):
                 signal = f"{one.output} [{one.unit}]" if record.signals[1:] else f"{one.unit} signal"
                 yield Mend("unit" if kind == ANGULAR else kind, factor, f"the measured {signal}: {words}",
-                           partial(scaled, plant=plant, output=one.output, factor=factor))  # fmt: skip
+                           of_signals(plant, [one.output], lambda x, by=factor: [by * x], factor))  # fmt: skip
         for name in (i.name for i in plant.inputs if kind != ANGULAR):
             yield Mend("input", factor, f"input '{name}': {words}",
                        of_pieces(partial(with_input, name=name, factor=factor)))  # fmt: skip
@@ -119,7 +120,7 @@ def mends_of_zeros(plant: Plant, record: Record) -> Iterator[Mend]:
     for turn in np.deg2rad(TURNS).tolist():
         more = f"looks counted from elsewhere: with {np.rad2deg(turn):g} deg more"
         for output in angles:
-            yield Mend("zero", turn, f"{output} {more}", partial(turned, plant=plant, output=output, turn=turn))
+            yield Mend("zero", turn, f"{output} {more}", of_signals(plant, [output], lambda x, by=turn: [x + by]))
         if position is not None:
             start = {"start_position": position + turn}
             yield Mend("zero", turn, f"the angle {more}", of_pieces(partial(Piece.with_constants, constants=start)))
@@ -160,27 +161,19 @@ def of_pieces(undo: Callable[[Piece], Piece]) -> Callable[[Record], Record]:
     return lambda record: record.with_pieces(undo)
 
 
-def scaled(record: Record, plant: Plant, output: str, factor: float) -> Record:
-    return with_measured(record, plant, {n: factor * x for n, x in measured_of(record).items() if n == output}, factor)
+def of_signals(
+    plant: Plant, outputs: Sequence[str], change: Callable[..., Sequence[Array]], factor: float = 1.0
+) -> Callable[[Record], Record]:
+    """Return what changes the samples of some outputs together, in a record that holds all of these."""
 
+    def undo(record: Record) -> Record:
+        measured = {one.output: one.measured for one in record.signals}
+        if not measured.keys() >= {*outputs}:
+            return with_measured(record, plant, {}, factor)
+        changed = change(*(measured[name] for name in outputs))
+        return with_measured(record, plant, dict(zip(outputs, changed, strict=True)), factor)
 
-def turned(record: Record, plant: Plant, output: str, turn: float) -> Record:
-    return with_measured(record, plant, {n: x + turn for n, x in measured_of(record).items() if n == output})
-
-
-def with_outputs_exchanged(record: Record, plant: Plant, a: str, b: str) -> Record:
-    measured = measured_of(record)
-    return with_measured(record, plant, {a: measured[b], b: measured[a]} if {a, b} <= measured.keys() else {})
-
-
-def with_other_taken_off(record: Record, plant: Plant, output: str, other: str) -> Record:
-    measured = measured_of(record)
-    both = {output, other} <= measured.keys()
-    return with_measured(record, plant, {output: measured[output] - measured[other]} if both else {})
-
-
-def measured_of(record: Record) -> dict[str, Array]:
-    return {one.output: one.measured for one in record.signals}
+    return undo
 
 
 def with_interval(record: Record, plant: Plant, factor: float) -> Record:

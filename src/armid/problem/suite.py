@@ -22,7 +22,8 @@ from armid.problem.fitness import FITNESS
 from armid.problem.meter import PENALTY
 from armid.problem.problem import IdentificationProblem, ready_record, replays, residuals
 from armid.problem.space import Space, space_of
-from armid.record import Campaign, Noise, Piece, Record, Signal, read_campaign
+from armid.record import Campaign, read_campaign
+from armid.record.record import made_record
 from armid.units import DEGREE
 
 VERSION = 1
@@ -289,10 +290,8 @@ class SuiteProblem(Problem):  # type: ignore[misc]
             n_samples = round(given.duration_s / INTERVAL_S) + 1
             constants = {"theta_C": start * DEGREE, "theta_D": target * DEGREE, "shell": shell, "U": supply}
             manoeuvre, rms = Manoeuvre(INTERVAL_S, n_samples, constants), given.noise_deg_s * DEGREE
-            (output, *_), noise = self.model.plant.outputs, Noise(rms, 0.0, 0.0, 1.0, n_samples, "known")
-            signal = Signal(output.name, output.unit, np.zeros(n_samples), np.empty(0), noise)
-            pieces = (Piece(manoeuvre, slice(0, n_samples)),)
-            record = Record(f"{self.name}, record {number}", "train", manoeuvre, (signal,), pieces, whole_pieces=())
+            name, output = f"{self.name}, record {number}", self.model.plant.outputs[0]
+            record = made_record(name, "train", manoeuvre, output, np.zeros(n_samples), rms)
             (replay,) = ready_record(record, self.model, self.space, "standard").each
             # recorded at the very steps of the search, so that the truth is the optimum of what has no noise, bit for
             # bit; normal numbers by the inverse distribution, as numpy's own may change between its versions

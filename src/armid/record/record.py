@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.model import Array, Manoeuvre
+from armid.model import Array, Manoeuvre, Output
 from armid.record.broken import Broken
 from armid.record.sensor import Mask, Sensor
 
 NOISE_FREE = 1e-6
+# Source of a noise that nothing has to be learnt from.
+KNOWN = "known"
 # Which samples of a piece: those of a window, or these of it that a sensor measured.
 Samples = slice | NDArray[np.intp]
 
@@ -290,3 +292,11 @@ class Record:
     def is_noise_free(self) -> bool:
         """Tell whether the noise is below a millionth of the largest value: a simulation, not a measurement."""
         return self.noise.rms <= NOISE_FREE * float(np.max(np.abs(self.measured)))
+
+
+def made_record(file: str, role: str, manoeuvre: Manoeuvre, output: Output, measured: Array, rms: float) -> Record:
+    """Return the record of one output that was not read from a file: the rms of its white noise is known."""
+    noise = Noise(rms, 0.0, 0.0, 1.0, measured.size, KNOWN)
+    pieces = (Piece(manoeuvre, slice(0, measured.size)),)
+    signal = Signal(output.name, output.unit, measured, np.empty(0), noise)
+    return Record(file, role, manoeuvre, (signal,), pieces, pieces)

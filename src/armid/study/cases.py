@@ -16,8 +16,9 @@ from armid.errors import ArmidError, quoted
 from armid.model import Manoeuvre, Model, Plant
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, SuiteProblem
-from armid.record import Campaign, Noise, Override, Piece, Record, Signal, read_campaign
+from armid.record import Campaign, Override, Record, read_campaign
 from armid.record.reader import NAME, campaign_path, record_constants
+from armid.record.record import made_record
 from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.inputs import input_values, inputs_of
@@ -34,7 +35,6 @@ from armid.study.spec import (
 from armid.units import DEG, SUFFIXES
 
 MOST_SAMPLES = 10**7
-KNOWN = "known"
 # What a problem of the suite brings, so that no key of a study may tell it.
 BROUGHT = ("noise_deg_s", "windows_s", "interval_s", "accuracy", "constants", "bounds", "fixed")
 # Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
@@ -317,10 +317,7 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
             raise ArmidError(f"{name}: the simulation diverges at the truth, a motion is expected")
         if is_constant(run.output[0]):
             raise ArmidError(f"{name}: the machine does not move at the truth, a motion is expected")
-        output, noise = model.plant.outputs[0], Noise(0.0, 0.0, 0.0, 1.0, n_samples, KNOWN)
-        signal = Signal(output.name, output.unit, run.output[0], np.empty(0), noise)
-        pieces = (Piece(manoeuvre, slice(0, n_samples)),)
-        records.append(Record(name, stroke["role"], manoeuvre, (signal,), pieces, pieces))
+        records.append(made_record(name, stroke["role"], manoeuvre, model.plant.outputs[0], run.output[0], 0.0))
     return tuple(records)
 
 
@@ -345,7 +342,7 @@ def noisy_records(records: Sequence[Record], settings: Mapping[str, Any]) -> tup
     for record in records:
         (signal,) = record.signals
         rms = noise_rms(settings, signal.unit)
-        known = Noise(rms, 0.0, 0.0, 1.0, signal.measured.size, KNOWN)
         measured = signal.measured + rms * rng.standard_normal(signal.measured.size)
-        noisy.append(replace(record, signals=(replace(signal, measured=measured, noise=known),)))
+        signal = replace(signal, measured=measured, noise=replace(signal.noise, rms=rms))
+        noisy.append(replace(record, signals=(signal,)))
     return tuple(noisy)

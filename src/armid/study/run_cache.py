@@ -10,7 +10,7 @@ from typing import Any
 from armid.errors import ArmidError
 from armid.estimation.least_squares import with_fitted_starts
 from armid.model import Model
-from armid.problem.problem import Replay, ready_record
+from armid.problem.problem import Replay, replays
 from armid.problem.space import Space, space_of
 from armid.problem.suite import VERSION, suite
 from armid.record import Campaign, Record
@@ -69,10 +69,10 @@ class RunCache:
             # the accuracy that is enough depends on how loud the noise is, not on how it turns out
             records = [r.with_signals(lambda s: replace(s, noise=replace(s.noise, rms=noise_rms(settings, s.unit))))
                        for r in records]  # fmt: skip
-        replays = tuple(r for record in records for r in ready_record(record, model, space, accuracy).each)
-        train = iter(with_fitted_starts(tuple(r for r in replays if r.record.role == "train"), space))
-        replays = tuple(next(train) if r.record.role == "train" else r for r in replays)
-        return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), replays)
+        made = replays(records, model, space, accuracy)
+        train = iter(with_fitted_starts(tuple(r for r in made if r.record.role == "train"), space))
+        made = tuple(next(train) if r.record.role == "train" else r for r in made)
+        return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), made)
 
     def _source(self, settings: Mapping[str, Any]) -> tuple[Model, tuple[Record, ...]]:
         source = settings.get("campaign")
