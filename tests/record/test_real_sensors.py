@@ -16,7 +16,7 @@ from armid.record import RecordWarning, read_campaign
 from armid.record.broken import repeated_samples
 from armid.record.resample import timing_of
 from armid.record.sensor import Sensor
-from armid.record.signal import column_of
+from armid.record.signal import signal_of
 from armid.record.table import read_table, time_column
 
 WHEEL = 'name = "wheel"\nplant = "{}"\nhold = "zero"\n{}\n[[records]]\nfile = "a.csv"\nrole = "train"\n'
@@ -235,7 +235,7 @@ def test_of_measured_records_nothing_is_left_out(name):
             times = time_column(table)
             timing = timing_of(times, False, file.name)
             signals = [
-                column_of(table, header, "rad/s" if "velocity" in header else "rad", 1.0, times, timing).signal
+                signal_of(table, header, "rad/s" if "velocity" in header else "rad", 1.0, times, timing)[0]
                 for header in headers
             ]
         assert all(signal.broken == () for signal in signals), file.name

@@ -8,12 +8,12 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 import numpy as np
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Manoeuvre, ManoeuvreKey, Plant
+from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.model.plant import unit_ends
 from armid.record.record import Piece, Record, Signal
-from armid.record.resample import Timing, is_constant, onto_grid, piece_length, timing_of, with_window
+from armid.record.resample import Timing, onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
-from armid.record.signal import Column, column_of
+from armid.record.signal import signal_of
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
     LARGEST,
@@ -45,12 +45,13 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     sources = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where)
     driven = [table.numbers(header) for header in sources.values()]
 
-    def column(header: str, factor: float, unit: str, output: str = "") -> Column:
+    def read(header: str, factor: float, unit: str, output: str = "") -> tuple[Signal, Array]:
         most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
-        return column_of(table, header, unit, factor, times, timing, driven, campaign.unwrap, most_lost, output)
+        return signal_of(table, header, unit, factor, times, timing, driven, campaign.unwrap, most_lost, output)
 
-    measured = [column(header, o.factors[header], o.unit, o.name) for o, header in found.items()]
-    check_columns(measured, timing, campaign.gyro_range_deg_s, table)
+    measured = [read(header, o.factors[header], o.unit, o.name) for o, header in found.items()]
+    if campaign.gyro_range_deg_s is not None:
+        check_range(measured, campaign.gyro_range_deg_s, table)
     others = {name: values for name, values in table.columns.items() if name not in (TIME, *found.values())}
     columns = {name: onto_grid(values, times, timing) for name, values in others.items() if np.isfinite(values).all()}
     manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, sources, where=where)
@@ -58,7 +59,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
         file=sheet.file,
         role=sheet.role,
         manoeuvre=manoeuvre,
-        signals=tuple(each.signal for each in measured),
+        signals=tuple(signal for signal, _ in measured),
         pieces=(),
         whole_pieces=(),
         earliest=timing.earliest,
@@ -67,7 +68,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
         restart_s=sheet.restart_s,
         irregularity=timing.irregularity,
     )
-    tracks = {} if plant.from_rest else tracks_of(record, plant, table, lambda *what: column(*what).signal)
+    tracks = {} if plant.from_rest else tracks_of(record, plant, table, lambda *what: read(*what)[0])
     return with_window(started(record, plant, tracks, where), sheet.window_s, where)
 
 
@@ -100,26 +101,19 @@ def input_factor(header: str, unit: str, table: CsvTable) -> float:
     return table.factor(header, next((factor for end, factor in ends.items() if header.endswith(f"_{end}")), 1.0))
 
 
-def check_columns(measured: Sequence[Column], timing: Timing, range_deg_s: float | None, table: CsvTable) -> None:
-    """Refuse a signal that shows no motion, and a speed that is cut off by the range of the gyro.
+def check_range(measured: Sequence[tuple[Signal, Array]], range_deg_s: float, table: CsvTable) -> None:
+    """Refuse a speed that is cut off by the range of the gyro.
 
     Saturated are 5 samples in a row within one step of the sensor of the range, but at most a hundredth of it.
     """
-    for column in measured:
-        if is_constant(column.values[timing.first :][column.rows[timing.first :]]):
-            what = "speed" if column.signal.unit in ("rad/s", "m/s") else column.signal.output
-            raise ArmidError(f"{table.file}: the measured {what} is constant after the start, a motion is expected")
-    if range_deg_s is None:
-        return
-    speed = next((column for column in measured if column.signal.unit == "rad/s"), None)
-    if speed is None:
-        unit = measured[0].signal.unit
-        raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {unit}: a speed in deg/s or "
-                         "rad/s is expected")  # fmt: skip
+    speed, values = next(((s, values) for s, values in measured if s.unit == "rad/s"), measured[0])
+    if speed.unit != "rad/s":
+        raise ArmidError(f"{table.file}: gyro_range_deg_s is given, but the speed is in {speed.unit}: a speed in deg/s "
+                         "or rad/s is expected")  # fmt: skip
     gyro_range = range_deg_s * DEGREE
-    step = min(speed.signal.sensor.step, gyro_range / 100)
+    step = min(speed.sensor.step, gyro_range / 100)
     # the slack keeps a value that is one step below the range inside, whatever its last binary digit
-    near = np.abs(speed.values) >= gyro_range - step * (1 + 1e-6)
+    near = np.abs(values) >= gyro_range - step * (1 + 1e-6)
     runs = np.convolve(near, np.ones(SATURATED_SAMPLES), mode="valid")
     saturated = np.flatnonzero(runs > SATURATED_SAMPLES - 0.5)
     if saturated.size:

@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,30 +27,18 @@ SPANNED = 0.75
 WRAPS = {"rad": (2.0 * np.pi,), "deg": (360.0,), "turns": (1.0,), "counts": (2.0**16, 2.0**32)}
 
 
-@dataclass(frozen=True, eq=False)
-class Column:
-    """Hold one measured column of a file.
-
-    values: (n_rows,), SI, NaN where a cell is empty. rows: which are data: new values of a sound sensor, (n_rows,).
-    signal: the column on the grid.
-    """
-
-    values: Array
-    rows: Mask
-    signal: Signal
-
-
-def column_of(
+def signal_of(
     table: CsvTable, header: str, unit: str, factor: float, times: Array, timing: Timing, inputs: Sequence[Array] = (),
     unwrap: bool = False, most_lost: float = 0.05, output: str = "",
-) -> Column:  # fmt: skip
-    """Return a column of a file and its signal, and warn of what of it is no data.
+) -> tuple[Signal, Array]:  # fmt: skip
+    """Return the signal of a column of a file, and the column, SI, (n_rows,); warn of what of it is no data.
 
     factor: to the SI unit, NaN for counts. inputs: the columns that drive the machine, (n_rows,) each. unwrap: whether
-    whole turns are taken out. most_lost: share of the samples that may be no data. output: whose signal it is.
+    whole turns are taken out. most_lost: share of the samples that may be no data. output: whose signal it is, which
+    has to show a motion.
     Raises ArmidError for a column with too few numbers or too many that are no data.
     """
-    raw = table.numbers(header, gaps=True)
+    raw, is_speed = table.numbers(header, gaps=True), unit in ("rad/s", "m/s")
     present = np.isfinite(raw)
     check_empty(table, header, present)
     values = without_turns(table, header, raw, unwrap) * table.factor(header, factor)
@@ -69,7 +56,7 @@ def column_of(
     rows[new.at[wild & ~new.since(jumps)]] = False
     found["spikes"] &= ~rows
     new = New(values, rows, times, timing)
-    rest, noise = rest_and_noise(new, inputs, is_speed=unit in ("rad/s", "m/s"))
+    rest, noise = rest_and_noise(new, inputs, is_speed)
     moves = not is_constant(new.motion)
     repeated = (
         repeated_samples(new.values, noise.rms, noise.source == "rest", sensor, new.since(jumps)) if moves else {}
@@ -82,9 +69,11 @@ def column_of(
     check_lost(table, header, faults, n_new, most_lost)
     check_number(table, header, rows, timing)
     measured, data = moved_onto_grid(values, times, timing, rows)
-    signal = Signal(output, unit, measured, rest, noise, None if data.all() else data, sensor,
-                    (*gaps(times, timing), *faults), header)  # fmt: skip
-    return Column(values, rows, signal)
+    if output and is_constant(values[timing.first :][rows[timing.first :]]):
+        what = "speed" if is_speed else output
+        raise ArmidError(f"{table.file}: the measured {what} is constant after the start, a motion is expected")
+    return Signal(output, unit, measured, rest, noise, None if data.all() else data, sensor,
+                  (*gaps(times, timing), *faults), header), values  # fmt: skip
 
 
 class New:

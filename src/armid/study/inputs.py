@@ -24,7 +24,7 @@ TO_HZ = key(above_zero, ABOVE, "Last frequency [Hz].")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Signal:
+class InputSignal:
     """What all signals that are made have in common; a subclass makes `unit_values`, of a size of 1."""
 
     kind: str = field(metadata=key(text, "the name of a signal", "chirp, multisine, steps or prbs."))
@@ -40,7 +40,7 @@ class Signal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chirp(Signal):
+class Chirp(InputSignal):
     """A sine whose frequency rises or falls evenly over the whole length."""
 
     from_hz: float = field(metadata=FROM_HZ)
@@ -53,7 +53,7 @@ class Chirp(Signal):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Multisine(Signal):
+class Multisine(InputSignal):
     """A sum of sines of evenly spaced frequencies and drawn phases, its largest value 1."""
 
     from_hz: float = field(metadata=FROM_HZ)
@@ -69,7 +69,7 @@ class Multisine(Signal):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Steps(Signal):
+class Steps(InputSignal):
     """Levels drawn evenly from -1 to 1, each held for a time."""
 
     hold_s: float = field(metadata=key(above_zero, ABOVE, "Time for which a level is held [s]."))
@@ -100,7 +100,7 @@ class Column:
     column: str = field(metadata=key(text, "the header of a column", "Its column."))
 
 
-SIGNALS: dict[str, type[Signal]] = {"chirp": Chirp, "multisine": Multisine, "steps": Steps, "prbs": Prbs}
+SIGNALS: dict[str, type[InputSignal]] = {"chirp": Chirp, "multisine": Multisine, "steps": Steps, "prbs": Prbs}
 
 
 def inputs_of(
