@@ -44,7 +44,7 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class WhitenedData:
-    """Hold records with their noise; what is of each record is of each of its signals, the records one by one.
+    """Hold records with their noise. Lists and arrays have an entry for each signal, record by record.
 
     levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of
     fits are kept, None: nowhere. cover: of a signal without a form; None for none.

@@ -39,7 +39,7 @@ class ReadyRecord:
 
     @property
     def each(self) -> tuple["Replay", ...]:
-        """What is compared: each of its signals."""
+        """A replay for each of its signals."""
         return tuple(Replay(self, i) for i in range(len(self.record.signals)))
 
 

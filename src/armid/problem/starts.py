@@ -49,7 +49,7 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
 
 
 def with_shown_starts(ready: ReadyRecord) -> ReadyRecord:
-    """Return a record whose samples are others than those to which its starts were fitted, corrected by these."""
+    """Return a record whose fitted starts follow its present samples, after these were changed."""
 
     def shown(piece: Piece) -> Piece:
         if piece.correction is None:

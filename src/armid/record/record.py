@@ -116,7 +116,7 @@ class Piece:
         return replace(self, manoeuvre=replace(self.manoeuvre, constants={**self.manoeuvre.constants, **constants}))
 
     def of(self, samples: NDArray[Any]) -> NDArray[Any]:
-        """Return its part of the samples of a whole record."""
+        """Return the samples of the piece out of those of the whole record."""
         return samples[self.start_index : self.start_index + self.manoeuvre.n_samples]
 
 
@@ -147,11 +147,11 @@ class Signal:
         return np.asarray(np.flatnonzero(piece.of(self.data)[piece.window]) + piece.window.start)
 
     def seen(self, piece: Piece) -> Array:
-        """Return what was measured at these samples."""
+        """Return the measured values of a piece that fitness and errors see."""
         return piece.of(self.measured)[self.samples(piece)]
 
     def n_seen(self, piece: Piece) -> int:
-        """Return how many these are."""
+        """Return the number of samples of a piece that fitness and errors see."""
         return len(piece.of(self.measured)[self.samples(piece)])
 
 
@@ -233,21 +233,21 @@ class Record:
 
     @property
     def seen(self) -> Array:
-        """What fitness and errors see of what was measured, (n_samples,)."""
+        """Measured samples that fitness and errors see, (n_samples,)."""
         return np.concatenate([self.signals[0].seen(p) for p in self.pieces])
 
     def seen_by_all(self, piece: Piece) -> Array:
-        """Return what they see of a piece, the signals one behind the other, (n_seen,)."""
+        """Return the seen samples of a piece, the signals one behind the other, (n_seen,)."""
         return np.concatenate([signal.seen(piece) for signal in self.signals])
 
     @cached_property
     def samples(self) -> list[Samples]:
-        """Which samples of each piece they see."""
+        """Samples of each piece that fitness and errors see."""
         return [self.signals[0].samples(piece) for piece in self.pieces]
 
     @property
     def lengths(self) -> tuple[int, ...]:
-        """How many samples of each piece they see."""
+        """Number of these samples in each piece."""
         return tuple(self.signals[0].n_seen(p) for p in self.pieces)
 
     @property
@@ -295,7 +295,7 @@ class Record:
 
 
 def made_record(file: str, role: str, manoeuvre: Manoeuvre, output: Output, measured: Array, rms: float) -> Record:
-    """Return the record of one output that was not read from a file: the rms of its white noise is known."""
+    """Return a simulated record of one output, with white noise of a known rms."""
     noise = Noise(rms, 0.0, 0.0, 1.0, measured.size, KNOWN)
     pieces = (Piece(manoeuvre, slice(0, measured.size)),)
     signal = Signal(output.name, output.unit, measured, np.empty(0), noise)

@@ -142,7 +142,7 @@ def table_with(
     found: Iterable[tuple[str, Array | tuple[int, str]]], file: str, path: Path, lines: tuple[int, ...],
     header_line: int, counts_per_turn: float | None,
 ) -> CsvTable:  # fmt: skip
-    """Return the table of some columns, each its numbers, or line and text of a cell without one; refuse none."""
+    """Return a table of columns: numbers, or line and text of a cell that is no number. Refuse one without columns."""
     table = CsvTable(file, path, {}, {}, lines, header_line, counts_per_turn)
     for name, values in found:
         if isinstance(values, tuple):

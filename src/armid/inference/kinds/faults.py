@@ -42,7 +42,7 @@ class Fault:
         return units.get(self.kind) or next((c.unit for c in plant.constants if c.name == self.constant), "1")
 
     def touches(self, output: str, other: str) -> bool:
-        """Tell whether what is wrong in one output of a record is so in another."""
+        """Tell whether a fault of one output of a record is a fault of another too."""
         return self.kind not in OF_SENSOR or other == output
 
     def undone(self, record: Record, value: float, plant: Plant, output: str = "") -> Record:
@@ -132,7 +132,7 @@ def leaves_of(model: Model, key: str) -> set[str]:
 
 
 def with_record(base: WhiteRecords, index: int, fault: Fault, value: float) -> WhiteRecords:
-    """Return a problem in which one record is replaced by itself without a fault; index: of the signal that has it."""
+    """Return a problem with one record replaced by itself without a fault; index: of the faulty signal."""
     data, ready, plant = base.data, base.replays[index].ready, base.model.plant
     sound, output = data.sound.copy(), data.each[index].output
     for i in of_file(base, index):
@@ -153,13 +153,13 @@ def with_measured(base: WhiteRecords, index: int, changes: Sequence[Array]) -> W
 
 
 def replaced(base: WhiteRecords, ready: ReadyRecord, index: int) -> tuple[Replay, ...]:
-    """Return the replays with one record replaced, whose fitted starts go by what it shows."""
+    """Return the replays with one record replaced; its fitted starts follow its samples."""
     old, new = base.replays[index].ready, with_shown_starts(ready)
     return with_each(base.replays, lambda one: new if one is old else one)
 
 
 def of_file(base: WhiteRecords, index: int) -> list[int]:
-    """Return which signals are of the same record as one."""
+    """Return the indices of all signals of the record that holds one signal."""
     return [i for i, r in enumerate(base.replays) if r.ready is base.replays[index].ready]
 
 
