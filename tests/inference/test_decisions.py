@@ -9,7 +9,8 @@ import armid
 from armid.inference import decisions
 
 SRC = Path(armid.__file__).parent
-FILES = sorted([*(SRC / "loop").glob("*.py"), *(SRC / "inference").rglob("*.py")])
+NOISE = SRC / "estimation" / "noise_model.py"
+FILES = sorted([*(SRC / "loop").glob("*.py"), *(SRC / "inference").rglob("*.py"), NOISE])
 MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
@@ -25,10 +26,11 @@ NUMERICS = {
         "FORETOLD",
     ),
     "budgets of computing": ("BUNDLE", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
-    "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "LAGS", "LINE", "MOST_BRIDGED", "STILL", "EVEN"),
+    "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS", "LINE", "MOST_BRIDGED", "STILL",
+                              "EVEN", "MISFIT", "ENGINE_ERRORS", "CHANCE"),
     "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),
     "layout of pages": ("MOST_DRAWN", "MOST_TOLD", "SHIFTED", "LEAST_SHARE", "WEAK", "VERSION"),
-}
+}  # fmt: skip
 # Plain numbers in comparisons that are no decision either: a half, rounding, and where a series or a range turns.
 LITERALS = {0, 1, 2, 3, -1, 0.5, 1.5, 5.0, 0.05, 1e-7, 1e-9, 1e-12, 1e-300}
 

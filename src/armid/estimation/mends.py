@@ -12,11 +12,11 @@ from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record, Signal
 from armid.record.start import Track, state_shown
 
-DEGREES, ANGULAR = 180.0 / np.pi, "angular"
+IN_DEGREES, ANGULAR = 180.0 / np.pi, "angular"
 FACTORS = {
     -1.0: ("sign", "its sign looks inverted: with the other one"),
-    DEGREES: (ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
-    1.0 / DEGREES: (ANGULAR, "57.3 times too large, as degrees under a header in radians are: in the other unit"),
+    IN_DEGREES: (ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
+    1.0 / IN_DEGREES: (ANGULAR, "57.3 times too large, as degrees under a header in radians are: in the other unit"),
     30.0 / np.pi: (ANGULAR, "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: so"),
     np.pi / 30.0: (ANGULAR, "9.55 times too large, as revolutions per minute under a header in rad/s are: so mended"),
     6.0: (ANGULAR, "6 times too small, as revolutions per minute under a header in deg/s are: so mended"),
@@ -149,12 +149,12 @@ def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
             f"{' and '.join(k.key for k in several)} {'look' if several[1:] else 'looks'} given in radians: in degrees"
         )
         names = [k.constant for k in several]
-        yield mend(words, lambda given, names=names: {n: DEGREES * given[n] for n in names}, "angle")
+        yield mend(words, lambda given, names=names: {n: IN_DEGREES * given[n] for n in names}, "angle")
 
 
 def may_be_radians(key: ManoeuvreKey, value: float) -> bool:
     low, high = range_of(key)
-    return 0.0 < abs(value) <= 2.0 * np.pi and low <= DEGREES * value <= high
+    return 0.0 < abs(value) <= 2.0 * np.pi and low <= IN_DEGREES * value <= high
 
 
 def of_pieces(undo: Callable[[Piece], Piece]) -> Callable[[Record], Record]:

@@ -23,8 +23,8 @@ from armid.record.noise import correlation_sum, new_share
 from armid.record.record import NOISE_FREE
 
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
-LEAST_NOISE = 5e-5
-MOST_TERMS, FEWEST_FOR_COLOUR, LAGS = 8, 50, 500
+HIDES_ENGINE = 5e-5
+MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS = 8, 50, 500
 # A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
 # engine it is the engine's.
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
@@ -91,7 +91,7 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
     sensors = [(r.output, r.manoeuvre.interval) for r in records]
     pooled = {
         (output, t): pooled_level([r for r in (*records, *others) if (r.output, r.manoeuvre.interval) == (output, t)],
-                                  LEAST_NOISE * sizes[output]) for output, t in set(sensors)
+                                  HIDES_ENGINE * sizes[output]) for output, t in set(sensors)
     }  # fmt: skip
     return tuple(pooled[sensor] for sensor in sensors)
 
@@ -128,7 +128,7 @@ def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseModel:
         return white_level(rms, n)
     terms, variance = fits[order]
     correlation = list(covariance[: order + 1] / covariance[0])
-    while len(correlation) <= LAGS:
+    while len(correlation) <= MOST_LAGS:
         correlation.append(float(terms @ np.array(correlation[: -order - 1 : -1])))
     rho = np.array(correlation[1:])
     slow, power = n / max(1.0 + 2.0 * rho.sum(), 1.0), n / (1.0 + 2.0 * float(rho @ rho))

@@ -22,7 +22,7 @@ from armid.problem.problem import ReadyRecord
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
-from armid.record.noise import correlation_sum
+from armid.record.noise import FEWEST_INDEPENDENT, correlation_sum
 from armid.record.table import POSITIONS
 from armid.units import shown
 
@@ -64,7 +64,7 @@ FIRST, ELSEWHERE, FAR_OF_MOTION = 3, 10.0, 0.02
 # Successive samples, of so many values, that two recordings do not have in common by chance.
 ALIKE, DIFFERENT = 40, 10
 # Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is no rest.
-RESTLESS, FEWEST_INDEPENDENT, LARGE_MEAN = 0.02, 12.0, 0.2
+RESTLESS, LARGE_MEAN = 0.02, 0.2
 
 
 def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, ...]:

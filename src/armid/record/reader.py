@@ -29,7 +29,7 @@ from armid.units import COUNTS, DEGREE
 
 NAME, SUFFIX = "campaign.toml", ".csv"
 POSITION, SPEED = "start_position", "start_speed"
-ROUNDING = 1e-9
+KEY_ROUNDING = 1e-9
 SATURATED_SAMPLES = 5
 
 
@@ -233,7 +233,7 @@ def check_key(key: ManoeuvreKey, constants: Mapping[str, float], where: str) -> 
     value = constants[key.constant] / key.factor
     if key.unlike and constants[key.constant] == constants.get(key.unlike):
         raise ArmidError(f"{where}: {key.key} is {value:.9g}, where the record starts: a motion is expected")
-    slack = ROUNDING * abs(value)
+    slack = KEY_ROUNDING * abs(value)
     low = key.low if key.low is not None else -LARGEST / abs(key.factor)
     high = key.high if key.high is not None else LARGEST / abs(key.factor)
     if not low - slack <= value <= high + slack or (key.boolean and value not in (0.0, 1.0)):

@@ -14,7 +14,7 @@ from armid.record.resample import FEWEST_SAMPLES, Timing, gap_samples, is_consta
 from armid.record.sensor import Mask, renewed, sensor_of
 from armid.record.table import CsvTable
 
-ROUNDING = 1e-6
+TURN_ROUNDING = 1e-6
 # Samples of the grid without a row near by that make a gap: fewer are a lost sample or jitter of the clock.
 BRIDGED = 2
 # An output without a number in more than this share of the rows is no measurement of the record.
@@ -163,7 +163,7 @@ def wraps_at(values: Array, header: str) -> float:
     known = values[np.isfinite(values)]
     largest, span = float(np.max(np.abs(np.diff(known)), initial=0.0)), float(np.ptp(known)) if known.size else 0.0
     unit = next((u for u in WRAPS if header.endswith(f"_{u}")), "")
-    fits = (t for t in WRAPS.get(unit, ()) if largest > 0.5 * t and SPANNED * t < span <= t * (1.0 + ROUNDING))
+    fits = (t for t in WRAPS.get(unit, ()) if largest > 0.5 * t and SPANNED * t < span <= t * (1.0 + TURN_ROUNDING))
     return next(fits, 0.0)
 
 

@@ -128,7 +128,7 @@ DEGREES = (1, 2)
 # ... and its value is taken from one of so many degrees more, whose bias is of a higher order.
 HIGHER = 2
 # Standard deviations by which squares may exceed those of the noise.
-CHANCE = 3.0
+BY_CHANCE = 3.0
 GROWTH, LONGEST = 1.25, 400
 
 
@@ -167,7 +167,7 @@ def fitted(window: Array, place: int, degree: int, noise: float, slope: bool) ->
     """Return value and standard deviation at one place of a window, None where it holds more than a polynomial."""
 
     def exceeds(squares: float, freedom: int) -> bool:
-        return bool(squares > noise**2 * (freedom + CHANCE * np.sqrt(2.0 * freedom)))
+        return bool(squares > noise**2 * (freedom + BY_CHANCE * np.sqrt(2.0 * freedom)))
 
     basis, mean = polynomials(window.size, degree + HIGHER), float(np.mean(window))
     centred = window - mean
