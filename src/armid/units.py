@@ -22,22 +22,25 @@ _angle: ContextVar[str] = ContextVar("angle", default=DEG)
 PREFIXED = re.compile(r"(N|V|A|W|J|H|F|ohm)(?![a-z])|s$")
 PREFIXES = {1e-9: "n", 1e-6: "u", 1e-3: "m", 1e3: "k", 1e6: "M", 1e9: "G"}
 LEAST, LARGEST = 1e-2, 1e4
-# SI unit of an output -> {end of the header of a column: factor that turns the column into SI}.
-SUFFIXES = {
-    "rad": {"deg": DEGREE, "rad": 1.0, "turns": TURN},
-    "rad/s": {"deg_s": DEGREE, "rad_s": 1.0, "rpm": TURN / 60.0, "turns_s": TURN},
-    "m": {"m": 1.0, "mm": 1e-3}, "m/s": {"m_s": 1.0, "mm_s": 1e-3},
-    "A": {"A": 1.0}, "N": {"N": 1.0}, "N m": {"N_m": 1.0}, "V": {"V": 1.0},
+# End of the header of a column -> SI unit, factor into it, and how a row of units or brackets in a header write it. The
+# factor of counts is that of the shaft's encoder: a turn over `counts_per_turn` of the campaign.
+ENDS = {
+    "deg": ("rad", DEGREE, ("deg", "\u00b0")), "rad": ("rad", 1.0, ("rad",)), "turns": ("rad", TURN, ("turns",)),
+    "counts": ("rad", np.nan, ("counts",)),
+    "deg_s": ("rad/s", DEGREE, ("deg/s", "\u00b0/s")), "rad_s": ("rad/s", 1.0, ("rad/s", "rad s-1")),
+    "rpm": ("rad/s", TURN / 60.0, ("rpm", "1/min", "min-1")), "turns_s": ("rad/s", TURN, ("turns/s", "rev/s")),
+    "counts_s": ("rad/s", np.nan, ("counts/s",)),
+    "m": ("m", 1.0, ("m",)), "mm": ("m", 1e-3, ("mm",)), "m_s": ("m/s", 1.0, ("m/s",)),
+    "mm_s": ("m/s", 1e-3, ("mm/s",)), "A": ("A", 1.0, ("A",)), "N": ("N", 1.0, ("N",)),
+    "N_m": ("N m", 1.0, ("N m", "Nm", "N*m")), "V": ("V", 1.0, ("V",)),
 }  # fmt: skip
-# Ends of headers whose factor is that of the shaft's encoder: a turn over `counts_per_turn` of the campaign.
-COUNTS = {"rad": "counts", "rad/s": "counts_s"}
-# Unit as a row of units or a header in brackets writes it -> end of the header of a column.
-UNIT_ENDS = {
-    "s": "s", "sec": "s", "ms": "ms", "us": "us", "rad": "rad", "rad/s": "rad_s", "rad s-1": "rad_s", "deg": "deg",
-    "\u00b0": "deg", "deg/s": "deg_s", "\u00b0/s": "deg_s", "rpm": "rpm", "1/min": "rpm", "min-1": "rpm",
-    "turns": "turns", "turns/s": "turns_s", "rev/s": "turns_s", "counts": "counts", "counts/s": "counts_s", "m": "m",
-    "mm": "mm", "m/s": "m_s", "mm/s": "mm_s", "A": "A", "N": "N", "N m": "N_m", "Nm": "N_m", "N*m": "N_m", "V": "V",
-}  # fmt: skip
+# SI unit of an output -> {end of the header of a column: factor that turns the column into SI, NaN for counts}.
+SUFFIXES = {unit: {end: factor for end, (own, factor, _) in ENDS.items() if own == unit}
+            for unit in dict.fromkeys(unit for unit, _, _ in ENDS.values())}  # fmt: skip
+# Unit as it is written -> end of the header of a column; times have ends too.
+UNIT_ENDS = {"s": "s", "sec": "s", "ms": "ms", "us": "us"} | {
+    w: end for end, (_, _, words) in ENDS.items() for w in words
+}
 
 
 @contextmanager

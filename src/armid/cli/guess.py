@@ -65,7 +65,7 @@ def quantity_of(column: Column) -> str:
     for quantity, words in WORDS.items():
         if any(word == column.words or word in parts for word in words):
             return quantity
-    if column.end in {*SUFFIXES["rad/s"], "counts_s"}:
+    if column.end in SUFFIXES["rad/s"]:
         return "speed"
     return "position" if column.end in {"deg", "rad", "turns"} else ""
 

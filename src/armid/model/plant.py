@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armid.errors import ModelError, nearest
 from armid.model.effect import Equation, Guard, State
 from armid.model.parameter import Parameter, Scales, check_name
-from armid.units import COUNTS, SUFFIXES
+from armid.units import SUFFIXES
 
 Array = NDArray[np.float64]
 # How much of its record before it a piece keeps of the inputs [s]: more than a usual dead time.
@@ -166,27 +166,22 @@ class Output:
         if self.unit not in SUFFIXES:
             raise ModelError(f"output '{self.name}' has the unit '{self.unit}': {nearest(self.unit, SUFFIXES)}")
         for column in self.columns:
-            if not any(column.endswith(f"_{end}") for end in unit_ends(self.unit)):
-                ends = " or ".join(f"_{end}" for end in unit_ends(self.unit))
+            if not any(column.endswith(f"_{end}") for end in SUFFIXES[self.unit]):
+                ends = " or ".join(f"_{end}" for end in SUFFIXES[self.unit])
                 raise ModelError(f"output '{self.name}' has the column '{column}': a name that ends in {ends} is "
                                  "expected")  # fmt: skip
 
     @property
     def factors(self) -> dict[str, float]:
         """Header of a column that brings the output -> factor that turns it into SI, NaN for counts of an encoder."""
-        ends = unit_ends(self.unit)
+        ends = SUFFIXES[self.unit]
         columns = self.columns or tuple(f"{self.name}_{end}" for end in ends)
         return {c: next(factor for end, factor in ends.items() if c.endswith(f"_{end}")) for c in columns}
 
 
-def unit_ends(unit: str) -> dict[str, float]:
-    """Return end of a header -> factor into SI, NaN for counts, whose factor a campaign tells."""
-    return SUFFIXES[unit] | ({COUNTS[unit]: math.nan} if unit in COUNTS else {})
-
-
 # Unit of the one speed that a plant records which declares no outputs -> its name and the columns that bring it.
 SPEEDS = {
-    "rad/s": ("angular_velocity", tuple(f"angular_velocity_{end}" for end in unit_ends("rad/s"))),
+    "rad/s": ("angular_velocity", tuple(f"angular_velocity_{end}" for end in SUFFIXES["rad/s"])),
     "m/s": ("velocity", ("velocity_m_s",)),
 }
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
-from armid.model.plant import unit_ends
 from armid.record.record import Piece, Record, Signal
 from armid.record.resample import Timing, onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
@@ -25,7 +24,7 @@ from armid.record.table import (
     position_of,
     time_column,
 )
-from armid.units import COUNTS, DEGREE
+from armid.units import DEGREE, SUFFIXES
 
 NAME, SUFFIX = "campaign.toml", ".csv"
 POSITION, SPEED = "start_position", "start_speed"
@@ -97,7 +96,7 @@ def input_factor(header: str, unit: str, table: CsvTable) -> float:
     """Return what turns the column of an input into SI: what is no angle and no turning speed is taken as it is."""
     if header.endswith(("_deg", "_deg_s")):
         return DEGREE
-    ends = unit_ends(unit) if unit in COUNTS else {}
+    ends = SUFFIXES[unit] if unit in ("rad", "rad/s") else {}
     return table.factor(header, next((factor for end, factor in ends.items() if header.endswith(f"_{end}")), 1.0))
 
 

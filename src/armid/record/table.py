@@ -20,7 +20,7 @@ from armid.model import Array, Output, Plant
 from armid.model.plant import SPEEDS
 from armid.record.dialect import COMMENTS, Cells, cells_of, check_names, columns_of, text_of
 from armid.record.record import RecordWarning
-from armid.units import DEGREE, TURN
+from armid.units import SUFFIXES, TURN
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -31,8 +31,8 @@ TIME = "time_s"
 QUANTITIES = ("angular_velocity", "velocity", "time", "drive", "angle", "position")
 FURTHER = ("_rpm", "_turns", "_turns_s", "_counts", "_counts_s")
 # header of a position -> unit of the speed that it belongs to, factor; counts: see `CsvTable.factor`
-POSITIONS = {"position_m": ("m/s", 1.0), "angle_rad": ("rad/s", 1.0), "angle_deg": ("rad/s", DEGREE)}
-POSITIONS |= {"angle_turns": ("rad/s", TURN), "angle_counts": ("rad/s", np.nan)}
+POSITIONS = {"position_m": ("m/s", 1.0)}
+POSITIONS |= {f"angle_{end}": ("rad/s", factor) for end, factor in SUFFIXES["rad"].items()}
 
 
 @dataclass(frozen=True, eq=False)
