@@ -248,7 +248,7 @@ def speed_column(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, str
 
 def position_of(table: CsvTable, unit: str) -> str | None:
     """Return the header of the position that belongs to a speed in `unit`, None where there is none."""
-    found = [name for name, (speed_unit, _) in POSITIONS.items() if speed_unit == unit and name in table.headers]
+    found = [name for name in table.headers if name in POSITIONS and POSITIONS[name][0] == unit]
     return table.only_one_of(found, "at most one position column is expected")
 
 
