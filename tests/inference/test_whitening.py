@@ -1,5 +1,6 @@
 """The filter that makes noise white, against what autoregressions are known to do; when a residual is no noise."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,10 @@ from scipy.signal import lfilter
 
 from armid.estimation.noise_model import coloured_level, white_level, yule_walker
 from armid.inference.checks import motion_phases, time_in_words
+from armid.inference.whitening import soundness
+from armid.model import Manoeuvre, Output
 from armid.record.noise import memory_of
+from armid.record.record import made_record
 
 TERMS = np.array([1.5, -0.7])
 
@@ -83,3 +87,12 @@ def test_memory_is_that_of_the_noise_and_not_of_what_the_model_lacks():
         assert found == (pytest.approx(rho, abs=0.15) if rho else 0.0)
     # too long to be told from a discrepancy, and nothing at all
     assert memory_of(slow) == memory_of([np.zeros(100)]) == 0.0
+
+
+@pytest.mark.parametrize("data", [[], [3], [3, 4, 9]])
+def test_samples_behind_a_gap_are_unsound_as_far_as_the_filter_reaches(data):
+    """A piece may hold one measured sample, or none."""
+    told = np.isin(np.arange(20), data)
+    record = made_record("a.csv", "train", Manoeuvre(0.01, 20, {}), Output("speed", "v", "rad/s"), np.arange(20.0), 0.1)
+    found = soundness(record.with_signals(lambda signal: replace(signal, data=told)), reach=1)
+    np.testing.assert_array_equal(found, [1.0, 1.0, 0.0][: len(data)])
