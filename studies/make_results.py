@@ -44,7 +44,7 @@ class Recipe:
 
 
 def study(name: str, *figures: str, file: str = "", before: tuple[tuple[str, str], ...] = ()) -> Recipe:
-    """Return the recipe of a study: run it, then report it; file: of the study, where it is no NAME.toml."""
+    """Return the recipe of a study: run it, then report it; file: of the study, where it is not a NAME.toml."""
     run, tell = f"armid study studies/{file or name}.toml --out out/{name}", f"armid report out/{name}"
     return Recipe((run, tell), figures, before)
 

@@ -135,7 +135,7 @@ def test_a_name_that_is_ours_or_that_of_another_plug_in_is_refused(own, attribut
     ("raise RuntimeError('no luck')", "RuntimeError: no luck"), ("def broken(:", "SyntaxError"),
     ("import not_there_at_all", "ModuleNotFoundError: No module named 'not_there_at_all'"),
     ("raise SystemExit(0)", "SystemExit: 0"),
-    ("from armid import Parameter\nParameter('a b', '1', 0, 1)", "parameter 'a b' is no usable name"),
+    ("from armid import Parameter\nParameter('a b', '1', 0, 1)", "parameter 'a b' is not a usable name"),
 ])  # fmt: skip
 def test_a_file_that_fails_is_refused(tmp_path, text, fragment):
     (tmp_path / "failing.py").write_text(text)

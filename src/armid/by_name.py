@@ -299,7 +299,7 @@ def examine(
     Parameters
     ----------
     campaign, model, space, effects, plugins, window, bounds, fix, plant, units
-        As of `identify`.
+        See `identify`.
     x : mapping of name to value, SI; or the free parameters in order
         Where sensitivities are taken; None: at the least-squares estimate.
     noise : float

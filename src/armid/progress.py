@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 LOG = logging.getLogger("armid")
-# When work is announced, and how often it is said again [s].
+# When work is announced, and how often again [s].
 SLOW_S, AGAIN_S = 2.0, 15.0
 # Where no bar can be drawn, so many seconds pass between two lines.
 SILENT_S = 60.0

@@ -42,7 +42,7 @@ KINDS = tuple(ACCEPTS)
 class Registry:
     """Hold what a command may name; `fitness` and `identifiers` are read from their catalogues when first asked for.
 
-    own: kind -> name -> what the user has registered beside a catalogue, as it was given.
+    own: kind -> name -> what the user has registered in addition to a catalogue, as it was given.
     """
 
     plants: dict[str, Plant] = field(default_factory=lambda: dict(PLANTS))
@@ -105,7 +105,7 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     Raises
     ------
     ArmidError
-        For a plug-in that cannot be found, fails, belongs to another kind or is none of ours.
+        For a plug-in that cannot be found, fails, belongs to another kind or to no kind of armid.
     """
     registry = Registry()
     installed = entry_points()
@@ -153,7 +153,7 @@ def load_file(file: Path) -> Any:
     linecache.checkcache(str(file.resolve()))
     spec = importlib.util.spec_from_file_location(name, file.resolve())
     if spec is None or spec.loader is None:
-        raise ArmidError(f"plug-in {file} is no Python file: FILE.py:attribute is expected")
+        raise ArmidError(f"plug-in {file} is not a Python file: FILE.py:attribute is expected")
     module = importlib.util.module_from_spec(spec)
     setattr(module, CONTENT, content)
     sys.modules[name] = module

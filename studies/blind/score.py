@@ -80,7 +80,7 @@ def read_results(folder: Path) -> tuple[dict[str, Any], Times]:
     store = folder / "study.sqlite"
     if not store.is_file():
         if not folder.is_dir():
-            raise RefusalError(f"{folder} is no folder, one with a folder for each campaign is expected")
+            raise RefusalError(f"{folder} is not a folder, one with a folder for each campaign is expected")
         return {file.parent.name: read_json(file) for file in sorted(folder.glob("*/report.json"))}, {}
     kept = "FROM plan p JOIN runs r USING (run) JOIN loops l USING (run)"
     query = f'SELECT p."case", l.report, r.seconds, l.cpu_seconds {kept}'
@@ -88,7 +88,7 @@ def read_results(folder: Path) -> tuple[dict[str, Any], Times]:
         with closing(sqlite3.connect(f"{store.resolve().as_uri()}?mode=ro", uri=True)) as connection:
             rows = connection.execute(query).fetchall()
     except sqlite3.Error as error:
-        raise RefusalError(f"{store} is no store of closed loops: {error}") from error
+        raise RefusalError(f"{store} is not a store of closed loops: {error}") from error
     return {row[0]: json.loads(row[1]) for row in rows}, {row[0]: (row[2], row[3]) for row in rows}
 
 

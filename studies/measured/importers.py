@@ -59,7 +59,7 @@ DFKI_CAMPAIGN = """\
 # Source: github.com/dfki-ric-underactuated-lab/torque_limited_simple_pendulum, commit ed17ea2d32a3, folder results/.
 # Licence of the set: BSD-3-Clause; cite F. Wiebe et al., JOSS 7(74), 2022, 3884, doi:10.21105/joss.03884.
 # Angle 0 hangs (steps of 0.0029 rad). The drive measures the speed (steps of 0.022 rad/s) and tells the torque at its
-# output from the current in its windings, so the torque is no measurement at the shaft.
+# output from the current in its windings, so the torque is not a measurement at the shaft.
 name = "dfki"
 plant = "driven_axis"
 
@@ -106,7 +106,7 @@ def read_emps(path: Path) -> tuple[float, dict[str, Array]]:
     try:
         variables: dict[str, Any] = loadmat(path)
     except damaged as error:
-        raise DataError(f"{path.name} is no readable MATLAB file: {quoted(str(error))}") from error
+        raise DataError(f"{path.name} is not a readable MATLAB file: {quoted(str(error))}") from error
     for name in EMPS_VARIABLES:
         if name not in variables:
             raise DataError(f"{path.name}: variable '{name}' is missing, {', '.join(EMPS_VARIABLES)} are expected")
@@ -164,7 +164,7 @@ def import_dfki(folder: str | Path, out: str | Path, holdout: str | None = None)
     gear^2 J_rotor. folder: where ddp_measured.csv and direct_collocation_measured.csv are. holdout: None: both train.
     """
     if holdout is not None and holdout not in DFKI_RECORDS:
-        raise DataError(f"holdout '{holdout}' is no record of the set, {nearest(holdout, DFKI_RECORDS)}")
+        raise DataError(f"holdout '{holdout}' is not a record of the set, {nearest(holdout, DFKI_RECORDS)}")
     tables = {f"{name}.csv": read_dfki(Path(folder), f"{name}_measured.csv") for name in DFKI_RECORDS}
     mass_moment, reflected = (POINT_MASS + ROD_MASS / 2) * LENGTH, ROTOR_INERTIA * GEAR**2
     text = DFKI_CAMPAIGN.format(

@@ -168,7 +168,7 @@ def read_manoeuvre(text: str) -> Manoeuvre:
     try:
         start, target, supply = float(parts[0]), float(parts[1]), float(parts[3])
     except ValueError:
-        raise RefusalError(f"the manoeuvre {text!r} holds an angle or voltage that is no number") from None
+        raise RefusalError(f"the manoeuvre {text!r} holds an angle or voltage that is not a number") from None
     return Manoeuvre(name, start, target, parts[2] == "shell", supply)
 
 

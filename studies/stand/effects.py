@@ -152,7 +152,7 @@ class Effects:
 
 
 def read_effects(words: Iterable[str]) -> Effects:
-    """Read effects written as NAME=SIZE; a name may come once. Raises RefusalError when a word is no effect."""
+    """Read effects written as NAME=SIZE; a name may come once. Raises RefusalError when a word is not an effect."""
     known = {each.name for each in fields(Effects)}
     sizes: dict[str, float] = {}
     for word in words:

@@ -219,7 +219,9 @@ def _make_families(options: argparse.Namespace) -> str:
     for text in options.families:
         family, _, count = text.partition("=")
         if family not in FAMILIES or not count.isdecimal():
-            raise RefusalError(f"{text!r} is no FAMILY=N: one of {', '.join(FAMILIES)} with a whole number is expected")
+            raise RefusalError(
+                f"{text!r} is not a FAMILY=N: one of {', '.join(FAMILIES)} with a whole number is expected"
+            )
         wanted.append((family, int(count)))
     # In turn, so that a study that is cut short has seen all families alike.
     parts = [((index + 0.5) / count, family, index) for family, count in wanted for index in range(count)]

@@ -118,7 +118,7 @@ def test_a_share_is_the_convergence_test_of_more_and_wild():
     shares = remaining_share(values, first, best)
     for tau in (0.5, 0.1, 0.01):
         assert ((shares <= tau) == (values <= best + tau * (first - best))).all()
-    # a start that is the best already counts only what reaches it; no start is no progress
+    # a start that is the best already counts only what reaches it; no start is not progress
     assert remaining_share(np.array([2.0, 1.0]), 1.0, 1.0).tolist() == [np.inf, 0.0]
     assert remaining_share(np.array([2.0]), np.nan, 1.0).tolist() == [np.inf]
 

@@ -99,8 +99,8 @@ TOLD = {
     "no return": (nothing_returned, "the equation nothing_returned returns nothing: a number is expected"),
     "default": (odd_default, "the equation odd_default has the default {'a': 1.0}: a number is expected"),
     "no source": (typed["typed_in"], "the source of the equation typed_in cannot be read: define it in a file"),
-    "partial": (functools.partial(plain), "is no plain Python function: write it as a def"),
-    "method": (Owner().method, "the equation Owner.method is no plain Python function: write it as a def"),
+    "partial": (functools.partial(plain), "is not a plain Python function: write it as a def"),
+    "method": (Owner().method, "the equation Owner.method is not a plain Python function: write it as a def"),
 }
 COMPILED = {
     "arrays": (of_arrays, r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),

@@ -202,7 +202,7 @@ def test_what_is_no_delay():
     np.testing.assert_array_equal(run.output[0], simulate(Model(AXIS), manoeuvre, [MASS]).output[0])
     np.testing.assert_array_equal(run.output[0], run.output[1])
     assert run.failed.tolist() == [False, False, True]
-    with pytest.raises(ArmidError, match="delays 'late' by 'wait', which is no parameter of it"):
+    with pytest.raises(ArmidError, match="delays 'late' by 'wait', which is not a parameter of it"):
         replace(EFFECTS["output_delay"], delays=(Delay("late", way, "wait"),))
     strengths = Parameter("level", "effort", 0, 9, null=0.0), Parameter("wait", "s", 0, 1, null=0.0)
     switching = Effect("switching", strengths, {"torque": late_switch}, (), (Guard("on", still, latch=True),),

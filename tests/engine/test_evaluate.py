@@ -35,5 +35,5 @@ def test_quantities_and_latches_agree_with_one_moment_at_a_time(arm):
 
 
 def test_an_unknown_name_is_refused_with_the_nearest(arm):
-    with pytest.raises(ArmidError, match=r"'curent' is no name of plant 'shell_transfer_arm'.*current"):
+    with pytest.raises(ArmidError, match=r"'curent' is not a name of plant 'shell_transfer_arm'.*current"):
         along(arm, Manoeuvre(0.001, 50), TRUTH, Schedule(), ["curent"])

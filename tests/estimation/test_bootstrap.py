@@ -1,4 +1,4 @@
-"""Intervals of a fitness that is no sum of squares: the scatter of its own estimates over draws of the noise."""
+"""Intervals of a fitness that is not a sum of squares: the scatter of its own estimates over draws of the noise."""
 
 from dataclasses import replace
 

@@ -114,7 +114,7 @@ def test_what_probes_elsewhere_lose_in_the_engine_hides_no_misfit(lowering_repla
     assert level.from_residual
     coarse = tuple(r.changed(calibrations=off) for r in lowering_found.train_replays)
     assert not any("the engine is off" in text for text in remarks(replace(lowering_found, train_replays=coarse)))
-    # where the engine itself is off at the estimate, what it leaves is no misfit
+    # where the engine itself is off at the estimate, what it leaves is not misfit
     rough = tuple(replace(c, schedule=Schedule(1, refinement=1)) for c in replay.calibrations)
     wrong = with_noise(replay, 1e-9).changed(calibrations=rough)
     clean = wrong.measuring(replay.signal(TRUTH[np.newaxis])[0])

@@ -1,4 +1,4 @@
-"""What identification makes of a dead time: its value, its interval, its derivative, and that it is no lag."""
+"""What identification makes of a dead time: its value, its interval, its derivative, and that it is not a lag."""
 
 import warnings
 from pathlib import Path

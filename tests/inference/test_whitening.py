@@ -1,4 +1,4 @@
-"""The filter that makes noise white, against what autoregressions are known to do; when a residual is no noise."""
+"""The filter that makes noise white, against what autoregressions are known to do; when a residual is not noise."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -24,7 +24,7 @@ LATE, DRIFT = Hypothesis("record", "late@a.csv"), Hypothesis("drift", "mass")
 
 
 def posterior(*sets):
-    """Return a posterior of some sets, (names of effects, probability) each; kind:name where it is no effect."""
+    """Return a posterior of some sets, (names of effects, probability) each; kind:name where it is not an effect."""
 
     def named(word):
         kind, colon, name = word.partition(":")
@@ -163,7 +163,7 @@ def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_lim
     assert (only.effect, only.port, only.claimed, only.empirical) == ("viscous", "torque, inertia", claimed, False)
     assert only.probability == pytest.approx(p)
     assert only.alternatives == (("coulomb",) if p < 0.99 else ())
-    # a model of faults alone is no step
+    # a model of faults alone is not a step
     assert steps_of(inference, [frozenset(), frozenset({LATE})], [None, after]) == ()
 
 

@@ -104,7 +104,7 @@ def with_state(rate: Callable[..., float], start: Callable[..., float]) -> Effec
 
 def test_a_comment_may_stand_at_the_margin() -> None:
     def torque(omega, level):
-        # it is no part of the indentation
+        # it is not part of the indentation
         return -level * omega
 
     assert "e__torque" in (Model(ARM) + Effect("e", LEVEL, {"torque": torque})).graph.nodes
@@ -154,9 +154,9 @@ DECLARED = {
     "guard twice": (lambda: Effect("e", LEVEL, {"torque": zero}, guards=(Guard("level", zero, latch=True),)),
                     "effect 'e' declares 'level' twice"),
     "reserved": (lambda: Effect("rate", LEVEL, {"torque": zero}), "effect 'rate' cannot have this name: rate"),
-    "effect's name": (lambda: Effect("my effect", LEVEL, {"torque": zero}), "effect 'my effect' is no usable name"),
-    "state's name": (lambda: State("a-b", "1", zero, zero), "state 'a-b' is no usable name: letters, digits and"),
-    "guard's name": (lambda: Guard("", zero), "guard '' is no usable name"),
+    "effect's name": (lambda: Effect("my effect", LEVEL, {"torque": zero}), "effect 'my effect' is not a usable name"),
+    "state's name": (lambda: State("a-b", "1", zero, zero), "state 'a-b' is not a usable name: letters, digits and"),
+    "guard's name": (lambda: Guard("", zero), "guard '' is not a usable name"),
     "constant twice": (lambda: replace(AXIS, constants=(*AXIS.constants, Constant("v", 1.0, "1"))),
                        "plant 'driven_axis' declares 'v' twice"),
     "output": (lambda: replace(AXIS, output="recorded_sped"), "plant 'driven_axis' records 'recorded_sped': did you"),
@@ -169,10 +169,10 @@ DECLARED = {
                             "effect 'e' calls something else 'torque', as a port to which it adds"),
     "unit of scales with a space": (
         lambda: (Model(AXIS) + Effect("e", (Parameter("c", "effort / speed", 0.0, 1.0),), {"torque": zero})).parameters,
-        "unit 'effort / speed' is no product of scales: words joined by"),
+        "unit 'effort / speed' is not a product of scales: words joined by"),
     "alias": (lambda: replace(AXIS, aliases={"omega": "w"}), "plant 'driven_axis' has the alias 'omega' for 'w': "),
     "alias twice": (lambda: replace(AXIS, aliases={"q": "v"}), "plant 'driven_axis' declares 'q' twice"),
-    "name": (lambda: replace(AXIS, quantities={"a__b": zero}), "quantity, port or alias 'a__b' is no usable name"),
+    "name": (lambda: replace(AXIS, quantities={"a__b": zero}), "quantity, port or alias 'a__b' is not a usable name"),
     "port": (lambda: replace(AXIS, ports={"time": "s"}), "quantity, port or alias 'time' cannot have this name"),
     "circle": (circle, "the equations run in a circle: a -> b -> c -> a; use a state or an earlier"),
     "unknown": (unknown, "plant 'driven_axis', quantity 'drive_effort', asks for 'voltage', which"),

@@ -105,7 +105,7 @@ def test_names() -> None:
     for name in ("p0", "eta3", "h", "np", "abs", "I6_loaded", "match"):
         check_name(name, "parameter")
     for name in ("a b", "2a", "lambda", "a__b", "_a", "a_", "", "a.b"):
-        with pytest.raises(ArmidError, match=f"^parameter '{name}' is no usable name"):
+        with pytest.raises(ArmidError, match=f"^parameter '{name}' is not a usable name"):
             Parameter(name, "1", 0.0, 1.0)
     with pytest.raises(ArmidError, match="state 'time' cannot have this name: in the equations, time is"):
         check_name("time", "state")

@@ -39,7 +39,7 @@ def test_its_sum_of_squares_is_the_fitness(several, arm_space, X, name):
     fitness = FITNESS[name]
     problem = IdentificationProblem(arm_space, several, fitness)
     if fitness.weigh is None:
-        with pytest.raises(ArmidError, match=f"'{name}' is no sum of squares, least squares expects rmse or like"):
+        with pytest.raises(ArmidError, match=f"'{name}' is not a sum of squares, least squares expects rmse or like"):
             problem.evaluated(X, True)
         return
     values, vectors = problem.evaluated(X, True)

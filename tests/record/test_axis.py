@@ -207,7 +207,7 @@ def test_irregular_times_keep_switch_and_force_apart(write, axis_columns):
 
 @pytest.mark.parametrize("noise", [1e-3, 0.05])
 def test_noise_of_irregular_samples(write, axis_columns, noise):
-    """What moves between uneven samples is no noise."""
+    """What moves between uneven samples is not noise."""
     rng = np.random.default_rng(6)
     times = 0.005 * np.arange(1000) + np.append(0.0, rng.uniform(-1e-3, 1e-3, 999))
     speed = 3.0 * np.sin(9.0 * times) + rng.normal(0.0, noise, 1000)

@@ -101,7 +101,7 @@ def test_a_rest_between_motions_tells_the_noise_where_the_input_is_still_too(rng
     assert np.std(rest) == pytest.approx(0.005, rel=0.2)
     noise = noise_of(rest, measured, INTERVAL)
     assert (noise.source, noise.mean) == ("rest", pytest.approx(0.02, abs=2e-3))
-    # under drive a stick is no rest, an even speed is no standstill, and a still input does not hold a machine
+    # under drive a stick is not a rest, an even speed is not a standstill, and a still input does not hold a machine
     assert rest_between(measured, np.zeros(3000, dtype=bool), True).size == 0
     assert rest_between(measured + 1.0, still, True).size == 0
     assert rest_between(3.0 * np.sin(np.arange(3000) / 40.0), still, True).size == 0

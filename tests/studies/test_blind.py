@@ -190,8 +190,8 @@ REFUSED = [
     (main, ["file", "--seed", "1"], "is a file"),
     (main, ["full", "--seed", "1"], "give --force"),
     (main, ["full", "--seed", "1", "--force"], "holds mine.txt"),
-    (families.main, ["made", "falt=1", "--seed", "1"], "families: 'falt=1' is no FAMILY=N: one of control, fault"),
-    (families.main, ["made", "fault=x", "--seed", "1"], "'fault=x' is no FAMILY=N"),
+    (families.main, ["made", "falt=1", "--seed", "1"], "families: 'falt=1' is not a FAMILY=N: one of control, fault"),
+    (families.main, ["made", "fault=x", "--seed", "1"], "'fault=x' is not a FAMILY=N"),
     (families.main, ["made", "fault=1", "--seed", "-1"], "seed must be 0"),
     (families.main, ["made", "fault=1", "--seed", "1", "--suite", "none.toml"], "none.toml cannot be read"),
 ]

@@ -225,7 +225,7 @@ def test_the_tables_agree_with_the_judgements(suite):
     assert bias.loc[("matching", "all"), "after"] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("key", "words"), [("{", "is no JSON"), ("{}", "'campaigns' of"), (None, "cannot be read")])
+@pytest.mark.parametrize(("key", "words"), [("{", "is not JSON"), ("{}", "'campaigns' of"), (None, "cannot be read")])
 def test_a_key_that_is_none_is_refused_with_one_sentence(key, words, tmp_path, capsys):
     if key is not None:
         (tmp_path / "key.json").write_text(key)

@@ -185,7 +185,7 @@ def test_a_campaign_without_a_report_is_missing(suite: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"), [("{", "is no JSON"), ("{}", "is no report of a closed loop"), ("[]", "is no report")]
+    ("text", "sentence"), [("{", "is not JSON"), ("{}", "is not a report of a closed loop"), ("[]", "is not a report")]
 )
 def test_refuses_what_is_no_report(text: str, sentence: str, suite: Path) -> None:
     (suite.with_name("results") / "c001" / "report.json").write_text(text)

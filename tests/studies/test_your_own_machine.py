@@ -89,7 +89,7 @@ def test_a_late_voltage_is_no_late_torque(folder, plugin):
 def test_what_is_read(folder, plugin):
     campaign = read_campaign(folder / "campaign", load_registry([plugin]).plants)
     assert [len(campaign.train), len(campaign.holdout)] == [4, 2]
-    # what the plant declares stays, and so does its first input, which is no force
+    # what the plant declares stays, and so does its first input, which is not a force
     assert (campaign.plant.scales.effort, campaign.plant.scales.speed) == (15.0, 4.0)
     gains = {r.file: (r.constants["kp"], r.constants["kd"]) for r in campaign.records}
     assert gains["stiff.csv"] == (90.0, 3.0)

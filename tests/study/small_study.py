@@ -95,7 +95,7 @@ class writes(Bad):
     def misbehave(self):
         for descriptor in range(3, 64):
             try:
-                os.write(descriptor, b"\\x00\\x00\\x00\\x20what is no message at all .....")
+                os.write(descriptor, b"\\x00\\x00\\x00\\x20what is not a message at all .....")
             except OSError:
                 pass
 

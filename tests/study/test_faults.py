@@ -156,7 +156,7 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
         "leaves": "SystemExit: 3",
         "segfaults": "the worker process ended by SIGSEGV, 2 times",
         "interrupts": "the worker process ended with code 130, 2 times",
-        "writes": "what came from the worker process is no message of ours",
+        "writes": "what came from the worker process is not a message of ours",
     }
     fail_alone(write_study, tmp_path / "out", bad_identifiers, undisturbed, errors)
 

@@ -103,7 +103,7 @@ def test_some_campaigns_only(write):
 @pytest.mark.parametrize(
     ("more", "sentence"),
     [
-        ('only = ["c002"]\n', "key 'only' holds 'c002', which is no campaign of 'suite', did you mean 'c00"),
+        ('only = ["c002"]\n', "key 'only' holds 'c002', which is not a campaign of 'suite', did you mean 'c00"),
         ('without = ["tillt"]\n', "effect 'tillt' is unknown, did you mean 'tilt'?"),
         ('report = "blnd"\n', "report 'blnd' is unknown, did you mean 'blind'?"),
         ('kind = "close_lop"\n', "kind 'close_lop' is unknown, did you mean 'close_loop'?"),

@@ -96,7 +96,7 @@ def test_a_file_of_another_program_is_left_alone(tmp_path, content):
         file.write_bytes(content)
     before = file.read_bytes()
     for use in (Store, load_study):
-        with pytest.raises(ArmidError, match="is no store of a study"):
+        with pytest.raises(ArmidError, match="is not a store of a study"):
             use(tmp_path)
     assert file.read_bytes() == before
 

@@ -61,7 +61,7 @@ REFUSED = [
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nlabel = "random"',
      "label 'random' stands for identifiers of other name or options"),
     ('name = "small"', 'name = "../small"', "key 'name' is '../small', a plain name"),
-    ('name = "small"', "name = ", "small.toml is no valid TOML"),
+    ('name = "small"', "name = ", "small.toml is not valid TOML"),
     ('[[cases]]\nname = "row 5"', 'campaign = "c"\n[[cases]]\nname = "row 5"',
      "manoeuvres to simulate or a campaign to read is expected, both are given"),
     ("duration_s = 0.3 }]", 'duration_s = 0.3, role = "holdout" }]', "no manoeuvre has the role 'train'"),
@@ -121,5 +121,5 @@ def test_a_path_that_is_no_utf_8_is_refused(refused, write_study, tmp_path, monk
     folder.mkdir()
     shutil.move(write_study(more=BOX), folder)
     sentence = refused("study", folder / "small.toml", "--out", "out", "--quiet")
-    assert sentence.startswith(r"armid: 'm\udce9s/small.toml' is no name in UTF-8")
+    assert sentence.startswith(r"armid: 'm\udce9s/small.toml' is not a name in UTF-8")
     assert not Path("out").exists()

@@ -51,7 +51,7 @@ def check_command(thing: str, on: str | None, time_limit: float, plugins: tuple[
     registry = load_registry(plugins)
     if on is not None:
         if on not in registry.plants:
-            raise ArmidError(f"--on '{on}' is no plant: {nearest(on, registry.plants)}")
+            raise ArmidError(f"--on '{on}' is not a plant: {nearest(on, registry.plants)}")
         registry.plants = {on: registry.plants[on]}
     kind, name, points = points_of(thing, registry)
     tell_points(f"{kind}: {name}", limited(points, time_limit), kind=kind, name=name)
@@ -127,7 +127,7 @@ def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
     """Measure speed, error and memory, with the programs in studies/bench of the repository.
 
     The engine against scipy and a plain loop, in one run, every ratio in one table: times in microseconds a
-    simulation, errors in rad/s, memory in MB beside what the results themselves take.
+    simulation, errors in rad/s, memory in MB without what the results themselves take.
     """
     load_registry(plugins)
     rows = of_studies("bench.run").run_bench(quick=quick)
@@ -155,7 +155,7 @@ def doctor_command() -> None:
 
 
 def doctor_points() -> "Iterator[ContractPoint]":
-    """Yield each point when it is done; what fails is told with its reason, and the rest is still tried."""
+    """Yield each point when it is done; a failure is reported with its reason, and the rest is still tried."""
     from armid.contract.trials import ContractPoint
 
     for name, work in POINTS.items():

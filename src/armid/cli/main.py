@@ -73,7 +73,7 @@ def app() -> None:
     name says otherwise. Every command takes --json (one object on the standard output) and --quiet.
 
     Exit codes: 0 done, whatever was found; 1 a point of a contract does not hold (`armid check`, `armid doctor`); 2 bad
-    input, told in one sentence, nothing half-written; 130 interrupted by Ctrl-C or SIGTERM, what was
+    input, explained in one sentence, nothing half-written; 130 interrupted by Ctrl-C or SIGTERM, what was
     found so far is kept.
     """
 
@@ -93,7 +93,7 @@ def main(arguments: list[str] | None = None) -> None:
     LOG.setLevel("INFO")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # a path that is no UTF-8 is shown, not a reason to fail
+            # a path that is not UTF-8 is shown, not a reason to fail
             stream.reconfigure(errors="backslashreplace")
     try:
         end_on_request()
@@ -109,7 +109,7 @@ def main(arguments: list[str] | None = None) -> None:
     except UnicodeEncodeError as error:
         # alone, or between the quotes of what was to be written
         name = error.object[: error.end].rpartition('"')[2] + error.object[error.end :].partition('"')[0]
-        stop(f"{name!a} is no name in UTF-8, such a one is expected", BAD_INPUT)
+        stop(f"{name!a} is not a name in UTF-8, such a one is expected", BAD_INPUT)
     except MemoryError as error:
         stop(f"not enough memory: {error}; a smaller population, fewer records or shorter ones are expected", BAD_INPUT)
     except (Exception, SystemExit) as error:

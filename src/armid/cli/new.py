@@ -25,7 +25,7 @@ from armid.report.result import NewFiles
 
 CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifiers", "plant": "plants",
               "analysis": "analyses"}  # fmt: skip
-# Kind and --style -> the template that stands for the kind's own.
+# Kind and --style -> the template that replaces the kind's own.
 STYLES = {("identifier", "function"): "identifier_function"}
 CAMPAIGN, STUDY = "campaign", "study"
 KINDS = (*CATALOGUES, CAMPAIGN, STUDY)
@@ -147,7 +147,7 @@ def check_new_name(kind: str, name: str, taken: Collection[str], template: str) 
     """Refuse a name that a starting file could not have; taken: names of the same kind that are registered."""
     if kind in FILES:
         if not FOLDER_NAME.fullmatch(name) or name.endswith("."):
-            raise ArmidError(f"{kind} '{name}' is no usable name: letters, digits, '_', '-' and '.' are expected")
+            raise ArmidError(f"{kind} '{name}' is not a usable name: letters, digits, '_', '-' and '.' are expected")
         return
     check_name(name, kind)
     if name in taken or (kind == "effect" and name in RESERVED):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armid.report.document import Document
 
 
-# Programs of the repository, beside the package.
+# Programs of the repository that the package does not ship.
 STUDIES = Path(__file__).parents[3] / "studies"
 
 
@@ -95,7 +95,7 @@ def speaks() -> bool:
 
 @contextmanager
 def while_read(stream: TextIO) -> Iterator[None]:
-    """Print for as long as someone reads: the work goes on after `| head -1`, and what is said then goes nowhere."""
+    """Print for as long as someone reads: the work goes on after `| head -1`, and further lines go nowhere."""
     try:
         yield
     except OSError as error:
@@ -107,7 +107,7 @@ def while_read(stream: TextIO) -> Iterator[None]:
 
 
 def say(*lines: str) -> None:
-    """Print lines as soon as they are said, unless --json or --quiet was given."""
+    """Print lines at once, unless --json or --quiet was given."""
     if speaks():
         put(*lines)
 
@@ -135,7 +135,7 @@ def give(**found: Any) -> None:
 
 
 def tell(text: str) -> None:
-    """Print a line beside the output, whose first line is the answer."""
+    """Print a line on stderr: the first line of the output is the answer."""
     with while_read(sys.stderr):
         print(printable(text), file=sys.stderr, flush=True)
 
@@ -224,7 +224,7 @@ def number(text: str, option: str) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise ArmidError(f"{option}: '{text}' is no number: one is expected, SI") from error
+        raise ArmidError(f"{option}: '{text}' is not a number: one is expected, SI") from error
 
 
 def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> dict[str, str]:

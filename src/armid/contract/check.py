@@ -115,7 +115,11 @@ def check_fitness(fitness: Fitness) -> list[ContractPoint]:
         ("finite", np.isfinite(values).all(), f"values {np.array2string(values, precision=3)}"),
         ("least at a perfect match", np.argmin(values) == 0, f"{values[0]:.3g} at the measured series"),
         ("a failed candidate is worst", failed[-1] > values.max(), f"{failed[-1]:.3g} for a NaN row"),
-        ("others untouched", apart, "alone, and beside a failed one, a candidate is compared with itself"),
+        (
+            "others untouched",
+            apart,
+            "compared: a candidate alone, and next to a failed one",
+        ),
         ("leaves its arguments alone", untouched, text),
         ("deterministic", np.array_equal(values, again), "a second call is compared with the first"),
     ]

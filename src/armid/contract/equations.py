@@ -56,7 +56,7 @@ def plant_points(model: Model) -> Iterator[ContractPoint]:
     is_printed = all(o.signal in str(model) for o in plant.outputs)
     yield ContractPoint("printed", is_printed, "print(model) shows its equations")
     if is_late_as_a_whole(plant):
-        text = ("a part of drive_effort follows the motion: a late voltage is told as a late drive and another "
+        text = ("a part of drive_effort follows the motion: a late voltage acts as a late drive and another "
                 "inertia; name what drives the motor `voltage` and add a port `winding` [V] to it")  # fmt: skip
         yield ContractPoint("late drive", True, text)
     used = f"all of {len(plant.guards)} guards are used"
@@ -74,7 +74,7 @@ def plant_points(model: Model) -> Iterator[ContractPoint]:
 def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS, strict: bool = False) -> Iterator[ContractPoint]:
     """Try an effect, in each of its forms, on every plant that offers its ports; yield each point when it is done.
 
-    strict: a function without a docstring fails; otherwise that is only said.
+    strict: a function without a docstring fails; otherwise it is only reported.
     """
     yield from (point for _, point in check_effects([effect], plants, strict))
 

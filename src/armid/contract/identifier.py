@@ -141,7 +141,7 @@ def disturbed(noise: int) -> Iterator[None]:
 
 
 def difference(one: Meter, other: Meter) -> str:
-    """Return from which candidate on two runs differ, in words, "" where they asked and were told the same."""
+    """Return from which candidate on two runs differ, in words, "" where requests and answers were the same."""
     a, b = one.log(), other.log()
     n = min(len(a.F), len(b.F))
     alike = (a.X[:n] == b.X[:n]).all(axis=1) & (a.F[:n] == b.F[:n]) if n else np.ones(0, np.bool_)

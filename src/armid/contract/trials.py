@@ -88,7 +88,7 @@ def corners(model: Model, effect: Effect) -> Array:
 
 
 def strengths_of(effect: Effect) -> list[Parameter]:
-    """Return the parameters with a null value; one that is fixed by declaration is none, as nothing is found by it."""
+    """Return the parameters with a null value that no declaration fixes."""
     return [p for p in effect.parameters if p.null is not None and p.fixed is None]
 
 

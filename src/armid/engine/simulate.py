@@ -252,7 +252,8 @@ def along(
     keys = {name: flat(model.plant.aliases.get(name, name)) for name in names}
     for name, key in keys.items():
         if key not in model.graph.nodes:
-            raise ArmidError(f"'{name}' is no name of plant '{model.plant.name}': {nearest(name, model.graph.nodes)}")
+            raise ArmidError(f"'{name}' is not a name of plant '{model.plant.name}': "
+                             f"{nearest(name, model.graph.nodes)}")  # fmt: skip
     values = model.graph.values(keys.values(), values)
     return {
         name: np.broadcast_to(np.asarray(values[key], dtype=float), times.shape).copy() for name, key in keys.items()

@@ -3,7 +3,7 @@
 identify        search the free parameters, judge the best candidate on train and holdout
 least_squares   the least-squares problem, its Jacobian, Levenberg-Marquardt, starts
 information     sensitivities, Fisher information, intervals
-noise_model     the noise of a record as fits take it: white, coloured, or told by the residual
+noise_model     the noise of a record as fits take it: white, coloured, or learnt from the residual
 bootstrap       intervals of a fitness that is not a sum of squares
 constants       constants within tolerances: what they do to the records, what they leave undetermined
 profile         profile likelihood

@@ -28,7 +28,7 @@ THRESHOLD = 6.0
 N_DRAWS, N_REFIT_DRAWS = 512, 4
 # So many fits all simulations may take; it decides how many manoeuvres are simulated, but not below the fewest.
 MOST_FITS, FEWEST = 160, 4
-# Rivals that a manoeuvre tells apart no more often than this are not said to be separated by it.
+# Rivals that a manoeuvre tells apart no more often than this are not listed as separated by it.
 OFTEN = 0.5
 TOLERANCE = 1e-5
 
@@ -51,7 +51,7 @@ class Advice:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A fitted model that others cannot be told from.
+    """A fitted model with rivals that the records cannot separate.
 
     z: its estimate, shares of the range, (n_free,). criterion: what the loop judges it by, smaller is better;
     differences are those of chi2 plus what parameters cost. trust: what a sample counts, below 1 where more than noise
@@ -104,7 +104,7 @@ def advise(
     Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
     """
     if len(rivals) < 2:
-        raise ArmidError(f"{len(rivals)} model was given to be told apart from others: at least two are expected")
+        raise ArmidError(f"{len(rivals)} model was given: at least two, to be told apart, are expected")
     first = rivals[0].records
     grid = grid or manoeuvre_grid(first.model, [r.record for r in first.replays])
     predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)

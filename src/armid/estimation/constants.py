@@ -22,7 +22,7 @@ STEP = 1e-4
 ONE, NOTHING = 1e-6, 1e-7
 # Combinations of relative changes that move the signal by less than this share of what each alone does are not seen.
 UNSEEN = 1e-5
-# Exponents are told as they are where they are whole within this.
+# Exponents within this of a whole number are written as whole.
 WHOLE = 0.02
 NAMED = "constant:"
 

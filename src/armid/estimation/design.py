@@ -25,13 +25,13 @@ VOLUME, WORST, SHRINKAGE = "volume", "worst", "shrinkage"
 N_PLACES, MARGIN, APART = 6, 0.05, 0.15
 # A place is rounded by at most this share of the range.
 ROUGHEST = 0.02
-# Part of its largest recorded value to which another key is turned down (a supply); up is not said to be safe.
+# Part of its largest recorded value to which another key is turned down (a supply); a higher one may be unsafe.
 TURNED_DOWN, MOST_LEVELS = 0.85, 3
 # What is done to recorded inputs: size, and how many times as fast.
 SIZES, PACES = (1.0, -1.0, 0.5, -0.5), (1.0, 2.0, 0.5)
 # How much finer than the records asked for time is cut: a manoeuvre that nobody calibrated may be stiffer.
 FINER = 2
-# A speed below this part of the fastest record's rms is no motion.
+# A speed below this part of the fastest record's rms is not motion.
 MOVES = 0.05
 # States of a machine that is driven by inputs may range this much wider than in its records.
 WIDER = 1.05

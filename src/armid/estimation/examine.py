@@ -27,7 +27,7 @@ LEAST_NOISE = 1e-15
 Members = tuple[int, ...]
 # From here on a group is reported; Brun et al. call indices above 10 to 15 poorly identifiable.
 CRITICAL = 10.0
-# A group explains the collinearity of a larger set when its index comes to this share of the set's.
+# A group explains the collinearity of a larger set when its index reaches this share of the set's.
 EXPLAINS = 0.5
 # Above this number of parameters only groups of up to so many members are tried, or all of them.
 MOST_TRIED, LARGEST_TRIED = 12, 4
@@ -49,7 +49,7 @@ class Group:
 def groups(fisher: Array, names: tuple[str, ...]) -> tuple[Group, ...]:
     """Return the groups of parameters that move together, the worst first.
 
-    The smallest set whose index comes to half of that of all parameters is the first group; then the member that does
+    The smallest set whose index reaches half of that of all parameters is the first group; then the member that does
     most harm is taken as known, and the rest is looked at again, until its index is below 10. fisher: in shares
     of the range; a parameter that is not seen at all has a zero row and is in no group.
     """
@@ -84,7 +84,7 @@ def index_of(scaled: Array, members: Members) -> float:
 
 
 def smallest(scaled: Array, among: Members, index: float) -> Members:
-    """Return the smallest set, and of its size the worst, that comes to an index; all where none smaller does."""
+    """Return the smallest set, and of its size the worst, that reaches an index; all where none smaller does."""
     for size in range(2, (len(among) if len(among) <= MOST_TRIED else LARGEST_TRIED) + 1):
         worst = max(combinations(among, size), key=lambda members: index_of(scaled, members))
         if index_of(scaled, worst) >= index:

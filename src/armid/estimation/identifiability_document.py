@@ -35,7 +35,7 @@ PACKAGES = ("armid", "numpy", "scipy", "numba")
 MOST_OFFERS, MOST_COLUMNS, MOST_NAMED = 8, 5, 6
 # The point that was given is away from the minimum when a step there is more standard deviations than this.
 AWAY = 1.0
-# The noise of a measured start is told of when it widens an interval by more than this factor.
+# The noise of a measured start is reported when it widens an interval by more than this factor.
 WIDENS = 1.2
 FIGURES = {
     "profiles": ("Profile likelihood", "Rise of chi2 when one parameter is held and the others are fitted again. A "
@@ -120,7 +120,7 @@ def profile_text(profile: Mapping[str, Any], factor: float) -> str:
 
 
 def deviation_text(name: str, p: Mapping[str, Any], deviation: float | None) -> str:
-    """Return a standard deviation: in percent of a value that is no addition, else in its unit; p: stored parameter."""
+    """Return a standard deviation in percent of a value, of an addition in its unit; p: stored parameter."""
     if deviation is None or not np.isfinite(deviation):
         return "not determined"
     if "." not in name and abs(p["value"]) > 1e-3 * (p["bound_high"] - p["bound_low"]):
@@ -391,9 +391,9 @@ def view(profile: Profile) -> tuple[float, float]:
 
 
 def sensitivity_figure(found: Examination) -> Any:
-    """Draw correlations, which record tells of which parameter, and the sensitivities of the records that tell most.
+    """Draw correlations, the information of each record, and the sensitivities of the most informative records.
 
-    With one record its sensitivities stand beside the correlations.
+    With one record its sensitivities are drawn next to the correlations.
     """
     weights = level_weights(found.information.levels)
     # d signal / d parameter of each record in units of its level, (n_samples, n_free) each

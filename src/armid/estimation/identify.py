@@ -84,7 +84,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class JointErrors(Errors):
-    """Errors of the plant's first output, NaN where no record holds it, beside those of each output.
+    """Errors of the plant's first output, NaN where no record holds it, and the errors of each output.
 
     joint_nrmse: root of the mean square, over the outputs, of rmse over span.
     """

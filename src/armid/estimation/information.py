@@ -14,9 +14,9 @@ from armid.problem.problem import Replay, by_record
 from armid.problem.space import Space
 
 NORMAL_95 = 1.959963984540054
-# Directions whose information is below this share of the strongest cannot be told from nothing.
+# Directions whose information is below this share of the strongest is rounding.
 SINGULAR = 1e-13
-# Parameters of a larger correlation than this cannot be told apart well.
+# Parameters of a larger correlation than this are hardly separated.
 CORRELATED = 0.95
 
 
@@ -91,7 +91,7 @@ def information_of(
 
     trust: 1 for each sample whose residual is noise, below it where the residual is larger, (n_samples,). doubts: what
     one standard deviation of each further unknown does to the weighted signal, (n_samples, n_doubts); the estimate is
-    then one of all together. weighed: what each square weighs in the estimate beside its weight here, (n_samples,);
+    then one of all together. weighed: what each square weighs in the estimate, times its weight here, (n_samples,);
     None: all alike.
     """
     residual, jacobian = records.residual_and_slopes(z)
@@ -192,7 +192,7 @@ def normalised(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def collinear(information: Information) -> list[tuple[str, str, float]]:
-    """Return the pairs of parameters that cannot be told apart well, strongest first: names and correlation."""
+    """Return the pairs of parameters that the records hardly separate, strongest first: names and correlation."""
     names, correlation = information.names, information.correlation
     pairs = [(names[i], names[j], float(correlation[i, j])) for i in range(len(names)) for j in range(i)]
     return sorted((pair for pair in pairs if abs(pair[2]) > CORRELATED), key=lambda pair: -abs(pair[2]))

@@ -195,7 +195,7 @@ def estimate(replays: tuple[Replay, ...], space: Space, weights: Sequence[float]
     Parameters
     ----------
     replays, space, weights
-        As of `refine`.
+        See `refine`.
 
     Returns
     -------
@@ -247,7 +247,7 @@ def spread_starts(records: LeastSquaresProblem) -> list[Array]:
 
 
 MOST_STEPS = 50
-# Dampings that are tried beside the last that was best, as factors of it; where none helps, all are raised so much.
+# Dampings that are tried, as factors of the last best one; where no step helps, all are raised so much.
 LADDER, RAISED = (1e-3, 0.1, 1.0, 10.0), 1e3
 FIRST, LEAST, LARGEST = 1e-3, 1e-9, 1e6
 # Two starts that have come this close to each other, in shares of the range, are one.

@@ -218,8 +218,8 @@ def with_input(piece: Piece, name: str, factor: float) -> Piece:
 def moved(record: Record, seconds: float) -> Record:
     """Return a record whose measured signals come earlier by some time (later where negative); what is lost goes.
 
-    Where inputs drive the machine they come later instead, so that its measured start stays where it is. A piece of
-    which hardly anything would be left stays as it is.
+    Where inputs drive the machine they come later instead, so that its measured start stays where it is. A piece that
+    would lose nearly all samples stays as it is.
     """
     shift = round(seconds / record.manoeuvre.interval)
     if record.manoeuvre.inputs:

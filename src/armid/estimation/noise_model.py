@@ -25,10 +25,10 @@ from armid.record.record import NOISE_FREE
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 HIDES_ENGINE = 5e-5
 MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS = 8, 50, 500
-# A mean square of the residual above this many times that of the noise is no noise; below this many errors of the
+# A mean square of the residual above this many times that of the noise is not noise; below this many errors of the
 # engine it is the engine's.
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
-# Chance below which a residual is no noise; independent samples in the blocks whose means are looked at.
+# Chance below which a residual is not noise; independent samples in the blocks whose means are looked at.
 CHANCE, BLOCKS = 1e-3, (8, 32)
 # What is assumed for a record without noise, as a share of its rms speed.
 ASSUMED = 1e-3

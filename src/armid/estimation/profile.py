@@ -18,7 +18,7 @@ AGREE = 0.15
 BETTER, MOST_RESTARTS = 0.01, 5
 # First step along a profile: so many standard deviations, at most this share of the range.
 FIRST_STEP, LONGEST_STEP = 0.5, 0.1
-# The walk ends where the rise comes to this many thresholds: what the figure shows.
+# The walk ends where the rise reaches this many thresholds: what the figure shows.
 SHOWN_TO = 1.7
 # Wanted change of sqrt(rise) from point to point; steps grow and shrink by at most these factors.
 WANTED, GROWTH, SHRINKAGE = 0.45, 2.0, 0.4
@@ -176,7 +176,7 @@ def start_at(points: list[Point], place: float) -> Array:
 
 
 def crossing(held: HeldFit, side: list[Point]) -> tuple[float | None, list[Point]]:
-    """Return where a side comes to the threshold (None: nowhere inside the box), and the points tried to find it.
+    """Return where a side reaches the threshold (None: nowhere inside the box), and the points tried to find it.
 
     Brent's method on the square root of the rise, which is next to straight; where the simulation diverges it is large.
     """

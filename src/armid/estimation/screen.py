@@ -1,4 +1,4 @@
-"""Whether records are what their campaign says: sign, unit, clock, manoeuvre, told before anything is identified.
+"""Whether records are what their campaign says: sign, unit, clock, manoeuvre, before anything is identified.
 
 A wrong header or an exchanged file does not stop a search: parameters follow, and the misfit reads like physics. Here
 the declared model is fitted roughly to the train records; where it misses more than a tenth of a signal, each of a list
@@ -28,20 +28,20 @@ from armid.units import shown
 
 # An error (rms over the rms of the signal) up to this is the business of missing effects, not of this screen.
 TOLERABLE = 0.1
-# What undoing a mistake must leave of the error, and of what it may be told to be one of several.
+# Shares of the error that undoing a mistake may leave, and the ratio of errors up to which mistakes are alternatives.
 MENDED, LEFT, AS_GOOD = 0.4, 0.5, 1.5
 # What is left of the error by a factor of two, which a missing spring or friction can imitate.
 LEFT_BY_TWO = 0.2
 # An error above this, with no candidate of this cosine to the signal: the model explains nothing of it.
 NOTHING, UNLIKE = 0.95, 0.3
-# An error up to this, where the model explains nothing as told, shows an exchange that a missing effect half hides.
+# An error up to this, where the model explains nothing as declared, shows an exchange that a missing effect half hides.
 EXCHANGED = 0.6
 # A record disagrees if its error is APART times that of the others. Errors well below AGREED count as agreement.
 APART, AGREED = 3.0, 0.05
 # Candidates spread over the box, samples of all records together that are looked at, least of one record.
 N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
-# The mends that leave least are fitted once more, as the declared model is: so many, from how many candidates, of which
-# the best so many.
+# The mends that leave least are fitted once more, as the declared model is: how many, from how many candidates, and
+# from how many of the best.
 N_LIKELY, N_HARD, N_BEST = 5, 512, 8
 MOST_VALUES, MOST_APART = 2**24, 6
 # What fits nearly as well is looked for at so many candidates each within these shares of the ranges.
@@ -63,7 +63,7 @@ LONGEST_INTERVAL = 1.0
 FIRST, ELSEWHERE, FAR_OF_MOTION = 3, 10.0, 0.02
 # Successive samples, of so many values, that two recordings do not have in common by chance.
 ALIKE, DIFFERENT = 40, 10
-# Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is no rest.
+# Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is not a rest.
 RESTLESS, LARGE_MEAN = 0.02, 0.2
 
 
@@ -226,7 +226,7 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Ar
     if not all(np.array_equal(getattr(declared, n), getattr(trial.space, n), True) for n in ("low", "high", "fixed")):
         own = Trial(trial.model, declared)
         tried.append((*own.fit(train), BOUNDS, own, tuple(train)))
-    # a poor fit of the declared model is no mistake of the records, and of two mends the better one is named
+    # a poor fit of the declared model is not a mistake of the records, and of two mends the better one is named
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
     starts = [z, *(t[0] for t in likely)]
     z, before = trial.fit_hard(train, starts)
@@ -242,7 +242,7 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Ar
     outside = [train[i] for i in np.argsort(-errors)[:MOST_APART] if errors[i] > max(TOLERABLE, APART * typical)]
     found = exchanged(trial, train, outside, before) or [s for r in outside for s in apart(trial, r, z, typical)]
     if not found and not everywhere and trial.model.plant.from_rest:
-        # a driven machine drifts away from its model for want of friction
+        # a driven machine drifts away from a model without friction
         found = [unlike(r.file, e) for r, e in zip(train, errors, strict=True)
                  if NOTHING < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
     return found or everywhere, z
@@ -325,7 +325,7 @@ def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[Suspic
 def least_nearby(trial: Trial, train: Sequence[Record], record: Record, z: Array) -> float:
     """Return the least error of a held-out record at candidates near by that fit the train records tolerably.
 
-    Where next to nothing decides how a machine moves on, as over the top, what they leave open is no mistake.
+    Where next to nothing decides how a machine moves on, as over the top, what they leave open is not a mistake.
     """
     n = len(z)
     near = np.concatenate([z + r * (2.0 * probes(np.zeros(n), np.ones(n), N_NEAR) - 1.0) for r in NEAR])
@@ -356,12 +356,12 @@ def unlike(file: str, error: float) -> Suspicion:
 
 def beyond(file: str, error: float) -> Suspicion:
     said = (f"{file}: the declared model misses it by {error:.3g} of its signal wherever it fits the train records "
-            "best, and no mistake that was tried explains that: whether a record is wrong cannot be told.")  # fmt: skip
+            "best, and no mistake that was tried explains that: whether a record is wrong stays open.")  # fmt: skip
     return Suspicion("unjudged", file, said)
 
 
 def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[Suspicion]:
-    """Return the two records of which each fits the manoeuvre of the other, none where no exchange mends much."""
+    """Return the two records that each fit the manoeuvre of the other, none where no exchange mends much."""
     tried = []
     for a, b in combinations(outside, 2):
         as_other = {a.file: told_as(b), b.file: told_as(a)}

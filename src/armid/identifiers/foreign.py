@@ -1,4 +1,4 @@
-"""Algorithms of other libraries, each of which calls for values by itself."""
+"""Algorithms of other libraries; each calls for values by itself."""
 
 import random as python_random
 import threading

@@ -22,7 +22,7 @@ OF_PYMOO = (
 )  # fmt: skip
 OF_SETUP = (*OF_PYMOO, "progress")
 
-# What a run decides and no option may: the budget, the seed, and all that pymoo is told when an algorithm is set up.
+# What a run decides and no option may: the budget, the seed, and all that pymoo gets when an algorithm is set up.
 NOT_OPTIONS = (*OF_SETUP, "budget", "self")
 # A share below the rounding of 1 changes nothing.
 SMALLEST_SHARE = 1e-15

@@ -81,7 +81,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Stencil:
-    """The points beside u at which each parameter is perturbed alone, one side first, and how far each is from u."""
+    """The points near u at which each parameter is perturbed alone, one side first, and how far each is from u."""
 
     points: Array
     offsets: Array
@@ -90,7 +90,7 @@ class Stencil:
 def stencil(u: Array, step: float, kind: str) -> Stencil:
     """Return the points at u + step and, when central, u - step; a point that would leave the cube turns inwards.
 
-    A central one at a bound keeps its inner point and takes one twice as far inside beside it.
+    A central one at a bound keeps its inner point and adds one twice as far inside.
     """
     ahead = np.where(u + step <= 1.0, step, -step)
     behind = np.where((u - ahead >= 0.0) & (u - ahead <= 1.0), -ahead, 2.0 * ahead)
@@ -210,7 +210,7 @@ def optimised(search: nlopt.opt, start: Array, calls: Calls) -> None:
         with suppress(*NO_PROGRESS):
             search.optimize(start)
     except SystemError:
-        # BOBYQA, told to stop in a step that it tries once more, returns a result all the same; Python, which finds a
+        # BOBYQA, stopped in a step that it tries once more, returns a result all the same; Python, which finds a
         # result and an error, raises this in place of the error
         if calls.error is None:
             raise

@@ -75,7 +75,7 @@ class SearchAlgorithm(Algorithm):  # type: ignore[misc]
 
     def infill(self) -> Population:
         """Refuse to be asked for a generation."""
-        raise ArmidError("a search of armid runs as a whole, it is not asked and told: minimize() or run() is expected")
+        raise ArmidError("a search of armid has no ask() and tell(): minimize() or run() is expected")
 
     next = infill
 

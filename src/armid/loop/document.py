@@ -1,4 +1,4 @@
-"""The document of a closed loop, and details.json: what of it is stored beside report.json."""
+"""The document of a closed loop, and details.json: what is stored next to report.json."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -61,10 +61,10 @@ from armid.report.result import Parts
 from armid.units import shown
 
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
-# A shift of a parameter by more than this share of its value, and of its interval, is told.
+# A shift of a parameter by more than this share of its value, and of its interval, is listed.
 SHIFTED = 0.01
 MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
-# A manoeuvre that separates rivals with a smaller chance is no advice.
+# A manoeuvre that separates rivals with a smaller chance is not advice.
 WEAK = 0.2
 # Smaller chances than this are all the same.
 LEAST = 1e-12
@@ -76,7 +76,7 @@ FIGURES = {
                    "Open marks are not to be trusted; a dashed line is the true value, where it is known."),
     "motion": ("Measured and simulated motion", "Grey: measured. The coloured lines are the model before and after."),
     "probabilities": ("How probable each is", "Of all models that were fitted: the share of those that hold it. A name "
-                      "counts only where nothing unknown stands beside it."),
+                      "counts only in models without anything unknown."),
     "intervals": ("Each parameter by model", "Values with 95 % intervals by the most probable models, were each true, "
                   "and over all of them."),
     "diagnosis": ("Where the discrepancy is", "Mean square of the residual in units of the noise's, part by part, "
@@ -168,7 +168,7 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     sure = [f"{name} = {value_text(p)}" for name, p in found.items() if p["trusted"]]
     exact = report["taken_as_exact"]
     names = ", ".join(exact[:MOST_EXACT]) + (f" and {len(exact) - MOST_EXACT} more" if exact[MOST_EXACT:] else "")
-    given = f", with {names} taken as exact (no tolerance is told)" if exact else ""
+    given = f", with {names} taken as exact (no tolerance is declared)" if exact else ""
     said = [f"To be trusted{given}: {', '.join(sure)}."] if sure else []
     also = [VERDICTS[word].lower() for word in report["also"]]
     second += f" Also: {', '.join(also)}." if also else ""
@@ -493,7 +493,7 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
     later, said = {e.name: e for e in after.estimates}, []
     for old in before.estimates:
         new = later[old.name]
-        # A bias is told of what is trusted alone: the other may be as wrong as the one before.
+        # Only trusted parameters show a bias: others may be as wrong as before.
         if new.trusted and old.low is not None and abs(old.value - new.value) > SHIFTED * abs(new.value):
             share = (old.value - new.value) / abs(new.value) if new.value else np.inf
             said.append(f"{old.name} was biased by {share:+.2%}: {value_text(old.entry)} before, "

@@ -128,8 +128,8 @@ class Effect:
         for delay in self.delays:
             known = [p.name for p in self.parameters]
             if delay.by not in known:
-                raise ModelError(f"effect '{self.name}' delays '{delay.name}' by '{delay.by}', which is no parameter "
-                                 f"of it: {nearest(delay.by, known)}")  # fmt: skip
+                raise ModelError(f"effect '{self.name}' delays '{delay.name}' by '{delay.by}', which is not a "
+                                 f"parameter of it: {nearest(delay.by, known)}")  # fmt: skip
         if self.exact is not None and self.exact.parameters != self.parameters:
             raise ModelError(f"effect '{self.name}' approximates one with other parameters: the same are expected")
         words = [e.form for e in self.every_form]

@@ -359,7 +359,7 @@ def definition_of(function: Equation) -> ast.FunctionDef:
     """Return the definition, bare of docstring, decorators and annotations; a lambda becomes one `return`."""
     label = getattr(function, "__qualname__", repr(function))
     if not isinstance(function, FunctionType):
-        raise ModelError(f"the equation {label} is no plain Python function: write it as a def")
+        raise ModelError(f"the equation {label} is not a plain Python function: write it as a def")
     try:
         # a comment may stand further out than what it stands in
         source = textwrap.dedent(re.sub(r"(?m)^\s*#.*\n", "", inspect.getsource(function)))
@@ -369,7 +369,7 @@ def definition_of(function: Equation) -> ast.FunctionDef:
         return lambda_definition(function)
     tree = ast.parse(source).body[0]
     if not isinstance(tree, ast.FunctionDef):
-        raise ModelError(f"the equation {label} is no plain Python function: write it as a def")
+        raise ModelError(f"the equation {label} is not a plain Python function: write it as a def")
     body = [s for s in tree.body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
     if not any(isinstance(node, ast.Return) for statement in body for node in ast.walk(statement)):
         raise ModelError(f"the equation {label} returns nothing: a number is expected")

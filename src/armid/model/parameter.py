@@ -16,7 +16,7 @@ def check_name(name: str, what: str) -> None:
     if name == "time":
         raise ModelError(f"{what} 'time' cannot have this name: in the equations, time is the time [s]")
     if not name.isidentifier() or keyword.iskeyword(name) or "__" in name or name != name.strip("_"):
-        raise ModelError(f"{what} '{name}' is no usable name: letters, digits and single underscores are expected")
+        raise ModelError(f"{what} '{name}' is not a usable name: letters, digits and single underscores are expected")
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ def powers_of(unit: str) -> dict[str, int] | None:
     if not re.search(r"effort|speed|inertia", unit):
         return None
     if not re.fullmatch(r"\w+(\^\d)?([*/]\w+(\^\d)?)*", unit):
-        raise ModelError(f"unit '{unit}' is no product of scales: words joined by * and /, such as effort/speed^2, are "
-                         "expected")  # fmt: skip
+        raise ModelError(f"unit '{unit}' is not a product of scales: words joined by * and /, such as effort/speed^2, "
+                         "are expected")  # fmt: skip
     powers: dict[str, int] = {}
     for sign, word, power in re.findall(r"(^|[*/])(\w+)(?:\^(\d))?", unit):
         if word not in WORDS:

@@ -35,7 +35,7 @@ class Fitness:
         function of sum w^2 (x - x')^2 over all samples of all records; None: it has no such form.
     unit: of the finished value; note: what it is, in words. output: the one that it looks at, "" for all, each divided
     by its noise.
-    Raises ArmidError for a function that is none or asks for something unknown, and for an unknown join.
+    Raises ArmidError for a function that is not a fitness or asks for something unknown, and for an unknown join.
     """
 
     name: str
@@ -81,10 +81,10 @@ class Fitness:
     def weight_of(self, noise: float) -> float:
         """Return the weight of a record's residual for a least-squares method.
 
-        noise: rms of the record [signal's unit]. Raises ArmidError when the fitness is no sum of squares.
+        noise: rms of the record [signal's unit]. Raises ArmidError when the fitness is not a sum of squares.
         """
         if self.weigh is None:
-            raise ArmidError(f"fitness '{self.name}' is no sum of squares, least squares expects rmse or likelihood")
+            raise ArmidError(f"fitness '{self.name}' is not a sum of squares, least squares expects rmse or likelihood")
         return self.weigh(noise)
 
 

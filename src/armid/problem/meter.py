@@ -46,11 +46,11 @@ class Trace(NamedTuple):
 
 
 class Meter:
-    """Count simulations against a budget, whoever searches, and remember the best.
+    """Count the simulations of any search against a budget, and remember the best.
 
     budget: number of simulations; target: fitness at which a search may stop (None: it never may).
     A failed candidate counts, but neither it nor a NaN is ever the best.
-    Raises ArmidError for a budget that is no whole number above 0 and for a target that is NaN.
+    Raises ArmidError for a budget that is not a whole number above 0 and for a target that is NaN.
     """
 
     def __init__(self, budget: int, target: float | None = None) -> None:
@@ -209,7 +209,7 @@ class Metered(Problem):  # type: ignore[misc]
         out["F"] = values[:, np.newaxis]
 
     def answered(self, X: Array, residuals: bool = False) -> tuple[Array, Array | None]:
-        """Return what pymoo is told: fitness, (n_candidates,), and residuals if asked; NaN beyond the budget."""
+        """Return what pymoo gets: fitness, (n_candidates,), and residuals if asked; NaN beyond the budget."""
         granted = len(X) if self.meter is None else self.meter.grant(len(X))
         if not granted:
             if self.meter is not None:

@@ -72,7 +72,7 @@ class Replay:
         return replace(self, ready=replace(self.ready, **changes))
 
     def measuring(self, values: Array) -> "Replay":
-        """Return a replay of which other values were measured, (n_samples,)."""
+        """Return a replay with other measured values, (n_samples,)."""
         measured, first = self.record.measured.copy(), 0
         for piece, samples, n in zip(self.pieces, self.record.samples, self.record.lengths, strict=True):
             piece.of(measured)[samples] = values[first : first + n]
@@ -164,7 +164,7 @@ def replays(
     threads : int
         Of each simulation.
     spans : bool
-        As of `armid.calibrate`.
+        See `armid.calibrate`.
 
     Returns
     -------
@@ -232,8 +232,8 @@ class IdentificationProblem(Metered):
     Raises
     ------
     ArmidError
-        No parameter is free, no record is given, or residuals are asked of a fitness that has none, or no record holds
-        the output that the fitness names.
+        No parameter is free, no record is given, residuals are needed and the fitness has none, or no record holds the
+        output that the fitness names.
     """
 
     def __init__(self, space: Space, replays: tuple[Replay, ...], fitness: Fitness, meter: Meter | None = None) -> None:
@@ -314,7 +314,7 @@ def output_sizes(replays: Sequence[Replay]) -> Array:
 def residual_weights(fitness: Fitness, replays: Sequence[Replay], sizes: Array) -> list[float]:
     """Return what the residual of each record weighs in the sum of squares that a fitness is, [1/unit].
 
-    sizes: see `output_sizes`. Raises ArmidError when the fitness is no sum of squares.
+    sizes: see `output_sizes`. Raises ArmidError when the fitness is not a sum of squares.
     """
     pairs = [(r.record.noise.rms, size) for r, size in zip(replays, sizes, strict=True)]
     return [fitness.weight_of(noise / size) / size for noise, size in pairs]

@@ -32,7 +32,7 @@ def similarity(
     epsilon, xi, slope_threshold : float
         Of the normalised series: level [1], duration [s], slope [1/s].
     noise : float
-        Rms [signal's unit]. A lone extremum within 3 % of the series' length from its end is no landmark when its
+        Rms [signal's unit]. A lone extremum within 3 % of the series' length from its end is not a landmark when its
         height is below three times that; 0, as in the paper: every one is.
 
     Returns
@@ -62,7 +62,7 @@ def numerical_similarity(measured: ArrayLike, simulated: ArrayLike, failed: floa
     Parameters
     ----------
     measured, simulated
-        As of `similarity`, and so are the errors.
+        See `similarity`, for the errors as well.
     failed : float
         What a candidate that holds a NaN or an infinity gets.
 

@@ -1,8 +1,8 @@
-"""Starts of records in motion, fitted beside the parameters: nuisances of each piece that cost a search no dimension.
+"""Starts of records in motion, fitted with the parameters: nuisances of each piece that cost a search no dimension.
 
-About one start the signals answer to its constants next to linearly, so that the best start of each candidate is had by
-a projection (`StartCorrection`), and a fit sees what no start could make up for. What is to be done beforehand is to
-find a start about which that holds: `with_starts` does, about one candidate.
+Near one start the signals are almost linear in its constants. The best start of each candidate is then a projection
+(`StartCorrection`), and a fit sees only what no start explains. `with_starts` finds the start of one candidate about
+which this holds.
 Source of the projection: Golub, Pereyra 1973, doi:10.1137/0710036.
 """
 
@@ -35,10 +35,12 @@ LEAST_NOISE = 1e-6
 def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ...]:
     """Return replays whose pieces start where one whole candidate fits best, ready to correct others about there.
 
-    Pieces whose start is not to be fitted stay as they are. Gauss and Newton's steps from the start that the piece has,
-    J(s) = |x - y(s)|^2 / (max(1, m) c) + |(s - s_reader) / 3 deviations|^2 with squares over those of the noise, m the
-    mean square that no start brings down and c = 1 + 2 sum rho its correlation in time: a model that lacks something
-    must not be made up for by a start that the first samples rule out.
+    Pieces whose start is not to be fitted stay as they are. Gauss-Newton steps from the piece's own start minimise
+
+    J(s) = |x - y(s)|^2 / (max(1, m) c) + |(s - s_reader) / 3 deviations|^2
+
+    in units of the noise. m is the mean square that no start brings down, c = 1 + 2 sum rho its correlation in time: a
+    start that the first samples rule out must not hide what the model lacks.
     """
 
     def started(ready: ReadyRecord) -> ReadyRecord:

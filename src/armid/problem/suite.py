@@ -79,7 +79,7 @@ CLASSES = (
 class Definition:
     """A problem of the suite; its instances differ in the truth, and in the noise where there is any.
 
-    free: parameter of an effect -> bounds, SI, beside the four of the paper's arm. strokes: one record each.
+    free: parameter of an effect -> bounds, SI, with the four of the paper's arm. strokes: one record each.
     """
 
     free: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -28,7 +28,7 @@ SUDDEN, SUDDEN_SHARE, AFTER_SUDDEN = 6.0, 0.05, 4
 # A sensor that froze is left behind by so many times what nearly all samples change.
 LEAP = 2.0
 # A signal that runs into the limit of its sensor gets there at no less than this share of its usual rate, over so many
-# samples, and leaves it so: a machine that comes to rest or to an even speed slows down before.
+# samples, and leaves it so: a machine that ends at rest or at an even speed slows down before.
 ABRUPT, RUN_UP = 0.2, 4
 
 

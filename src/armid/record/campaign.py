@@ -48,7 +48,7 @@ class Campaign(Shown):
     manoeuvre holds all that apply to it. gyro_range: [rad/s], None when not given. tolerances: constant -> relative
     half-range within which it is known. rough: those of a tenth or more, with parameters of the plant that are fixed.
     chances: effect -> its probability before the records. known: parameter of the plant -> what is known of it before.
-    taken_as_exact: constants of which neither the plant nor the campaign says how well they are known. angle: deg, rad
+    taken_as_exact: constants for which neither the plant nor the campaign says how well they are known. angle: deg, rad
     or rpm, in which results show angles and turning speeds. truth: true values of parameters, for figures alone.
     """
 
@@ -327,8 +327,8 @@ def record_entries(tables: Sequence[Mapping[str, Any]], keys: Sequence[str], whe
             raise ArmidError(f"{where}: file {quoted(entry.file)} is in two records, each file once is expected")
         others = [other.file for other in entries if other.file != entry.file]
         if entry.repeat_of is not None and entry.repeat_of not in others:
-            raise ArmidError(f"{where}, record {quoted(entry.file)}: repeat_of {quoted(entry.repeat_of)} is no file of "
-                             f"another record, {nearest(entry.repeat_of, others)}")  # fmt: skip
+            raise ArmidError(f"{where}, record {quoted(entry.file)}: repeat_of {quoted(entry.repeat_of)} is not a file "
+                             f"of another record, {nearest(entry.repeat_of, others)}")  # fmt: skip
     repeats = {entry.file: entry.repeat_of for entry in entries if entry.repeat_of is not None}
     entries = [replace(e, repeat_of=original_of(e.file, repeats, where)) if e.file in repeats else e for e in entries]
     if not any(entry.role == "train" for entry in entries):
@@ -350,8 +350,8 @@ def original_of(file: str, repeats: Mapping[str, str], where: str) -> str:
 def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     """Return the plant with the sizes of effort and speed that its train records show, where it asks for that.
 
-    Effort = max |gain x drive|, the drive being its first input, or the moment of gravity where the drive rests, and
-    speed = max |measured speed|, or of the change of a position over a hundredth of the record.
+    Effort = max |gain x drive| of the first input, or the moment of gravity where the drive rests.
+    Speed = max |measured speed|, or of the change of a position over a hundredth of the record.
     """
     if not plant.scales_from_records:
         return plant
@@ -470,7 +470,7 @@ def flattened(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, object]:
 
 
 def check_bounds(override: Override, declared: Parameter, where: str) -> None:
-    """Refuse bounds that leave nothing between them, and bounds beside a fixed value; warn of values far outside."""
+    """Refuse bounds that leave nothing between them, and bounds of a fixed parameter; warn of values far outside."""
     if override.fixed is not None and (override.low, override.high) != (None, None):
         raise ArmidError(f"{where}: 'fixed' and a bound are both there, a fixed value or bounds are expected")
     low = declared.low if override.low is None else override.low

@@ -178,7 +178,7 @@ def has_decimal_comma(rows: Sequence[Sequence[str]], separator: str, lines: Sequ
     """Tell whether numbers have a comma for their point; refuse a file in which it may part thousands.
 
     Numbers such as 0,5 or 12,25 tell; where all are such as 1,234 nothing does. A file that has points, too, keeps
-    them: a cell with a comma is no number then.
+    them: a cell with a comma is not a number then.
     """
     sign = ","
     marked = [(number, c) for number, cells in zip(lines, rows, strict=True) for c in cells if COMMA.fullmatch(c)]

@@ -55,7 +55,7 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
 def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:
     """Return the longest rest between motions, empty without one of 50 samples.
 
-    A stick of friction under drive is no rest: the inputs are still, too. values: (n_rows,). still: where no input
+    A stick of friction under drive is not a rest: the inputs are still, too. values: (n_rows,). still: where no input
     changes, (n_rows,). is_speed: whether a value of 0 tells a standstill, else any that stays does.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
@@ -99,7 +99,7 @@ def memory_of(parts: Sequence[Array]) -> float:
     """Return the correlation of neighbouring samples of the noise in residuals, 0 where none is seen or it is too long.
 
     From second differences, which leave next to nothing of what a model lacks: their correlation tells that of an
-    exponential one, rho^k at lag k. Long memory is not told from what changes slowly.
+    exponential one, rho^k at lag k. Long memory looks like a slow change.
     """
     differences = [np.diff(p, n=2) for p in parts]
     size = OUTLYING * 1.4826 * float(np.median(np.abs(np.concatenate(differences))))

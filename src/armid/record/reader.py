@@ -36,7 +36,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     """Return the record of one [[records]] entry and its table, with a signal for each output that it holds.
 
     plant: the one that the campaign names; its sibling for the record's unit is taken. Warns with RecordWarning of what
-    is no data, of uneven times with IrregularSamplingWarning.
+    is not data, of uneven times with IrregularSamplingWarning.
     """
     times = time_column(table)
     plant, found = output_columns(table, plant)
@@ -93,7 +93,7 @@ def manoeuvre_of(
 
 
 def input_factor(header: str, unit: str, table: CsvTable) -> float:
-    """Return what turns the column of an input into SI: what is no angle and no turning speed is taken as it is."""
+    """Return what turns the column of an input into SI: what is not an angle and no turning speed is taken as it is."""
     if header.endswith(("_deg", "_deg_s")):
         return DEGREE
     ends = SUFFIXES[unit] if unit in ("rad", "rad/s") else {}
@@ -266,7 +266,7 @@ def record_path(folder: Path, file: str, where: str) -> Path:
     if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
         raise ArmidError(f"{where}: file {quoted(file)} leads out of the campaign's folder, a file inside is expected")
     if pure.suffix.lower() != SUFFIX or not file.isprintable():
-        raise ArmidError(f"{where}: file {quoted(file)} is no CSV file, a name that ends in {SUFFIX} is expected")
+        raise ArmidError(f"{where}: file {quoted(file)} is not a CSV file, a name that ends in {SUFFIX} is expected")
     path = os.path.join(folder, file)
     if not os.path.isfile(path):
         there = sorted(p.name for p in folder.glob(f"*{SUFFIX}") if p.is_file())

@@ -20,7 +20,7 @@ Samples = slice | NDArray[np.intp]
 
 
 class RecordWarning(UserWarning):
-    """Say what had to be assumed to read a record, or what of it is no data."""
+    """Say what had to be assumed to read a record, or what of it is not data."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Irregularity:
 class StartCorrection:
     """How the signals of a piece answer to its start, and how much of it a candidate lacks.
 
-    Beside a candidate's signals y the start moves by d = gain (x - y) + offset, x what was measured: the d that brings
+    With a candidate's signals y the start moves by d = gain (x - y) + offset, x what was measured: the d that brings
     x - y - slopes d down, of all outputs of the file together, and does not leave the start that the reader saw.
     slopes: d signal / d start constant, SI, (n_constants, n_outputs, n_samples). gain: (n_constants, n_seen); offset:
     (n_constants,). samples: of each output, those that are seen; measured: their values, the outputs one behind the
@@ -89,9 +89,9 @@ class Piece:
 
     window: the samples that fitness and errors see. start_index: sample of the record at which the piece begins.
     start_deviation: constant (`start_position`, `start_speed`) -> standard deviation of its measured value, SI; empty
-    for a machine that starts from its declared state. n_spent: first samples that told the start of a record that is
+    for a machine that starts from its declared state. n_spent: first samples that gave the start of a record that is
     held out, so that they judge nothing. shown_start: constant -> its measured value, SI, where a fit estimates these
-    constants beside the parameters; correction: what does so, None before.
+    constants with the parameters; correction: what does so, None before.
     """
 
     manoeuvre: Manoeuvre

@@ -18,7 +18,7 @@ LATEST_START = 2.0
 MOST_FILLING = 10
 EVEN = 1e-3
 LARGE_GAP = 3.0
-# A row this near to a grid sample, in intervals, stands for it.
+# A row this near to a grid sample, in intervals, is that sample.
 NEAR = 0.75
 NEIGHBOURS = 7
 
@@ -51,7 +51,7 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     """Find the even grid of a record.
 
     from_rest: the grid begins at t = 0 exactly (samples before are rest), else at the first sample. The interval is the
-    slope of the times where they are even but for rounding and jitter, else the median interval, of which is warned.
+    slope of the times where they are even but for rounding and jitter, else the median interval, with a warning.
     """
     first = 0
     if from_rest:
@@ -198,7 +198,7 @@ def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp
 
 
 def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
-    """Return the slope at each row of the least-squares parabola through 7 neighbours, those at the ends beside it."""
+    """Return the slope at each row of the least-squares parabola through 7 neighbours, at the ends on one side."""
     first, n = np.clip(rows - NEIGHBOURS // 2, 0, times.size - NEIGHBOURS), NEIGHBOURS
     unit = float(np.median(np.diff(times)))
     middle = sum((times[first + i] for i in range(n)), np.zeros(rows.size)) / n

@@ -378,4 +378,4 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
         raise ArmidError(f"{where} is nested too deeply, plain tables of TOML are expected") from error
     except ValueError as error:
         # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
-        raise ArmidError(f"{where} is no valid TOML: {str(error)[:200]}") from error
+        raise ArmidError(f"{where} is not valid TOML: {str(error)[:200]}") from error

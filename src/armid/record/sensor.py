@@ -22,7 +22,7 @@ FEWEST_CHANGES = 20
 MOST_RENEWALS = 3.5
 # This share of all changes comes within a quarter of a hold of a multiple of it: by chance only half of them do.
 ON_TIME, QUARTER = 0.9, 0.25
-# ... and at least this share of the changes is no single step onward, as a slow motion of a coarse sensor makes them.
+# ... and at least this share of the changes differs from a single step onward: a slow motion makes such steps.
 UNLIKE_SLOW_MOTION = 0.2
 
 

@@ -17,7 +17,7 @@ from armid.record.table import CsvTable
 TURN_ROUNDING = 1e-6
 # Samples of the grid without a row near by that make a gap: fewer are a lost sample or jitter of the clock.
 BRIDGED = 2
-# An output without a number in more than this share of the rows is no measurement of the record.
+# An output without a number in more than this share of the rows is not a measurement of the record.
 MOST_EMPTY = 0.5
 WORDS = {"clipped": "are at the limit of the sensor", "stuck": "are repeated while the signal leaps",
          "spikes": "are far from their neighbours"}  # fmt: skip
@@ -31,7 +31,7 @@ def signal_of(
     table: CsvTable, header: str, unit: str, factor: float, times: Array, timing: Timing, inputs: Sequence[Array] = (),
     unwrap: bool = False, most_lost: float = 0.05, output: str = "",
 ) -> tuple[Signal, Array]:  # fmt: skip
-    """Return the signal of a column of a file, and the column, SI, (n_rows,); warn of what of it is no data.
+    """Return the signal of a column of a file, and the column, SI, (n_rows,); warn of what of it is not data.
 
     factor: to the SI unit, NaN for counts. inputs: the columns that drive the machine, (n_rows,) each. unwrap: whether
     whole turns are taken out. most_lost: share of the samples that may be no data. output: whose signal it is, which
@@ -137,7 +137,7 @@ def lost(table: CsvTable, header: str, kind: str, mask: Mask, times: Array, firs
     if kind == "spikes":
         more = f", and {at.size - 1} more" if at.size > 1 else ""
         value = float(table.columns[header][at[0]])
-        warn(table, f"{header} is {value:g} on line {line}, far from its neighbours: that sample is no data{more}")
+        warn(table, f"{header} is {value:g} on line {line}, far from its neighbours: that sample is not data{more}")
     return Broken(kind, at.size, float(times[at[0]]), float(times[at[-1]]), line)
 
 

@@ -53,10 +53,10 @@ def state_shown(
 ) -> State:
     """Return the start constants that are not given, and their standard deviations, SI, as the outputs show them.
 
-    The outputs are functions h of the states, so that at the start h(x) is what they are and dh/dx f(x) how fast they
-    change, where f, the rates of x, asks for states and constants alone (a position's rate is a speed). Values and
-    slopes of the smoothed outputs, each weighed by its deviation, are met by least squares. What no output shows keeps
-    its default, with the plant's own size for its deviation.
+    The outputs are functions h of the states x. At the start their values are h(x), and they change by dh/dx f(x). The
+    rates f depend there on states and constants alone (the rate of a position is a speed). Values and slopes of the
+    smoothed outputs, each weighed by its deviation, are met by least squares. What no output shows keeps its default,
+    with the plant's own size for its deviation.
     """
     outputs = VisibleOutputs(plant, given)
     names = [c for c in plant.start_constants.values() if c not in given]
@@ -135,7 +135,7 @@ GROWTH, LONGEST = 1.25, 400
 def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tuple[float, float]:
     """Return the value of a signal at one sample and its standard deviation, or its change from sample to sample.
 
-    A polynomial of degree 1 or 2 is fitted to a window around the sample (at the ends of a record beside it), which
+    A polynomial of degree 1 or 2 is fitted to a window around the sample (one-sided at the ends of a record), which
     grows from 5 to 400 samples until its squares are more than noise: sum r^2 > noise^2 (f + 3 sqrt(2 f)) with f
     degrees of freedom, or the same for what the next two degrees explain. The value is that of the polynomial with
     these two degrees more on the last window that held, so that its bias is small against its deviation. The window of

@@ -40,7 +40,7 @@ class CsvTable:
     """The columns of one file.
 
     file: name to show. columns: header -> values, (n_rows,), NaN where a cell is empty. texts: of the columns that hold
-    a cell that is no number, header -> its line, and what it is and what is expected. lines: of the file on which the
+    text, header -> its line, and what it is and what is expected. lines: of the file on which the
     rows stand, empty where every line below the first is a row or empty. counts_per_turn: of the encoder, None where it
     is not known.
     """
@@ -70,7 +70,7 @@ class CsvTable:
         return (*self.columns, *self.texts)
 
     def numbers(self, header: str, gaps: bool = False) -> Array:
-        """Return a column, (n_rows,); refuse one with a cell that is no number; gaps: but for empty ones, NaN."""
+        """Return a column, (n_rows,); refuse one with a cell that is not a number; gaps: but for empty ones, NaN."""
         if header in self.texts:
             line, found = self.texts[header]
             raise ArmidError(f"{self.file}, line {line}: {header} is {found} is expected")
@@ -142,7 +142,7 @@ def table_with(
     found: Iterable[tuple[str, Array | tuple[int, str]]], file: str, path: Path, lines: tuple[int, ...],
     header_line: int, counts_per_turn: float | None,
 ) -> CsvTable:  # fmt: skip
-    """Return a table of columns: numbers, or line and text of a cell that is no number. Refuse one without columns."""
+    """Return a table of columns: numbers, or line and text of a cell that holds text. Refuse one without columns."""
     table = CsvTable(file, path, {}, {}, lines, header_line, counts_per_turn)
     for name, values in found:
         if isinstance(values, tuple):
@@ -168,7 +168,7 @@ def plain_columns(text: str) -> tuple[list[str], Array] | None:
         return None
     try:
         with warnings.catch_warnings():
-            # of a file without rows, of which the caller tells
+            # of a file without rows, which the caller reports
             warnings.filterwarnings("ignore", message=".*input contained no data", category=UserWarning)
             values: Array = np.loadtxt(StringIO(below), delimiter=",", comments=None, ndmin=2)
     except ValueError:
@@ -259,7 +259,7 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
     """
     for name, header in named.items():
         if name not in {i.name for i in plant.inputs}:
-            raise ArmidError(f"{where}: {quoted(name)} in inputs is no input of plant '{plant.name}', "
+            raise ArmidError(f"{where}: {quoted(name)} in inputs is not an input of plant '{plant.name}', "
                              f"{nearest(name, (i.name for i in plant.inputs))}")  # fmt: skip
         if header not in table.headers:
             raise ArmidError(f"{where}: input '{name}' names the column {quoted(header)}, which {table.file} does not "

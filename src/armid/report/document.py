@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Rows of a table that are shown; its file holds all.
 MOST_SHOWN = 60
-# A column that says the same in all rows of a page's table is told below it, from so many rows and columns on.
+# A column that says the same in all rows of a page's table is written below it, from so many rows and columns on.
 LEAST_ROWS, LEAST_COLUMNS = 3, 4
 FIRST_NUMBER = re.compile(r"\s*(?:below )?([-+]?(?:inf|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?))(?=[\s%,;(]|$)")
 
@@ -45,7 +45,7 @@ class Column:
 
 
 class Struck(str):
-    """A text that is shown struck through: it is told, and it does not hold."""
+    """A text that is shown struck through: it does not hold."""
 
 
 @dataclass(frozen=True)
@@ -429,7 +429,7 @@ def record_axes(n: int, height: float, heights: Sequence[float] = (1,)) -> tuple
     """
     columns, k = 1 if n == 1 else 2, len(heights)
     rows = -(-n // columns)
-    # as for `small_axes` margins are told, in inches: a layout engine takes longer than all the drawing
+    # as for `small_axes` margins are given, in inches: a layout engine takes longer than all the drawing
     width, above, below, gap, between = 6.8 * columns, 0.95, 1.0, 0.85, 1.1
     whole = height * rows + above + below - gap
     figure = pyplot().figure(figsize=(width, whole))

@@ -30,7 +30,7 @@ def html(document: Document, stored: Mapping[str, str] | None = None) -> str:
     environment = templates()
     environment.globals["picture"] = picture
     first = next(iter(document.tables), None)
-    # evidence near the answer: figures stand before tables, of which the first alone is open
+    # evidence near the answer: figures stand before tables; the first table alone is open
     sections = [(s, sorted(s.parts, key=lambda part: isinstance(part, Table) and part is not first))
                 for s in document.sections]  # fmt: skip
     script, style = (environment.loader.get_source(environment, name)[0] for name in ("page.js", "page.css"))
@@ -77,7 +77,7 @@ PICTURE = "data:image/png;base64,"
 
 
 def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Markup:
-    """Return an SVG as part of a page; refuse what is none.
+    """Return an SVG as part of a page; refuse anything else.
 
     Elements and attributes that drawings do not need are left out, and so are references to anything outside. prefix:
     set before each id, so that several can stand on one page; label: read out in place of the picture.
@@ -94,7 +94,7 @@ def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Marku
             made.attrib["width"] = f"{float(width.group(1)) / POINTS_PER_PIXEL:.0f}"
         return Markup(ElementTree.tostring(made, encoding="unicode"))
     except (ElementTree.ParseError, RecursionError) as error:
-        raise ArmidError(f"{where} is no SVG, it was damaged: a file that armid wrote is expected") from error
+        raise ArmidError(f"{where} is not an SVG, it was damaged: a file that armid wrote is expected") from error
 
 
 def local(name: str) -> str:

@@ -1,6 +1,6 @@
 """LaTeX of a table: `booktabs`, numbers aligned by `siunitx`, a wide table made smaller by `graphicx` until it fits.
 
-A long table is several floats, of which each repeats the headings. A document needs these three packages.
+A long table is several floats; each repeats the headings. A document needs these three packages.
 """
 
 import re

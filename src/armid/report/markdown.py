@@ -1,4 +1,4 @@
-"""Write a document as Markdown; figures are the PNG files beside it."""
+"""Write a document as Markdown; figures are the PNG files in its folder."""
 
 import re
 

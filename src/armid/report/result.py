@@ -25,7 +25,7 @@ DETAILS = "details.json"
 BESIDE = ".armid-"
 # Room on a disk without which no search is begun: results take some MB.
 LEAST_ROOM = 3_000_000
-# How a page tells a path whose name is no UTF-8.
+# How a page tells a path whose name is not UTF-8.
 ODD_NAMES = "backslashreplace"
 # Letters of a result's `repr`.
 MOST_LETTERS = 1_500
@@ -36,7 +36,7 @@ Draw = Callable[[], Any]
 
 
 class Parts(NamedTuple):
-    """What is stored of a result, what its page needs beside, and name -> what draws a figure."""
+    """What is stored of a result, what else its page needs, and name -> what draws a figure."""
 
     result: dict[str, Any]
     details: dict[str, Any]
@@ -186,12 +186,12 @@ def refuse_damaged(folder: Path, kind: Kind) -> Iterator[None]:
     except UNSHOWABLE as error:
         if isinstance(error, ArmidError):
             raise
-        raise ArmidError(f"{folder / kind.file}, or a file beside it, is not what `{kind.command}` writes, it was "
+        raise ArmidError(f"{folder / kind.file}, or a file next to it, is not what `{kind.command}` writes, it was "
                          "damaged or changed: a folder as that command left it is expected") from error  # fmt: skip
 
 
 class NewFiles:
-    """Write files beside a folder and move them in when all are there, so that nothing half-written is found.
+    """Write files next to a folder and move them in when all are there, so that nothing half-written is found.
 
     A folder that is made for them goes again when nothing comes into it.
     """

@@ -34,7 +34,7 @@ PAGE_SETTINGS: Any = SETTINGS | {"svg.fonttype": "none", "font.family": "sans-se
 
 
 # Seaborn's theme "ticks", context "notebook": importing it for these numbers takes as long as drawing a figure. A title
-# whose height is told is not moved around ticks, which would measure all of them once more.
+# whose height is given is not moved around ticks, which would measure all of them once more.
 SIDES = ("x", "y")
 THEME: Any = {
     "axes.axisbelow": True, "axes.edgecolor": ".15", "axes.labelcolor": ".15", "axes.labelsize": 12.0,
@@ -284,7 +284,7 @@ def legend_rows(colours: Mapping[str, int]) -> list[tuple[str, int]]:
 
 
 def line_look(i: int) -> dict[str, Any]:
-    """Return the look of the line of an identifier, of which the first have a colour each."""
+    """Return the look of the line of an identifier; the first have a colour each."""
     return {"color": COLOURS[i], "lw": 1.7, "zorder": 3} if i < MOST_NAMED else {"color": PALE, "lw": 1.0, "zorder": 1}
 
 

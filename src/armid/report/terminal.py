@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
-# Letters that stand beside each column, and those of the frame.
+# Letters between columns, and those of the frame.
 BESIDE, FRAME = 3, 1
 # A column of words is folded down to this width before another column is left out; one of numbers in words, such as
 # intervals, to the second.
@@ -114,7 +114,7 @@ def drawn(
 
     made = RichTable(show_header=headed)
     for column, width in zip(columns, widths, strict=False):
-        # as Text: a name is no markup
+        # as Text: a name is not markup
         shown = RichText(column.header if len(column.header) <= width else words(column.header))
         made.add_column(shown, width=width, overflow="fold", justify="right" if column.digits else "left")
     for row in rows:

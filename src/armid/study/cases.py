@@ -46,7 +46,7 @@ FINER = 8
 class Case:
     """Hold one case: manoeuvres to simulate (strokes), a campaign to read (source) or a problem of `armid.suite()`.
 
-    truth: parameter -> true value, SI, empty where not known. published: values of others to stand beside. source:
+    truth: parameter -> true value, SI, empty where not known. published: values of others to compare with. source:
     campaign, its folder relative to the study's file; records, its files; digest, of them and campaign.toml. angle: in
     which that campaign shows angles.
     """
@@ -334,7 +334,7 @@ def noise_rms(settings: Mapping[str, Any], unit: str) -> float:
 def noisy_records(records: Sequence[Record], settings: Mapping[str, Any]) -> tuple[Record, ...]:
     """Return the records with white noise of the gyro added, of an rms that is known and need not be estimated.
 
-    The same study seed, case, level and seed give the same noise whoever searches, on whatever fitness and window.
+    The same study seed, case, level and seed give the same noise for every identifier, fitness and window.
     """
     words = "\0".join(str(settings[word]) for word in ("noise_seed", "case", "noise_deg_s", "seed"))
     rng = np.random.default_rng(np.frombuffer(hashlib.sha256(words.encode()).digest(), dtype="<u4"))

@@ -40,8 +40,8 @@ def report_of(
 
     key: file of a truth that was kept from a study of loops, which is not opened here. own: analyses of a user. again:
     command that makes the report again, "" for the plain one.
-    Raises ArmidError when no run has ended, for a key to a study that knows its truths, for a kind of study that nobody
-    knows, and for an analysis of a user that returns no table and no figure.
+    Raises ArmidError when no run has ended, and for an unknown kind of study. Also for a key to a study that knows its
+    truths, and for an analysis of a user that returns no table and no figure.
     """
     study, own, angle = results.study, own or {}, str(results.study.get("angle", DEG))
     closes_loops = known_kind(study) == CLOSES_LOOP

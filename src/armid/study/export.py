@@ -2,7 +2,7 @@
 
 iohinspector and IOHanalyzer load the traces. One algorithm is an identifier, with its fitness where it ran on several.
 One function is a case under one noise, window and fitness, since each of these is another landscape; its dimension is
-the number of free parameters. A run's instance is its seed, which stands for its noise. All are minimised. A run starts
+the number of free parameters. A run's instance is its seed, and so its noise. All are minimised. A run starts
 at evaluation 1 and its last one is logged; where the first simulations failed, evaluation 1 carries WORST. Failed runs
 have no trace and are left out.
 """

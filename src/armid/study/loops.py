@@ -69,7 +69,7 @@ class LoopStudy:
         return next(own, self.candidates)
 
     def description(self, out: Path) -> dict[str, Any]:
-        """Return what a report needs to know, as JSON can hold it; the key is told as seen from `out`, the store."""
+        """Return what a report needs to know, as JSON can hold it; the key's path is relative to `out`, the store."""
         spec = self.spec
         key = Path(os.path.relpath(self.folder / spec.key, out.resolve())).as_posix() if spec.key else ""
         return {
@@ -123,7 +123,7 @@ class LoopStudy:
 
 
 def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
-    """Return the campaigns of a folder, by name; `made_by` is told where there are none."""
+    """Return the campaigns of a folder, by name; an error names `made_by` where there are none."""
     place = folder / spec.campaigns
     made = f", `{spec.made_by}` makes them" if spec.made_by else ", a folder of campaigns is expected"
     if not place.is_dir():
@@ -133,7 +133,7 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
         raise ArmidError(f"{where}: {quoted(spec.campaigns)} holds no folder with a {NAME}{made}")
     for pattern in spec.only:
         if not any(fnmatchcase(name, pattern) for name in names):
-            raise ArmidError(f"{where}: key 'only' holds {quoted(pattern)}, which is no campaign of "
+            raise ArmidError(f"{where}: key 'only' holds {quoted(pattern)}, which is not a campaign of "
                              f"{quoted(spec.campaigns)}, {nearest(pattern, names)}")  # fmt: skip
     chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in spec.only)]
     return {name: digest_of(place / name, _files(place / name)) for name in chosen}

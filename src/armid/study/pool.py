@@ -35,12 +35,12 @@ MOST_STARTS = 3
 START_S = 300.0
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 LATE, DIED = "late", "died"
-NO_MESSAGE = "what came from the worker process is no message of ours: something in the run writes into its pipe"
+NO_MESSAGE = "what came from the worker process is not a message of ours: something in the run writes into its pipe"
 
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """Hold what a worker is told at its start, and how long a run may take [s]."""
+    """Hold what a worker gets at its start, and how long a run may take [s]."""
 
     kind: str
     plugins: tuple[str, ...]

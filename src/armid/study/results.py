@@ -171,7 +171,7 @@ def load_study(path: str | Path) -> StudyResults:
     Raises
     ------
     StudyError
-        For what is no store of a study.
+        For what is not a store of a study.
     """
     file = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
     if not file.is_file():
@@ -243,7 +243,7 @@ def _versions(connection: sqlite3.Connection) -> dict[str, str]:
 def _reading(path: Path) -> Iterator[sqlite3.Connection]:
     """Give a connection that cannot write, and tell in one sentence what cannot be read.
 
-    A store whose runner was killed has a log beside it, which cannot be read in a read-only folder: it is copied then.
+    A store whose runner was killed has a log in its folder. In a read-only folder both are copied to be read.
     """
     with translate_errors(path), ExitStack() as stack:
         uri = f"{path.resolve().as_uri()}?mode=ro"

@@ -80,7 +80,7 @@ def seeds(value: object) -> tuple[int, ...]:
 
 
 def one_or_more(kind: Kind) -> Kind:
-    """Return a kind of lists; one value stands for a list of it."""
+    """Return a kind of lists; one value is taken as a list of it."""
     several = list_of(kind, 1)
     return Kind(lambda value: several(value) if isinstance(value, list) else (kind(value),),
                 {"anyOf": [kind.schema, several.schema]})  # fmt: skip
@@ -347,7 +347,7 @@ class LoopSpec:
     suite: Mapping[str, Any] = field(default_factory=dict, metadata=key(
         any_table, "a table", "What the campaigns are made of, for their maker; the study does not read it.",
     ))  # fmt: skip
-    # last: from here on the name stands for this field
+    # last: from here on the name means this field
     key: str = field(default="", metadata=key(
         line_of_text, "the file that holds the truth, relative to this file",
         "Truth of the campaigns, for who scores them; neither study nor report opens it.",

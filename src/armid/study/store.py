@@ -264,11 +264,11 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
     except sqlite3.DatabaseError as error:
         if error.sqlite_errorname != "SQLITE_NOTADB":
             raise
-        raise ArmidError(f"{path} is no store of a study: another file has its name") from error
+        raise ArmidError(f"{path} is not a store of a study: another file has its name") from error
     if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
         return
     if found[0] != APPLICATION:
-        raise ArmidError(f"{path} is no store of a study: another program's data, or nothing, is in it")
+        raise ArmidError(f"{path} is not a store of a study: another program's data, or nothing, is in it")
     raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
 
 

@@ -89,7 +89,7 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
         raise ArmidError(f"study {file} does not exist, a file that ends in {SUFFIX} is expected")
     table = load_toml(file)
     kind = table.get("kind", IDENTIFIES)
-    # what is no text is refused with the other keys
+    # what is not text is refused with the other keys
     if not isinstance(kind, str) or not kind:
         kind = IDENTIFIES
     if kind not in KIND_NAMES:
@@ -111,7 +111,7 @@ def task_type(kind: str) -> "type[Task]":
 def perform(run: MissingRun, cache: RunCache) -> Outcome:
     """Perform a run of any kind; one that fails is an outcome too, so that the others go on.
 
-    Raises MachineError where disk, memory or cache are at fault: that is no result of a run.
+    Raises MachineError where disk, memory or cache are at fault: that is not a result of a run.
     """
     began, started_at = time.perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
     try:
@@ -136,7 +136,7 @@ def of_machine(error: BaseException) -> bool:
 
 
 def sentence(error: BaseException) -> str:
-    """Return what an error says, with its kind and its place in a plug-in where it is none of ours."""
+    """Return what an error says, with its kind and its place in a plug-in where it is a user's."""
     if isinstance(error, ArmidError):
         return str(error)[:LONGEST_ERROR]
     place = place_in_plugin(error)
@@ -413,11 +413,11 @@ def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
 
 
 def _check_apart(entry: Entry, other: Entry, where: str) -> None:
-    """Refuse a label that stands for two things, and a run that two entries ask for."""
+    """Refuse a label of two things, and a run that two entries ask for."""
     same_label = other.label == entry.label
     same_thing = (other.name, other.options) == (entry.name, entry.options)
     if same_label and not same_thing:
-        raise ArmidError(f"{where}: label '{entry.label}' stands for identifiers of other name or options, "
+        raise ArmidError(f"{where}: label '{entry.label}' names identifiers of other name or options, "
                          "a label of its own is expected for each")  # fmt: skip
     shared = (entry.fitness, other.fitness), (entry.noise_deg_s, other.noise_deg_s), (entry.seeds, other.seeds)
     same_run = all(set(one) & set(two) for one, two in shared)
@@ -427,7 +427,7 @@ def _check_apart(entry: Entry, other: Entry, where: str) -> None:
 
 
 def _check_noise(entry: Entry, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
-    """Refuse a fitness that needs noise where there is none."""
+    """Refuse a fitness that needs noise on records without noise."""
     at = f"{where}, identifier '{entry.label}'"
     simulated, end = any(case.strokes for case in cases), NOISES.get(cases[0].model.plant.output_unit, "")
     for fitness in entry.fitness:

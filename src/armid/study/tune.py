@@ -56,7 +56,7 @@ def tune(
 ) -> tuple[list[Tuned], Ending]:  # fmt: skip
     """Try n configurations of each identifier; return what was found, nothing after Ctrl-C, and how all rounds ended.
 
-    first: see `training`. The others are those of `armid.study.runner.run`; progress is told of all rounds as one
+    first: see `training`. The others are those of `armid.study.runner.run`; progress counts all rounds as one
     study. Raises ArmidError without Optuna, and while another process is at the store.
     """
     if find_spec("optuna") is None:
@@ -81,7 +81,7 @@ def tune(
         areas = scores(study, load_study(out))
     found = []
     for label, own in tried.items():
-        # the first of the best: nothing is told where nothing surpasses the defaults
+        # the first of the best: nothing is returned where nothing surpasses the defaults
         best = max(own, key=lambda each: areas[each.label])
         found.append(Tuned(label, best.options, areas[own[0].label], areas[best.label]))
     return found, _together(endings, 0)

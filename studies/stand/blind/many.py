@@ -66,7 +66,7 @@ def make_as_told(make: Callable[[argparse.Namespace], str], words: Sequence[str]
     """Make campaigns as the command line says and print what was made; give the exit code, 2 when refused."""
 
     def stranger(there: list[str]) -> str:
-        return next((f"{name}, which is no blind campaign" for name in there if not CAMPAIGN.fullmatch(name)), "")
+        return next((f"{name}, which is not a blind campaign" for name in there if not CAMPAIGN.fullmatch(name)), "")
 
     def checked(options: argparse.Namespace) -> str:
         if not 0 <= options.seed < LARGEST:

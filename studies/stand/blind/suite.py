@@ -167,7 +167,7 @@ def shuffled(cases: list[Case], seed: int, only: Iterable[str] = ()) -> Mapping[
     """Name the cases c000, c001 ... in random order; `only` keeps those of some classes or effects.
 
     What a case draws depends on its place in the whole suite and not on this order. Raises RefusalError for a word
-    that is no class and no effect.
+    that is not a class and no effect.
     """
     words = tuple(only)
     for word in words:

@@ -123,7 +123,7 @@ def judge_all(key: Mapping[str, Any], reports: Mapping[str, Any]) -> tuple[list[
         try:
             rows.append(judge(campaign, entry, reports[campaign]))
         except (KeyError, TypeError) as error:
-            said = f"the report of {campaign} is no report of a closed loop: {error} is not as expected"
+            said = f"the report of {campaign} is not a report of a closed loop: {error} is not as expected"
             raise RefusalError(said) from error
     return rows, missing
 
@@ -134,7 +134,7 @@ def read_json(file: Path) -> Any:
     except OSError as error:
         raise RefusalError(f"{file} cannot be read: {error.strerror or error}") from error
     except ValueError as error:
-        raise RefusalError(f"{file} is no JSON: {error}") from error
+        raise RefusalError(f"{file} is not JSON: {error}") from error
 
 
 def told(campaign: str, entry: Entry) -> dict[str, Any]:

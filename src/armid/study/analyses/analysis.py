@@ -1,4 +1,4 @@
-"""What an analysis is, and what it is given: the runs of a study beside their truths, names and settings."""
+"""What an analysis is, and what it is given: the runs of a study with their truths, names and settings."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -117,7 +117,7 @@ def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
 
 NOISE_FREE, SPEED = "noise-free", "rad/s"
 PAPER = "the paper's pso"
-# Variants that a table of every row and parameter is printed for, beside the paper's own method.
+# Variants that a table of every row and parameter is printed for, with the paper's own method.
 MOST_OTHERS = 3
 # What a setting is made of.
 APART = ("noise", "window", "budget")
@@ -142,7 +142,7 @@ class Evidence:
     """Compute once what several analyses share; the traces are read when one of them first asks.
 
     runs: outcomes, one row a run, in the order of the study. parameters: one row a run and free parameter. estimates:
-    the same of finished runs, with case, variant, setting, seed, fitness and noise beside.
+    the same of finished runs, with case, variant, setting, seed, fitness and noise added.
     """
 
     def __init__(self, results: StudyResults) -> None:
@@ -276,7 +276,7 @@ def is_swarm(variant: str) -> bool:
 
 
 def wide_runs(evidence: Evidence) -> DataFrame:
-    """Return one row a run with its parameters beside: what an analysis of a user is given.
+    """Return one row a run with its parameters: what an analysis of a user is given.
 
     ==================================  ==========================================================================
     study, run                          names of the study and of the run

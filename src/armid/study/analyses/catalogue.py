@@ -20,7 +20,7 @@ from armid.study.analyses.success import SUCCESS
 from armid.study.analyses.table1 import TABLE1
 from armid.study.analyses.table2 import TABLE2
 
-# A new analysis is a file beside this one, and a name here.
+# A new analysis is a file in this folder, and a name here.
 ANALYSES = (
     OVERVIEW, TABLE1, TABLE2, CRAMER_RAO, FITNESS_QUALITY, SUCCESS, RUNNING_TIME, BEST_FITNESS, CONVERGENCE, ERRORS,
     RANKS, BY_CLASS, ANYTIME, RUNS,
@@ -81,7 +81,7 @@ def part(file: str, title: str, found: Any) -> Part:
     frame = found if isinstance(found.index, RangeIndex) else found.reset_index()
     frame = frame.set_axis([" ".join(map(str, c)).strip() if isinstance(c, tuple) else str(c) for c in frame], axis=1)
     columns = tuple(Column(str(c), str(c), digits(frame[c].dtype)) for c in frame)
-    # what is missing in a column of a pandas type of its own is no number
+    # what is missing in a column of a pandas type of its own is not a number
     for c in frame:
         if is_extension_array_dtype(frame[c].dtype):
             frame = frame.assign(**{str(c): frame[c].astype(object).where(frame[c].notna(), None)})

@@ -85,7 +85,7 @@ ATTAINED_CAPTION = (
 )
 AREA_CAPTION = (
     "Area over the convergence curve: mean over the targets of the share of the budget, in its logarithm, that is left "
-    "when the target is first hit; 1 hits all at once, 0 none. Over all cases and seeds, quartiles beside the mean. "
+    "when the target is first hit; 1 hits all at once, 0 none. Over all cases and seeds, quartiles and mean. "
     "Targets as in the figure."
 )
 

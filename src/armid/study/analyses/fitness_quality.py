@@ -22,7 +22,7 @@ COLUMNS = (
 )  # fmt: skip
 TABLE_CAPTION = (
     "Which fitness gives right parameters: the largest relative error of a run, median and worst over cases and seeds "
-    "(a failed run counts as infinite), beside 1 - S, the similarity degree that the result reached on the train "
+    "(a failed run counts as infinite), and 1 - S, the similarity degree that the result reached on the train "
     "records whatever was minimised (median). rank correlation: Spearman's, over the runs of the line, between 1 - S "
     "and the largest error; near 1 a higher similarity means better parameters, near 0 it says nothing about them."
 )

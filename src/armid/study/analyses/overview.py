@@ -22,14 +22,14 @@ PAPER_CAPTION = (
     f" The line '{PAPER}' is computed from the values that the paper printed, one run a row, on its own data."
 )
 VALUES_CAPTION = (
-    "No truth is known. Median and population standard deviation of each parameter over all finished runs, "
-    "Cramer-Rao standard deviation at the solution (median), the errors of the result on the train and the holdout "
-    "records (medians), and runs of which the parameter ended on its bound."
+    "No truth is known. Median and population standard deviation of each parameter over all finished runs. "
+    "Cramer-Rao: standard deviation at the solution (median). RMSE: of the result on train and holdout records "
+    "(medians). At a bound: runs whose parameter ended on its bound."
 )
 RUNS_CAPTION = (
     "One line a noise and identifier. budget, used: simulations of a run (median used); diverged: share of the used "
     "simulations that gave no finite record. failed: runs that ended in an error and hold no result. at a bound: runs "
-    "of which at least one parameter ended on a bound of the box."
+    "that ended with at least one parameter on a bound of the box."
 )
 VALUES_COLUMNS = (
     SETTING, VARIANT, PARAMETER, Column("unit", "unit"), N_RUNS, Column("median", "median", ".6g"),

@@ -19,7 +19,7 @@ from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, i
 
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
 FLOOR = 1e-8
-# With noise, a smaller difference than this share of the Cramer-Rao standard deviation is no difference.
+# With noise, a smaller difference than this share of the Cramer-Rao standard deviation is not a difference.
 SHARE_OF_BOUND = 0.01
 # A smaller corrected p tells two identifiers apart. The answer names so many that it does not tell from the best.
 SURE, MOST_ALIKE = 0.05, 4
@@ -44,7 +44,7 @@ PAIRS_CAPTION = (
     "the smallest p that the test can give before correction is {least:.2g}."
 )
 FIGURE_CAPTION = (
-    "Mean ranks over the cases. A bar joins identifiers of which no pair differs significantly at 5 % (Wilcoxon "
+    "Mean ranks over the cases. A bar joins identifiers without a pair that differs significantly at 5 % (Wilcoxon "
     "signed-rank, Holm)."
 )
 
@@ -298,7 +298,7 @@ CLASS_CAPTION = (
     "search."
 )
 CLASSES = ("smooth", "valley", "rugged", "plateau", "stair")
-# A fitness this near to that of the truth is not told from it: [rad/s], or of a similarity 1.
+# A fitness this near to that of the truth equals it: [rad/s], or of a similarity 1.
 NEAR_TRUTH = 1e-8
 N_BOOTSTRAP = 1000
 

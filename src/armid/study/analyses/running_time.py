@@ -19,7 +19,7 @@ from armid.study.analyses.success import TOLERANCES
 Array = NDArray[np.floating[Any]]
 PAIRS_HIT = "share of (run, target) pairs hit"
 SHARES: Any = {"xscale": "log", "ylim": (0.0, 1.0)}
-# Said of both targets.
+# Of both targets.
 CAPTION = (
     "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
     "runs that hit it), over all cases and seeds; inf where no run hits it. In brackets the share of runs that hit. "

@@ -38,7 +38,7 @@ SUCCESS = Analysis("success", "Success rates", parts, "share of runs with all pa
 def success_rates(runs: DataFrame, tolerances: Sequence[float] = TOLERANCES) -> DataFrame:
     """Return, per setting, variant and tolerance: runs, successes, rate and its 95 % Wilson interval.
 
-    A failed run is no success. Source: Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
+    A failed run is not a success. Source: Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
     """
     rows = []
     for key, group in runs.dropna(subset=["largest_error"]).groupby(["setting", "variant"], sort=False):

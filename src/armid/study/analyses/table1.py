@@ -170,7 +170,7 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) 
     sample = np.sort(np.asarray(values, np.float64))
     if sample.size < 2:
         return np.nan, np.nan
-    # ranks instead of values where some are infinite: the bootstrap subtracts, and inf - inf is no number
+    # ranks instead of values where some are infinite: the bootstrap subtracts, and inf - inf is not a number
     finite = bool(np.isfinite(sample).all())
     resampled = sample if finite else np.arange(sample.size, dtype=np.float64)
     found = bootstrap(

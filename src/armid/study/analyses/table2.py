@@ -26,7 +26,7 @@ TABLE_CAPTION = (
     "population, sqrt(mean (x - mean)^2), which is what the paper calls mean square error. between records: of the "
     "means of the records, which the noise of the records makes; within a record: root mean square over the records "
     "of the deviation among repeats on the same record, which the search makes. Cramer-Rao: median over the runs of "
-    "the bound at the solution for one record; where the misfit is far above the noise, the residual stands for the "
+    "the bound at the solution for one record; where the misfit is far above the noise, the residual replaces the "
     "noise and makes it wider. low, high: the box; at a bound: runs that ended on it, where the box and not the record "
     "decides the value, and the other parameters scatter less than they would without it. The paper's lines are "
     "computed from its five printed identifications of a real arm; ours are of records whose truth is known (a test "
