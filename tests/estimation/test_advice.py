@@ -204,7 +204,7 @@ def test_the_largest_set_that_is_told_apart_is_named(rivals):
 
 
 def test_one_model_has_no_rival(rivals):
-    with pytest.raises(ArmidError, match="1 model was given to be told apart from others: at least two"):
+    with pytest.raises(ArmidError, match="1 model was given: at least two are expected"):
         advise(rivals[:1], whitening(rivals))
 
 

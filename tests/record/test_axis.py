@@ -133,7 +133,7 @@ def test_hold_of_the_record_wins(write, axis_columns):
     ("[records.constants]\ngian = 1.0\n", {}, ["'gian'", "did you mean 'gain'"]),
     ("gyro_range = 1.0\n", {}, ["'gyro_range'", "unknown"]),
     ("supply_V = 1.0\n", {}, ["'supply_V'", "unknown"]),
-    ("[records.inputs]\nU = 'drive_V'\n", {}, ["'U'", "no input", "driven_axis"]),
+    ("[records.inputs]\nU = 'drive_V'\n", {}, ["'U'", "not an input", "driven_axis"]),
     ("[records.inputs]\nu = 'drive_v'\n", {}, ["'drive_v'", "move.csv", "did you mean 'drive_V'"]),
     ("", {"drive_V": None}, ["move.csv, line 1", "input 'u'", "drive_N_m"]),
     ("", {"drive_V": None, "drive_kN": 1.0}, ["move.csv, line 1", "'drive_kN'", "unknown unit", "drive_N"]),

@@ -232,7 +232,7 @@ def test_a_result_without_its_details_is_one_sentence(tmp_path):
     """As `armid export reports` writes it."""
     folder = write_loop(tmp_path / "loop")
     (folder / "details.json").unlink()
-    with pytest.raises(ArmidError, match=r"or a file beside it, is not what `armid close-loop` writes"):
+    with pytest.raises(ArmidError, match=r"or a file next to it, is not what `armid close-loop` writes"):
         document_of(folder, LOOP, "x")
 
 
@@ -245,7 +245,7 @@ def test_damaged_details_are_one_sentence(tmp_path):
     folder = write_loop(tmp_path / "loop", figures=False)
     for key in sorted(set(loop_details()) - {"conclusion", "n_records", "n_files", "missing", "models"}):
         (folder / "details.json").write_text(json.dumps(loop_details(n_records=1) | {key: 3}))
-        with pytest.raises(ArmidError, match=r"or a file beside it, is not what `armid close-loop` writes"):
+        with pytest.raises(ArmidError, match=r"or a file next to it, is not what `armid close-loop` writes"):
             document_of(folder, LOOP, "x")
 
 

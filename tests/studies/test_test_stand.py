@@ -106,7 +106,7 @@ REFUSED: list[tuple[list[str], str]] = [
     (["out", "--p0", "9e6"], "leave the travel"),
     (["out", "--manoeuvres", "jump"], "no manoeuvre 'jump'"),
     (["out", "--manoeuvres", "a=1:2"], "must read NAME="),
-    (["out", "--manoeuvres", "a=1:x:shell:28"], "no number"),
+    (["out", "--manoeuvres", "a=1:x:shell:28"], "not a number"),
     (["out", "--manoeuvres", "a=1:80:shell:28"], "outside the travel"),
     (["out", "--manoeuvres", "a=1:1:shell:28"], "starts at its target"),
     (["out", "--manoeuvres", "a=1:2:shell:0"], "positive voltage"),

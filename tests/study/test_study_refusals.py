@@ -59,7 +59,7 @@ REFUSED = [
     ('name = "pso+least_squares"', 'name = "random"',
      "identifier 'random' is there twice with the same fitness, noise and seeds"),
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nlabel = "random"',
-     "label 'random' stands for identifiers of other name or options"),
+     "label 'random' names identifiers of other name or options"),
     ('name = "small"', 'name = "../small"', "key 'name' is '../small', a plain name"),
     ('name = "small"', "name = ", "small.toml is not valid TOML"),
     ('[[cases]]\nname = "row 5"', 'campaign = "c"\n[[cases]]\nname = "row 5"',

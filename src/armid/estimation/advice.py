@@ -104,7 +104,7 @@ def advise(
     Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
     """
     if len(rivals) < 2:
-        raise ArmidError(f"{len(rivals)} model was given: at least two, to be told apart, are expected")
+        raise ArmidError(f"{len(rivals)} model was given: at least two are expected")
     first = rivals[0].records
     grid = grid or manoeuvre_grid(first.model, [r.record for r in first.replays])
     predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
