@@ -462,6 +462,8 @@ def spectra(
     """
     found: dict[int, list[float]] = {}
     for record, level, signal in zip(seen.data.each, seen.data.levels, signals, strict=True):
+        if not len(signal):  # the rest of a record in motion
+            continue
         taper = np.hanning(len(signal) + 2)[1:-1]
         power = np.abs(np.fft.rfft(signal * taper)[1:-1]) ** 2 / float(taper @ taper) / level.rms**2
         frequency = np.fft.rfftfreq(len(signal), record.spacing)[1:-1]
