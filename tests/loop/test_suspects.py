@@ -121,7 +121,7 @@ def test_broken_samples_weigh_nothing(campaign, sound, tmp_path):
     wild = np.isin(np.round(columns["time_s"], 6), [0.2, 0.4, 0.6])
     columns["angular_velocity_deg_s"][wild] += 115.0
     write_table(folder / "lower.csv", columns)
-    with pytest.warns(RecordWarning, match=r"lower\.csv: .* far from its neighbours: .* no data, and 2 more"):
+    with pytest.warns(RecordWarning, match=r"lower\.csv: .* far from its neighbours: .* not data, and 2 more"):
         found = close_loop(Model(ARM), read_campaign(folder), CANDIDATES)
     (suspect,) = found.suspects
     assert (suspect.record, suspect.kind, suspect.value, suspect.action) == ("lower.csv", "spikes", 3.0, "left_out")

@@ -46,8 +46,9 @@ class Fault:
         return self.kind not in OF_SENSOR or other == output
 
     def undone(self, record: Record, value: float, plant: Plant, output: str = "") -> Record:
-        """Return a record without the fault; output: whose sensor it is."""
-        measured = {one.output: self.measured(one, value) for one in record.each if self.touches(output, one.output)}
+        """Return a record without the fault; output: whose sensor it is, "" for the first."""
+        own = output or record.output
+        measured = {one.output: self.measured(one, value) for one in record.each if self.touches(own, one.output)}
         return record.with_measured(measured).with_pieces(lambda piece: self.undone_piece(piece, value, plant))
 
     def lost(self, record: Record, value: float) -> tuple[int, int]:
