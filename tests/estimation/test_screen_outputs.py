@@ -95,7 +95,7 @@ MISTAKES = {
     "of two, ms once": (both, (clock(1000, "b.csv"),), r"b\.csv: time_s looks like milli"),
     "ten times once": (write_arm, (clock(10, "b.csv"),), r"b\.csv: time_s looks ten times too"),
     "link, ten times once": (
-        write_link, (clock(10, "a.csv"),), r"[: ]a\.csv: time_s looks ten times too long"),
+        write_link, (clock(10, "a.csv"),), r"(^|[: ])a\.csv: time_s looks ten times too long"),
     "drives exchanged": (write_arm, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged: each with the inputs"),
     "drives exchanged, axis": (bare, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged"),
     "drives exchanged, link": (write_link, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged"),
