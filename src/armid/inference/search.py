@@ -311,15 +311,18 @@ def drops(found: Exploration, model: Hypotheses, fit: Fit) -> list[Trial]:
 
 def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -> Fit | None:
     active = tuple(k for k in fit.active if k.declared != hypothesis.means)
-    return near(fit, active, fit.values, library, weight)
+    return near(fit, active, [fit.values], library, weight)
 
 
 def near(
-    fit: Fit, active: tuple[EffectKey, ...], values: dict[str, float], library: Library, weight: float
+    fit: Fit, active: tuple[EffectKey, ...], each: Sequence[dict[str, float]], library: Library, weight: float
 ) -> Fit | None:
-    """Return the model with some effects fitted from near, its other unknowns from where a fit has them."""
+    """Return the model with some effects fitted from the best of several values, other unknowns as in a fit."""
     posed = effects.beside(fit, active, library)
-    return effects.fitted(fit, posed, active, [start_of(posed, values)], library, weight)
+    starts = [start_of(posed, values) for values in each]
+    if len(starts) > 1:
+        starts = [starts[int(np.argmin(projected(fit, posed, weight).chi2(np.array(starts))))]]
+    return effects.fitted(fit, posed, active, starts, library, weight)
 
 
 def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal]) -> list[Trial]:
@@ -379,12 +382,10 @@ def swapped(
     new: EffectKey = proposal.hypothesis.means
     new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
     active = (*(k for k in fit.active if k != key), new)
-    posed = effects.beside(fit, active, library)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     shares = np.clip(strength * STRENGTHS, 0.01, library.reach)
-    starts = np.array([start_of(posed, values | proposal.grid[variant].at(float(share))) for share in shares])
-    best = int(np.argmin(projected(fit, posed, weight).chi2(starts)))
-    return effects.fitted(fit, posed, active, [starts[best]], library, weight)
+    each = [values | proposal.grid[variant].at(float(share)) for share in shares]
+    return near(fit, active, each, library, weight)
 
 
 def pairs(
@@ -423,7 +424,7 @@ def pairs(
         values_of = dict(about.fit.values) | one.grid[variants[i]].at(float(np.clip(first, 0.01, found.library.reach)))
         values_of |= two.grid[variants[k]].at(float(np.clip(second, 0.01, found.library.reach)))
         active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
-        yield key, near(about.fit, active, values_of, found.library, about.scale.weight)
+        yield key, near(about.fit, active, [values_of], found.library, about.scale.weight)
 
 
 def finish(found: Exploration) -> None:

@@ -166,6 +166,8 @@ def freed(
         has_arrived = weight * fall < max(SETTLED, ROUGHLY * weight * cost if rough else 0.0)
         if is_new and ((has_arrived and fall > 0.0) or damping > LARGEST):
             break
+        if is_new and not fall > 0.0:  # columns that were taken here need no others, only a shorter step
+            continue
         # Columns serve on while they foretell what a step does.
         is_new = has_arrived or fall < FORETOLD * float(2.0 * slope @ step - step @ square @ step)
         if is_new:

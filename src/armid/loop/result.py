@@ -32,7 +32,7 @@ IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAI
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
-# Causes of the width of an interval that are listed; models that are listed.
+# Listed causes of the width of an interval, and listed models.
 MOST_CAUSES, MOST_LISTED = 2, 30
 # Of the keys of report.json: 2 came with probabilities.
 VERSION = 2

@@ -152,7 +152,7 @@ class Signal:
 
     def n_seen(self, piece: Piece) -> int:
         """Return the number of samples of a piece that fitness and errors see."""
-        return len(piece.of(self.measured)[self.samples(piece)])
+        return len(self.seen(piece))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
