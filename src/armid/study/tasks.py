@@ -370,7 +370,7 @@ def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) ->
         name = table.get("label", table.get("name"))
         at = f"{where}, identifier {quoted(name) if isinstance(name, str) else i + 1}"
         own = validated(EntrySpec, table, at)
-        noise = _levels(own, spec, unit, at)
+        noise = _levels(own, spec, unit, where, at)
         entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
                       own.fitness or spec.fitness, noise, own.seeds or spec.seeds,
                       own.budget_per_parameter or spec.budget_per_parameter)  # fmt: skip
@@ -382,17 +382,18 @@ def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) ->
     return tuple(entries)
 
 
-def _levels(own: EntrySpec, spec: StudySpec, unit: str, where: str) -> tuple[float, ...]:
+def _levels(own: EntrySpec, spec: StudySpec, unit: str, where: str, at: str) -> tuple[float, ...]:
     """Return the levels of the noise; a key for records in another unit is refused. unit: of the records, SI."""
-    given: dict[str, tuple[float, ...]] = {}
+    levels: tuple[float, ...] = (0.0,)
     for of, end in NOISES.items():
-        told = getattr(own, f"noise_{end}")
-        given[of] = getattr(spec, f"noise_{end}") if told is None else told
-    for of, found in given.items():
-        if of != unit and any(found):
+        key = f"noise_{end}"
+        sheet, place = (spec, where) if getattr(own, key) is None else (own, at)
+        if of == unit:
+            levels = getattr(sheet, key)
+        elif any(getattr(sheet, key)):
             wanted = f"noise_{NOISES[unit]} is" if unit in NOISES else "no noise is"
-            raise ArmidError(f"{where}: noise_{NOISES[of]} is given, but the records are in {unit}, {wanted} expected")
-    return given.get(unit, (0.0,))
+            raise ArmidError(f"{place}: {key} is given, but the records are in {unit}, {wanted} expected")
+    return levels
 
 
 def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
