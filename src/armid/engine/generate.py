@@ -58,7 +58,7 @@ class KernelParts:
     """Hold what the template is filled with: local names of one model, and its equations.
 
     equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
-    width: candidates side by side. parameters, starts: what each candidate is given, in order; constants: what all are.
+    width: candidates side by side. parameters, constants: what each candidate is given, in order.
     fixed: quantities that do not move, computed once. states, inputs, latches: what moves, each in its order.
     outputs: recorded signals. latch_guards: the guard of each latch; kinks: the other guards; driven_start: whether a
     state starts where the inputs say; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
@@ -70,7 +70,6 @@ class KernelParts:
     equations: str
     width: int
     parameters: list[str]
-    starts: list[str]
     constants: list[str]
     fixed: list[str]
     states: list[str]
@@ -107,7 +106,7 @@ class KernelParts:
         lists |= {
             "x": listed(self.states), "x_n": listed(self.states, "n_"), "fixed": listed(self.fixed),
             "latches": listed(self.latches), "latches_n": listed(self.latches, "n_"), "times": listed(times),
-            "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.starts + self.constants),
+            "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.constants),
         }  # fmt: skip
         lists["judging"] = f"judged, {listed(self.states, 'per_')}"
         names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
@@ -188,14 +187,13 @@ class Emitter:
         delays, n_moving, late_inputs, late_states = self.late_leaves([*rates, *guards], recorded)
         used = [f"{word}_{effect}" for effect in self.strengths for word in ("using", "used")]
         lists: dict[str, Iterable[str]] = {
-            "parameters": model.parameters, "starts": model.starts, "fixed": fixed, "states": model.states,
-            "constants": [c for c in model.constants if c not in model.starts],
+            "parameters": model.parameters, "constants": model.constants, "fixed": fixed, "states": model.states,
             "inputs": inputs, "latches": model.latches, "latch_guards": latch_guards, "kinks": kinks,
         }  # fmt: skip
         names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
         names["fixed"] += used
         names["outputs"] = [o.name for o in model.plant.outputs]
-        given = [*names["parameters"], *names["starts"], *names["constants"]]
+        given = [*names["parameters"], *names["constants"]]
         starts = [n.replace("rate__", "initial__", 1) for n in rates]
         at_start = [variable(k) for k in ("time", *inputs)] if self.uses(starts, ["time", *inputs]) else []
         moving = [variable("time"), *names["latches"], *names["states"], *names["inputs"],

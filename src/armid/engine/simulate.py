@@ -121,26 +121,25 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
     spans = (replace(schedule, plan=None) if states else schedule).spans(manoeuvre.n_samples)
     # The plant says whether an input keeps the value of its last sample, else the record does.
     holds = [i.hold or manoeuvre.hold for i in model.plant.inputs] or [""]
-    given = dict(zip(model.constants, model.constant_values(manoeuvre.constants), strict=True))
-    starts = np.array([given.pop(name) for name in model.starts])
+    constants = np.array(model.constant_values(manoeuvre.constants))
     settings = (
-        np.array(list(given.values()) or [0.0]), input_values(model, manoeuvre),
-        float(manoeuvre.interval), manoeuvre.n_samples, schedule.least, schedule.refinement,
-        float(schedule.fresh_samples), spans, np.array([hold == "zero" for hold in holds]),
+        input_values(model, manoeuvre), float(manoeuvre.interval), manoeuvre.n_samples, schedule.least,
+        schedule.refinement, float(schedule.fresh_samples), spans, np.array([hold == "zero" for hold in holds]),
         float(manoeuvre.start_time),
         DIVERGED * np.array(model.plant.sizes),
         schedule.rough is not None,
         np.zeros(len(model.states)) if schedule.rough is None else 1.0 / schedule.rough,
         manoeuvre.n_before,
     )  # fmt: skip
-    return Prepared(model, kernel, width, schedule, manoeuvre.n_samples, starts, settings, states)
+    return Prepared(model, kernel, width, schedule, manoeuvre.n_samples, constants, settings, states)
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """Simulate populations through one manoeuvre, everything but the candidates made ready once.
 
-    settings: arguments of the kernel between the candidates and where their results go.
+    constants: of the manoeuvre, SI, (n_constants,), in the order of the model's. settings: arguments of the kernel
+    between the candidates and where their results go.
     """
 
     model: Model
@@ -148,17 +147,25 @@ class Prepared:
     width: int
     schedule: Schedule
     n_samples: int
-    starts: Array
+    constants: Array
     settings: tuple[Any, ...]
     states: bool
 
-    def run(self, population: ArrayLike, threads: int = 1, starts: Array | None = None) -> Simulation:
-        """Simulate every candidate; starts: in place of the manoeuvre's, (n_candidates, n_starts), SI."""
+    def moved_constants(self, shares: Mapping[str, Array]) -> Array:
+        """Return the constants of candidates of which some differ by shares of their value, see `run`."""
+        order = list(self.model.constants)
+        moved = np.tile(self.constants, (len(next(iter(shares.values()))), 1))
+        for name, several in shares.items():
+            moved[:, order.index(name)] *= 1.0 + several
+        return moved
+
+    def run(self, population: ArrayLike, threads: int = 1, constants: Array | None = None) -> Simulation:
+        """Simulate every candidate; constants: in place of the manoeuvre's, (n_candidates, n_constants), SI."""
         model = self.model
         candidates = as_population(model, population)
         n = len(candidates)
-        starts = np.broadcast_to(self.starts if starts is None else starts, (n, len(self.starts)))
-        rows, places = arranged(candidates, starts, self.width, self.schedule.weights)
+        constants = np.atleast_2d(self.constants if constants is None else constants)
+        rows, places = arranged(candidates, constants, self.width, self.schedule.weights)
         outputs = np.empty((len(model.plant.outputs), n, self.n_samples))
         switches = np.full((len(model.latches), rows.shape[1]), np.nan)
         trace = np.empty((len(model.states), n, self.n_samples) if self.states else (0, 0, 0))
@@ -197,18 +204,21 @@ def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
 
 
 def arranged(
-    candidates: Array, starts: Array, width: int, weights: Array | None
+    candidates: Array, constants: Array, width: int, weights: Array | None
 ) -> tuple[Array, NDArray[np.int64]]:  # fmt: skip
-    """Return parameters and starts as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
-    n = len(candidates)
+    """Return parameters and constants as rows, one column for each lane, and the candidate of each lane (-1: padding).
+
+    constants: of each candidate, or one row for all.
+    """
+    n, n_parameters = candidates.shape
     if n <= width:
         weights = None  # within one group the order saves nothing
     order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
     places = np.full(n + -n % width, -1)
     places[:n] = order
-    whole = np.hstack([candidates, starts]) if starts.size else candidates
-    rows = np.empty((whole.shape[1], len(places)))
-    rows[:, :n] = whole.T if weights is None else whole[order].T
+    rows = np.empty((n_parameters + constants.shape[1], len(places)))
+    rows[:n_parameters, :n] = candidates.T if weights is None else candidates[order].T
+    rows[n_parameters:, :n] = (constants if weights is None or len(constants) < n else constants[order]).T
     rows[:, n:] = rows[:, n - 1 : n]
     return rows, places
 

@@ -71,14 +71,14 @@ def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[
 
     By central differences; a constant whose change makes the simulation diverge has a column of 0.
     """
-    candidate = records.whole(z[np.newaxis])
-    found = []
-    for name in names:
-        moved = (moved_replays(records.replays, {name: s}) for s in (STEP, -STEP))
-        sides = [records.weighted([signal[0] for signal in signals_of(there, candidate)]) for there in moved]
-        slope = (sides[0] - sides[1]) / (2.0 * STEP)
-        found.append(slope if np.isfinite(slope).all() else np.zeros_like(slope))
-    return np.array(found).reshape(len(names), len(records.measured))
+    n = len(names)
+    if not n:
+        return np.empty((0, len(records.measured)))
+    moves = dict(zip(names, np.hstack([STEP * np.eye(n), -STEP * np.eye(n)]), strict=True))
+    candidates = np.repeat(records.whole(z[np.newaxis]), 2 * n, axis=0)
+    sides = records.weighted(signals_of(records.replays, candidates, moves))
+    slopes = (sides[:n] - sides[n:]) / (2.0 * STEP)
+    return np.where(np.isfinite(slopes).all(axis=1, keepdims=True), slopes, 0.0)
 
 
 def products(records: LeastSquaresProblem, z: Array, tolerances: Mapping[str, float]) -> tuple[Product, ...]:

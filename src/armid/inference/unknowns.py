@@ -126,8 +126,9 @@ def about_known(records: WhiteRecords, columns: Array, values: Array, weight: fl
 
 
 def moved(records: WhiteRecords, unknowns: Sequence[Unknown], values: Sequence[float] | Array) -> WhiteRecords:
-    """Return records with the values of some unknowns."""
-    for unknown, value in zip(unknowns, values, strict=True):
+    """Return records with the values of some unknowns, constants last: candidates side by side differ in them."""
+    pairs = zip(unknowns, values, strict=True)
+    for unknown, value in sorted(pairs, key=lambda pair: pair[0].product is not None):
         if value != 0.0:
             records = unknown.moved(records, float(value))
     return records
@@ -152,8 +153,8 @@ def freed(
         if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
             break
         dampings = [max(factor * damping, LEAST) for factor in LADDER]
-        tried = [step_in_box(square, slope, here, d, len(z)) for d in dampings]
-        costs = [cost_of(base, unknowns, one[len(z) :], one[: len(z)], weight) for one in tried]
+        tried = np.array([step_in_box(square, slope, here, d, len(z)) for d in dampings])
+        costs = costs_of(base, unknowns, tried[:, len(z) :], tried[:, : len(z)], weight)
         best = int(np.argmin(costs))
         fall, step = cost - costs[best], tried[best] - here
         if fall > 0.0:
@@ -213,12 +214,35 @@ def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array,
 
 def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, weight: float) -> float:
     """Return the sum of squares, the priors and the samples that are left out counted."""
-    residual = moved(base, unknowns, values).residuals(z)[0]
-    lost = sum(u.lost(float(v)) for u, v in zip(unknowns, values, strict=True))
-    chi2 = float(residual @ residual)
+    return float(costs_of(base, unknowns, values[np.newaxis], z[np.newaxis], weight)[0])
+
+
+def costs_of(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: Array, weight: float) -> Array:
+    """Return `cost_of` several candidates, (n_candidates,)."""
+    residuals = residuals_at(base, unknowns, V, Z)
+    lost = np.array([sum(u.lost(float(v)) for u, v in zip(unknowns, values, strict=True)) for values in V])
+    chi2 = np.sum(residuals**2, axis=1)
     # A sample that is left out would have missed by as much as the others do.
-    total = chi2 + float(values @ values) / weight + max(chi2 / len(residual), 1.0) * lost
-    return total if np.isfinite(total) else np.inf
+    total = chi2 + np.sum(V**2, axis=1) / weight + np.maximum(chi2 / residuals.shape[1], 1.0) * lost
+    return np.where(np.isfinite(total), total, np.inf)
+
+
+def residuals_at(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: Array) -> Array:
+    """Return the whitened residuals of candidates, each with its own values of the unknowns, (n_candidates, n).
+
+    V: (n_candidates, n_unknowns). Candidates that differ in parameters and constants alone are simulated side by side.
+    """
+    free = np.array([u.product is None for u in unknowns], dtype=np.bool_)
+    rest = [u for u in unknowns if u.product is None]
+    found: dict[int, Array] = {}
+    for values in dict.fromkeys(map(tuple, V[:, free])):
+        rows = np.flatnonzero((V[:, free] == values).all(axis=1))
+        records = moved(base, rest, values)
+        shares = {u.product.names[0]: V[rows, i] * u.product.tolerance for i, u in enumerate(unknowns) if u.product}
+        signals = records.whole_signals(records.whole(Z[rows]), shares)
+        residuals = records.measured - records.with_rows(signals, Z[rows])
+        found |= dict(zip(rows.tolist(), residuals, strict=True))
+    return np.array([found[row] for row in range(len(V))])
 
 
 def columns_about(
@@ -228,16 +252,18 @@ def columns_about(
 
     kept: columns that are known.
     """
-    here, found = moved(base, unknowns, values).residuals(z)[0], []
-    for i, unknown in enumerate(unknowns):
+    stepped = [i for i, u in enumerate(unknowns) if u.name not in kept and u.column is None]
+    there = np.vstack([values, values + STEP * np.eye(len(values))[stepped]])
+    residuals = residuals_at(base, unknowns, there, np.tile(z, (len(there), 1)))
+    by_steps = dict(zip(stepped, (residuals[0] - residuals[1:]) / STEP, strict=True))
+
+    def column(i: int, unknown: Unknown) -> Array:
         if unknown.name in kept:
-            column = kept[unknown.name]
-        elif unknown.column is not None:
-            rest = moved(base, [u for u in unknowns if u is not unknown], np.delete(values, i))
-            column = unknown.column(rest, z, float(values[i]))
-        else:
-            there = values.copy()
-            there[i] += STEP
-            column = (here - moved(base, unknowns, there).residuals(z)[0]) / STEP
-        found.append(column if np.isfinite(column).all() else np.zeros_like(here))
-    return np.array(found).reshape(len(unknowns), len(here)).T
+            return kept[unknown.name]
+        if unknown.column is None:
+            return np.asarray(by_steps[i])
+        rest = moved(base, [u for u in unknowns if u is not unknown], np.delete(values, i))
+        return unknown.column(rest, z, float(values[i]))
+
+    found = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), residuals.shape[1])
+    return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, 0.0).T

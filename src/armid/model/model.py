@@ -94,11 +94,6 @@ class Model:
         """Name -> default value, SI."""
         return {c.name: c.value for c in self.plant.constants}
 
-    @cached_property
-    def starts(self) -> list[str]:
-        """Constants in which candidates that are simulated together may differ: the starts that a fit may estimate."""
-        return list(dict.fromkeys(self.plant.start_constants.values()))
-
     @caused_by(ModelError)
     def constant_values(self, given: Mapping[str, float]) -> list[float]:
         """Return all constants in order, the given ones replacing defaults.

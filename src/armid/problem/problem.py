@@ -1,6 +1,6 @@
 """Identification as a problem on which any algorithm of pymoo can work."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -26,9 +26,12 @@ class ReadyRecord:
     calibrations: tuple[Calibration, ...]
     threads: int = 1
 
-    def runs(self, candidates: Array) -> list[Simulation]:
-        """Return the simulation of each piece with whole candidates, its start corrected where it is fitted."""
-        runs = [prepared.run(candidates, self.threads) for prepared in self.prepared]
+    def runs(self, candidates: Array, shares: Mapping[str, Array] | None = None) -> list[Simulation]:
+        """Return the simulation of each piece with whole candidates, its start corrected where it is fitted.
+
+        shares: by which share of its value a constant differs from the record's, name -> (n_candidates,).
+        """
+        runs = [p.run(candidates, self.threads, p.moved_constants(shares) if shares else None) for p in self.prepared]
         pairs = [(run, piece.correction) for run, piece in zip(runs, self.record.pieces, strict=True)]
         return [run if c is None else replace(run, outputs=c.corrected(run.outputs)) for run, c in pairs]
 
@@ -174,9 +177,14 @@ def replays(
     return tuple(one for r in records for one in ready_record(r, model, space, accuracy, threads, known, spans).each)
 
 
-def signals_of(replays: Sequence[Replay], candidates: Array) -> list[Array]:
-    """Return the signal of each replay, as `Replay.signal` does; those of one record share its simulation."""
-    runs = {ready: ready.runs(candidates) for ready in by_record(replays)}
+def signals_of(
+    replays: Sequence[Replay], candidates: Array, shares: Mapping[str, Array] | None = None
+) -> list[Array]:  # fmt: skip
+    """Return the signal of each replay, as `Replay.signal` does; those of one record share its simulation.
+
+    shares: see `ReadyRecord.runs`.
+    """
+    runs = {ready: ready.runs(candidates, shares) for ready in by_record(replays)}
     return [replay.seen(runs[replay.ready]) for replay in replays]
 
 

@@ -125,8 +125,8 @@ class Start:
     def signals(self, starts: Array, population: Array) -> Array:
         """Return the outputs of the file, each candidate from its own start, (n_outputs, n_candidates, n_samples)."""
         prepared = self.ready.prepared[self.index]
-        whole = np.tile(prepared.starts, (len(starts), 1))
-        whole[:, [self.ready.model.starts.index(name) for name in self.names]] = starts
+        whole, order = np.tile(prepared.constants, (len(starts), 1)), list(self.ready.model.constants)
+        whole[:, [order.index(name) for name in self.names]] = starts
         outputs = prepared.run(population, self.ready.threads, whole).outputs
         return np.asarray(outputs[list(self.places)])
 

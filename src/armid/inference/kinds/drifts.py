@@ -1,11 +1,11 @@
 """Drifts: a parameter or a constant that changes in proportion to the order of the records."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from armid.estimation.constants import Product, moved_replays
+from armid.estimation.constants import Product
 from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
@@ -30,18 +30,19 @@ class OfParameter:
     name: str
     product: Product | None = None
 
-    def moved(self, values: dict[str, float], records: WhiteRecords, value: float) -> WhiteRecords:
-        """Return records as they would be in the middle of the campaign; values: of the parameters, about which, SI."""
+    def moved(self, fit: Fit, records: WhiteRecords, value: float) -> WhiteRecords:
+        """Return records as they would be in the middle of the campaign; fit: about which."""
         firsts, found = [i for i, replay in enumerate(records.replays) if replay.index == 0], records
-        at, names = records.shares(free_values(records, values)), records.space.free_names
+        at, names = records.shares(free_values(records, fit.values)), records.space.free_names
         for place, index in enumerate(firsts):
-            share, there, z = value * LARGEST * (place / (len(firsts) - 1.0) - 0.5), records, at
+            share = value * LARGEST * (place / (len(firsts) - 1.0) - 0.5)
+            Z, shares = np.tile(at, (2, 1)), {name: np.full(2, off) for name, off in fit.constants.items()}
             if self.product is not None:
-                there = replace(records, replays=moved_replays(records.replays, {self.product.names[0]: share}))
+                name = self.product.names[0]
+                shares[name] = (1.0 + fit.constants.get(name, 0.0)) * np.array([1.0, 1.0 + share]) - 1.0
             else:
-                z = at + share * np.array([name == self.name for name in names])
-            pairs = zip(simulated_file(records, index, at), simulated_file(there, index, z), strict=True)
-            found = with_measured(found, index, [x - y for x, y in pairs])
+                Z[1] += share * np.array([name == self.name for name in names])
+            found = with_measured(found, index, [x - y for x, y in simulated_file(records, index, Z, shares)])
         return found
 
 
@@ -75,7 +76,7 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
     base, what, again, weight = fit.base or fit.records, hypothesis.means, fit, about.scale.weight
     for is_first in (True, False, False):
-        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again.values))
+        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again))
         others = [f.unknown for f in fit.others if f.unknown.name != unknown.name]
         tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, is_first))  # noqa: B023
         if tried is None:

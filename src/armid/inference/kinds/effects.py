@@ -12,7 +12,7 @@ from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import EffectKey, Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
 from armid.inference.refit import free_values, responses, unless_diverged
-from armid.inference.unknowns import freed, projected
+from armid.inference.unknowns import freed, moved, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
@@ -93,9 +93,7 @@ def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRe
     posed = library.problem(active, fit.values)
     if fit.records.data.cover is not None:
         posed = replace(posed, data=fit.records.data)
-    for one in fit.others:
-        posed = one.unknown.moved(posed, one.value)
-    return posed
+    return moved(posed, [f.unknown for f in fit.others], [f.value for f in fit.others])
 
 
 def refit(

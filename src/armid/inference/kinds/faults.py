@@ -3,7 +3,7 @@
 Each is undone by a size; `column_of` gives what a unit of it does to the whitened signal.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -168,14 +168,19 @@ def residual_of(posed: WhiteRecords, index: int, z: Array) -> Array:
     """Return the whitened residual of the file of one record, the others' at 0, (n_samples,)."""
     left = [np.zeros(r.record.n_samples) for r in posed.replays]
     for i, simulated in zip(of_file(posed, index), simulated_file(posed, index, z), strict=True):
-        left[i] = posed.replays[i].measured - simulated
+        left[i] = posed.replays[i].measured - simulated[0]
     return posed.data.white(left)
 
 
-def simulated_file(posed: WhiteRecords, index: int, z: Array) -> list[Array]:
-    """Return the simulated signals of the outputs of the file of one record, each (n_samples of it,)."""
+def simulated_file(
+    posed: WhiteRecords, index: int, Z: Array, shares: Mapping[str, Array] | None = None
+) -> list[Array]:  # fmt: skip
+    """Return the simulated signals of the outputs of the file of one record, each (n_candidates, n_samples of it).
+
+    shares: see `ReadyRecord.runs`.
+    """
     replays = [posed.replays[i] for i in of_file(posed, index)]
-    return [signal[0] for signal in signals_of(replays, posed.space.complete(posed.values(z)[np.newaxis]))]
+    return signals_of(replays, posed.whole(np.atleast_2d(Z)), shares)
 
 
 def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Array]:
@@ -189,7 +194,7 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
         step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
                                   for p, own in zip(replay.pieces, replay.record.samples, strict=True)])  # fmt: skip
-        found.append(-np.gradient(simulated, record.spacing) * (1.0 if fault.kind == "late" else step * samples))
+        found.append(-np.gradient(simulated[0], record.spacing) * (1.0 if fault.kind == "late" else step * samples))
     return found
 
 
@@ -211,7 +216,7 @@ def moved_by(base: WhiteRecords, index: int, z: Array, fault: Fault, value: floa
     else:
         there = with_record(base, index, fault, value)
         before, after = (simulated_file(posed, index, z) for posed in (base, there))
-        changes = [there.replays[i].measured - base.replays[i].measured - y + x
+        changes = [there.replays[i].measured - base.replays[i].measured - y[0] + x[0]
                    for i, x, y in zip(inside, before, after, strict=True)]  # fmt: skip
     levels = [base.data.levels[i].rms for i in inside]
     return max(float(np.sqrt(np.mean(c**2))) / rms for c, rms in zip(changes, levels, strict=True))
