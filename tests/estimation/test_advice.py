@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_records import linear_records
+from scipy.stats import multivariate_normal
 
 from armid.engine import Calibration, Schedule, simulate
 from armid.errors import ArmidError
@@ -17,6 +18,7 @@ from armid.estimation.advice import (
     advice_of,
     advise,
     chance,
+    entropy,
     normal_draws,
     outside,
     simulate_refits,
@@ -68,8 +70,18 @@ def brute_force(rivals, old, new, seen, rng, n=1500):
     return wins / n
 
 
+def brute_entropy(rivals, new, rng, n=1500):
+    """Return the mean entropy of the posterior after a record of A, by the normal distribution of all its samples."""
+    spreads = [design @ r.root for design, r in zip(new, rivals)]
+    normals = [multivariate_normal(d @ r.z, np.eye(25) + s @ s.T) for d, r, s in zip(new, rivals, spreads)]
+    records = normals[0].rvs(n, random_state=rng)
+    logs = np.array([-0.5 * r.criterion + m.logpdf(records) for r, m in zip(rivals, normals)])
+    share = 1.0 / (1.0 + np.exp(np.clip(logs[1] - logs[0], -50.0, 50.0)))
+    return float(np.mean([-sum(p * np.log2(p) for p in (s, 1.0 - s) if p > 0.0) for s in share]))
+
+
 def test_chances_of_linear_models_are_those_of_brute_force():
-    told = []
+    told, entropies = [], []
     for seed, apart in enumerate(APART):
         rng = np.random.default_rng(seed)
         rivals, old, new, seen = linear_rivals(rng, apart)
@@ -78,7 +90,9 @@ def test_chances_of_linear_models_are_those_of_brute_force():
         forecast, _ = chance(a, b, rivals[1].criterion - rivals[0].criterion, normal_draws(7, 512))
         assert forecast == pytest.approx(told[-1], abs=0.05)
         of = dict(zip("AB", new))
-        won, delta = simulate_refits(rivals, 0, lambda r, Z, of=of: Z @ of[r.name].T, normal_draws(3, 60))
+        won, delta, left = simulate_refits(rivals, 0, lambda r, Z, of=of: Z @ of[r.name].T, normal_draws(3, 60))
+        entropies.append(brute_entropy(rivals, new, rng))
+        assert left == pytest.approx(entropies[-1], abs=0.08)
         assert won[0] == 1.0
         assert won[1] == pytest.approx(told[-1], abs=0.08)
         assert delta[0] == 0.0 < delta[1]
@@ -86,6 +100,7 @@ def test_chances_of_linear_models_are_those_of_brute_force():
     assert min(told) < 0.3
     assert max(told) > 0.7
     assert sum(0.1 < t < 0.9 for t in told) >= 2
+    assert max(entropies) > min(entropies) + 0.2
 
 
 def test_a_draw_stays_in_the_box_where_its_mirror_does():
@@ -152,8 +167,10 @@ def test_advice_on_the_arm(rivals):
     advice = advise(rivals, whitening(rivals), speed_limit=200.0 * DEGREE)
     assert len(advice) >= 4
     assert all(a.separates == ("coulomb", "viscous") for a in advice)
-    powers = [round(a.power, 2) for a in advice]
-    assert powers == sorted(powers, reverse=True)
+    odds = np.exp(-0.5 * (rivals[1].criterion - rivals[0].criterion))
+    shares = [round(a.gain / entropy(np.array([1.0, odds]) / (1.0 + odds)), 2) for a in advice]
+    assert shares == sorted(shares, reverse=True)
+    assert 0.0 < shares[0] <= 1.0
     assert all(0.0 <= a.power <= 1.0 for a in advice)
     assert set(advice[0].manoeuvre) == {"start_angle_deg", "target_angle_deg", "shell", "supply_V"}
     assert advice[0].words != "lower.csv once more"
@@ -176,6 +193,7 @@ def test_a_louder_sensor_tells_less_apart(rivals, some):
         for words, advice in loud.items():
             assert advice.delta < quiet[words].delta
             assert advice.power < quiet[words].power
+            assert advice.gain < quiet[words].gain
     assert np.all(unsure[0].root.diagonal() >= rivals[0].root.diagonal())
 
 
@@ -183,6 +201,7 @@ def test_twins_cannot_be_told_apart(rivals, some):
     twin = replace(rivals[1], name="twin")
     for advice in advise([rivals[1], twin], whitening(rivals), some):
         assert advice.power < 0.05
+        assert abs(advice.gain) < 0.05
         assert advice.delta < 0.1
     for advice in advise([*rivals, twin], whitening(rivals), some):
         assert not {"viscous", "twin"} <= set(advice.separates)
@@ -192,14 +211,14 @@ def test_the_largest_set_that_is_told_apart_is_named(rivals):
     three = [replace(rivals[0], name=n) for n in "xyz"]
     (feasible, *_) = manoeuvre_grid(rivals[0].records.replays[0].model, [rivals[0].records.replays[0].record])
     clear = {(0, 1): (0.9, 5.0), (0, 2): (0.7, 4.0), (1, 2): (0.8, 3.0)}
-    assert advice_of(three, feasible, clear).separates == ("x", "y", "z")
-    assert advice_of(three, feasible, clear).power == 0.7
+    assert advice_of(three, feasible, 1.0, clear).separates == ("x", "y", "z")
+    assert advice_of(three, feasible, 1.0, clear).power == 0.7
     partly = clear | {(0, 2): (OFTEN - 0.1, 1.0)}
-    told = advice_of(three, feasible, partly)
+    told = advice_of(three, feasible, 1.0, partly)
     assert (told.separates, told.power, told.delta) == (("x", "y"), 0.9, 5.0)
     hardly = {pair: (0.1 * sum(pair), 1.0) for pair in clear}
-    assert advice_of(three, feasible, hardly) == Advice(
-        dict(feasible.keys), feasible.name, ("y", "z"), pytest.approx(0.3), 1.0
+    assert advice_of(three, feasible, 1.0, hardly) == Advice(
+        dict(feasible.keys), feasible.name, 1.0, ("y", "z"), pytest.approx(0.3), 1.0
     )
 
 

@@ -2,6 +2,8 @@
 
 All manoeuvres are predicted (linear in the parameters, see `chance`); for the best of them the whole is simulated: a
 record from each rival in turn, as uncertain as it is known by now, and all rivals fitted again (see `simulate_refits`).
+The best is the one whose record lets the entropy of the posterior over the rivals fall most, as expected before it is
+made (Lindley 1956, doi:10.1214/aoms/1177728069; Box, Hill 1967, doi:10.1080/00401706.1967.10490441).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 from scipy.linalg import cholesky
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr, ndtri, softmax, xlogy
 
 from armid.engine import probes, simulate
 from armid.errors import ArmidError
@@ -30,20 +32,24 @@ N_DRAWS, N_REFIT_DRAWS = 512, 4
 MOST_FITS, FEWEST = 160, 4
 # Rivals that a manoeuvre tells apart no more often than this are not listed as separated by it.
 OFTEN = 0.5
-TOLERANCE = 1e-5
+TOLERANCE = 1e-3
+# Draws of the noise of one record.
+N_NOISES = 64
 
 
 @dataclass(frozen=True)
 class Advice:
     """A manoeuvre that is advised.
 
-    words: its keys for people. separates: names of the rivals that its record is expected to tell apart. power: chance
-    that the right one of any two of them wins by more than the threshold, the lowest of the pairs, whichever of the two
-    is right. delta: distance of their predictions after both were fitted again, in standard deviations, of that pair.
+    words: its keys for people. gain: expected fall of the entropy of the posterior over the rivals, bit. separates:
+    names of the rivals that its record is expected to tell apart. power: chance that the right one of any two of
+    them wins by more than the threshold, the lowest of the pairs, whichever of the two is right. delta: distance of
+    their predictions after both were fitted again, in standard deviations, of that pair.
     """
 
     manoeuvre: Mapping[str, Key]
     words: str
+    gain: float
     separates: tuple[str, ...]
     power: float
     delta: float
@@ -53,9 +59,8 @@ class Advice:
 class Rival:
     """A fitted model with rivals that the records cannot separate.
 
-    z: its estimate, shares of the range, (n_free,). criterion: what the loop judges it by, smaller is better;
-    differences are those of chi2 plus what parameters cost. trust: what a sample counts, below 1 where more than noise
-    is left.
+    z: its estimate, shares of the range, (n_free,). criterion: -2 times its log posterior, up to a constant. trust:
+    what a sample counts, below 1 where more than noise is left.
     """
 
     name: str
@@ -98,10 +103,9 @@ def advise(
 ) -> tuple[Advice, ...]:
     """Rank feasible manoeuvres by how well one record of each would tell the rivals apart, the best first.
 
-    Only manoeuvres that were simulated are returned, ranked by the mean power over pairs, then by the mean distance.
+    Only manoeuvres that were simulated are returned, ranked by their gain, then by the mean distance.
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
     n_samples), into units of white noise, (n_signals, n). grid: None: `manoeuvre_grid`. speed_limit: of the gyro.
-    Source: Box, Hill 1967, doi:10.1080/00401706.1967.10490441; Atkinson, Fedorov 1975, doi:10.1093/biomet/62.1.57.
     """
     if len(rivals) < 2:
         raise ArmidError(f"{len(rivals)} model was given: at least two are expected")
@@ -114,25 +118,27 @@ def advise(
     most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
     promising = sorted(possible, key=lambda f: ranks[f], reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
-    powers = side_by_side(lambda f: simulated_powers(rivals, f, white, draws), promising, threads)
-    ranked = sorted(zip(promising, powers, strict=True), key=lambda pair: rank(pair[1]), reverse=True)
-    return tuple(advice_of(rivals, feasible, found) for feasible, found in ranked)
+    found = side_by_side(lambda f: simulated(rivals, f, white, draws), promising, threads)
+    each = [(f, *one) for f, one in zip(promising, found, strict=True)]
+    now = max(float(entropy(softmax([-0.5 * r.criterion for r in rivals]))), 1e-9)
+    each.sort(key=lambda e: rank(e[2], e[1] / now), reverse=True)
+    return tuple(advice_of(rivals, *one) for one in each)
 
 
-def rank(powers: Powers) -> tuple[float, float]:
-    """Return what manoeuvres are ranked by: mean power in steps of a hundredth, then mean distance."""
+def rank(powers: Powers, gain: float | None = None) -> tuple[float, float]:
+    """Return what manoeuvres are ranked by: the share of the entropy that goes, None: the mean power; mean distance."""
     power, delta = (float(np.mean([p[k] for p in powers.values()])) for k in (0, 1))
-    return round(power, 2), delta
+    return round(power if gain is None else gain, 2), delta
 
 
-def advice_of(rivals: Sequence[Rival], feasible: Feasible, powers: Powers) -> Advice:
+def advice_of(rivals: Sequence[Rival], feasible: Feasible, gain: float, powers: Powers) -> Advice:
     """Return the advice for one manoeuvre: the largest set of rivals that it often tells apart, or the best pair."""
     for size in range(len(rivals), 1, -1):
         weakest = {s: min(powers[pair] for pair in combinations(s, 2)) for s in combinations(range(len(rivals)), size)}
         best = max(weakest, key=lambda s: weakest[s])
         if weakest[best][0] >= OFTEN:
             break
-    return Advice(dict(feasible.keys), feasible.name, tuple(rivals[i].name for i in best), *weakest[best])
+    return Advice(dict(feasible.keys), feasible.name, gain, tuple(rivals[i].name for i in best), *weakest[best])
 
 
 def normal_draws(n_dimensions: int, n_draws: int) -> Array:
@@ -238,26 +244,39 @@ def whitened_signals(feasible: Feasible, white: Whitening, rival: Rival, Z: Arra
     return np.asarray(white(run.outputs[places][..., feasible.window]))
 
 
-def simulated_powers(rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array) -> Powers:
+def simulated(
+    rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array
+) -> tuple[float, Powers]:  # fmt: skip
+    """Return gain and powers of one manoeuvre."""
     new = partial(whitened_signals, feasible, white)
     tried = [simulate_refits(rivals, i, new, draws) for i in range(len(rivals))]
+    now = softmax([-0.5 * r.criterion for r in rivals])
+    after = sum(float(p) * left for p, (*_, left) in zip(now, tried, strict=True))
     chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
-    return {
+    return float(entropy(now)) - after, {
         (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
         for a, b in combinations(range(len(rivals)), 2)
     }
 
 
-def simulate_refits(rivals: Sequence[Rival], right: int, new: NewSignals, draws: Array) -> tuple[Array, Array]:
+def entropy(shares: Array) -> Array:
+    """Return the entropy of distributions along the first axis, bit."""
+    return np.asarray(-np.sum(xlogy(shares, shares), axis=0) / np.log(2.0))
+
+
+def simulate_refits(
+    rivals: Sequence[Rival], right: int, new: NewSignals, draws: Array
+) -> tuple[Array, Array, float]:  # fmt: skip
     """Return the chance that each other rival loses to the right one by more than the threshold, and its distance.
 
-    The record is simulated without noise from the right model as it is known by now, once for each draw, and every
-    rival is fitted again to old and new. Noise then scatters the difference D of the criteria by twice the distance of
-    the fitted predictions: the chance is Phi((D - THRESHOLD)/(2 distance)). draws: standard normal, (n_draws, at least
-    n_free). A draw whose simulation diverges says nothing.
+    Then the expected entropy of the posterior, bit. The record is simulated without noise from the right model as it is
+    known by now, once for each draw, and every rival is fitted again to old and new. Noise then scatters the difference
+    D of the criteria by twice the distance of the fitted predictions: the chance is Phi((D - THRESHOLD)/(2 distance)).
+    draws: standard normal, (n_draws, at least n_free). A draw whose simulation diverges says nothing.
     """
     true = rivals[right]
-    chances, distances = [], []
+    noises = normal_draws(len(rivals), N_NOISES).T
+    chances, distances, left = [], [], [float(entropy(softmax([-0.5 * r.criterion for r in rivals])))]
     for draw in draws:
         seen = new(true, true.drawn(draw)[np.newaxis])[0]
         if not np.isfinite(seen).all():
@@ -269,9 +288,11 @@ def simulate_refits(rivals: Sequence[Rival], right: int, new: NewSignals, draws:
         won[right] = 1.0
         chances.append(won)
         distances.append(apart)
+        scattered = np.array(values)[:, np.newaxis] + 2.0 * apart[:, np.newaxis] * noises
+        left.append(float(np.mean(entropy(softmax(-0.5 * scattered, axis=0)))))
     if not chances:
-        return np.zeros(len(rivals)), np.zeros(len(rivals))
-    return np.mean(chances, axis=0), np.mean(distances, axis=0)
+        return np.zeros(len(rivals)), np.zeros(len(rivals)), left[0]
+    return np.mean(chances, axis=0), np.mean(distances, axis=0), float(np.mean(left[1:]))
 
 
 def fitted_again(rival: Rival, new: NewSignals, seen: Array) -> tuple[float, Array]:

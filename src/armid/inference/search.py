@@ -234,7 +234,7 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     trials += drops(found, model, fit)
     if not is_far and found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
         forms = effects.propose_forms(fit, found.known, library)
-        trials += swaps(found, model, fit, scale, [*proposals, *forms])
+        trials += swaps(found, model, fit, scale, [*proposals, *forms], limit)
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
         found.take(key, again)
@@ -315,17 +315,20 @@ def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -
 
 
 def near(
-    fit: Fit, active: tuple[EffectKey, ...], each: Sequence[dict[str, float]], library: Library, weight: float
-) -> Fit | None:
+    fit: Fit, active: tuple[EffectKey, ...], each: Sequence[dict[str, float]], library: Library, weight: float,
+    limit: float = np.inf,
+) -> Fit | None:  # fmt: skip
     """Return the model with some effects fitted from the best of several values, other unknowns as in a fit."""
     posed = effects.beside(fit, active, library)
     starts = [start_of(posed, values) for values in each]
     if len(starts) > 1:
         starts = [starts[int(np.argmin(projected(fit, posed, weight).chi2(np.array(starts))))]]
-    return effects.fitted(fit, posed, active, starts, library, weight)
+    return effects.fitted(fit, posed, active, starts, library, weight, limit)
 
 
-def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal]) -> list[Trial]:
+def swaps(
+    found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal], limit: float
+) -> list[Trial]:
     """Return the fits in which what moves the records most alike takes the place of an effect of a model.
 
     A swap partner that was never fitted would make a posterior that is sure of the wrong one.
@@ -347,7 +350,8 @@ def swaps(found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposa
         for _, proposal, variant, strength in [*forms, *each[:N_SWAPPED]]:
             other = model - {hypothesis} | {proposal.hypothesis}
             if not is_complete(found, other):  # a known rival may have been fitted from afar
-                trials[other] = partial(swapped, fit, key, proposal, variant, strength, found.library, scale.weight)
+                start = partial(swapped, fit, key, proposal, variant, strength)
+                trials[other] = partial(start, found.library, scale.weight, limit)
     return list(trials.items())
 
 
@@ -376,8 +380,9 @@ def likest(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, 
 
 
 def swapped(
-    fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library, weight: float
-) -> Fit | None:
+    fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library, weight: float,
+    limit: float,
+) -> Fit | None:  # fmt: skip
     """Return the model with one effect replaced by another, its shapes free where those of the old one are."""
     new: EffectKey = proposal.hypothesis.means
     new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
@@ -385,7 +390,7 @@ def swapped(
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     shares = np.clip(strength * STRENGTHS, 0.01, library.reach)
     each = [values | proposal.grid[variant].at(float(share)) for share in shares]
-    return near(fit, active, each, library, weight)
+    return near(fit, active, each, library, weight, limit)
 
 
 def pairs(

@@ -146,22 +146,25 @@ def freed(
     known = {f.unknown.name: f.value for f in fit.others}
     kept = {f.unknown.name: f.column for f in fit.others}
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
-    cost, damping = cost_of(base, unknowns, values, z, weight), FIRST
-    columns, is_new = columns_about(base.plain, unknowns, values, z, kept), not kept
+    (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
+    damping, columns, is_new = FIRST, columns_about(base.plain, unknowns, values, z, kept), not kept
     for _ in range(MOST_ROUGH if rough else MOST_STEPS):
-        here, square, slope = normal_equations(moved(base, unknowns, values), columns, values, z, weight)
+        there = moved(base, unknowns, values)
+        here, square, slope = normal_equations(there, residual, columns, values, z, weight)
         if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
             break
         dampings = [max(factor * damping, LEAST) for factor in LADDER]
         tried = np.array([step_in_box(square, slope, here, d, len(z)) for d in dampings])
-        costs = costs_of(base, unknowns, tried[:, len(z) :], tried[:, : len(z)], weight)
+        costs, residuals = costs_at(base, unknowns, tried[:, len(z) :], tried[:, : len(z)], weight)
         best = int(np.argmin(costs))
         fall, step = cost - costs[best], tried[best] - here
         if fall > 0.0:
             z, values, cost, damping = tried[best][: len(z)], tried[best][len(z) :], costs[best], dampings[best]
+            residual = residuals[best]
             if fits_starts(base.replays):
                 base = about_starts(base, unknowns, values, z)
-                cost = min(cost, cost_of(base, unknowns, values, z, weight))
+                (begun,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
+                cost = min(cost, begun)
         elif is_new:
             damping *= RAISED
         has_arrived = weight * fall < max(SETTLED, ROUGHLY * weight * cost if rough else 0.0)
@@ -177,15 +180,14 @@ def freed(
         raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
     records = moved(base, unknowns, values)
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
-    return replace(fit, records=records, z=z, residual=records.plain.residuals(z)[0], base=base,
+    return replace(fit, records=records, z=z, residual=residual[: columns.shape[0]], base=base,
                    others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
 
 
 def normal_equations(
-    records: WhiteRecords, columns: Array, values: Array, z: Array, weight: float
+    records: WhiteRecords, residual: Array, columns: Array, values: Array, z: Array, weight: float
 ) -> tuple[Array, Array, Array]:
     """Return all unknowns, parameters first, and half the second and the negative first derivatives of the cost."""
-    residual = records.residuals(z)[0]
     slopes = np.empty((len(residual), 0))
     if len(z):
         slopes = forward_slopes(records, [Descent(z, residual, float(residual @ residual))])[0]
@@ -212,19 +214,19 @@ def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array,
     return replace(base, replays=with_each(base.replays, begun))
 
 
-def cost_of(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, weight: float) -> float:
-    """Return the sum of squares, the priors and the samples that are left out counted."""
-    return float(costs_of(base, unknowns, values[np.newaxis], z[np.newaxis], weight)[0])
+def costs_at(
+    base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: Array, weight: float
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return the cost of candidates, (n_candidates,), and their residuals.
 
-
-def costs_of(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: Array, weight: float) -> Array:
-    """Return `cost_of` several candidates, (n_candidates,)."""
+    The cost is the sum of squares, the priors and the samples that are left out counted.
+    """
     residuals = residuals_at(base, unknowns, V, Z)
     lost = np.array([sum(u.lost(float(v)) for u, v in zip(unknowns, values, strict=True)) for values in V])
     chi2 = np.sum(residuals**2, axis=1)
     # A sample that is left out would have missed by as much as the others do.
     total = chi2 + np.sum(V**2, axis=1) / weight + np.maximum(chi2 / residuals.shape[1], 1.0) * lost
-    return np.where(np.isfinite(total), total, np.inf)
+    return np.where(np.isfinite(total), total, np.inf), residuals
 
 
 def residuals_at(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: Array) -> Array:

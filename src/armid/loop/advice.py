@@ -11,7 +11,7 @@ from armid.inference.infer import Inference
 from armid.model import Array
 
 # Manoeuvres that are listed, and models that one has to tell apart.
-MOST_ADVICE, MOST_RIVALS = 5, 4
+MOST_ADVICE, MOST_RIVALS = 5, 3
 
 
 def advice_on(
