@@ -35,9 +35,9 @@ from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 
 # Step of the differences, in prior standard deviations.
 STEP = 1e-2
-# Most steps of a rough fit, the fall of the weighted sum of squares at which a fit has arrived, and the share of the
-# fall that was foretold below which columns are taken anew.
-MOST_ROUGH, SETTLED, FORETOLD = 8, 0.1, 0.7
+# Fall of the weighted sum of squares at which a fit has arrived, and the share of the fall that was foretold below which
+# columns are taken anew.
+SETTLED, FORETOLD = 0.1, 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ def freed(
     """Return a fit with some unknowns freed, from where it stands: min weight |r|^2 + |v|^2.
 
     base: the records of the fit before any of the unknowns was moved. weight: of each square, see `evidence.Scale`.
-    limit: see `descend`. rough: a few steps.
+    limit: see `descend`. rough: to about where it arrives.
     Raises ArmidError where it diverges.
     """
     known = {f.unknown.name: f.value for f in fit.others}
@@ -148,7 +148,7 @@ def freed(
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
     (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
     damping, columns, is_new = FIRST, columns_about(base.plain, unknowns, values, z, kept), not kept
-    for _ in range(MOST_ROUGH if rough else MOST_STEPS):
+    for _ in range(MOST_STEPS):
         there = moved(base, unknowns, values)
         here, square, slope = normal_equations(there, residual, columns, values, z, weight)
         if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
