@@ -26,8 +26,8 @@ class Straight:
     def plain(self):
         return self
 
-    def residuals(self, _):
-        return (self.residual,)
+    def residuals(self, Z, *_):
+        return np.tile(self.residual, (len(np.atleast_2d(Z)), 1))
 
     def padded(self, columns):
         return columns

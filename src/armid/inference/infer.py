@@ -22,7 +22,7 @@ from armid.inference.model import Fit, fit_from
 from armid.inference.posterior import CONSTANTS, Posterior, posterior
 from armid.inference.prediction import predicting_best
 from armid.inference.refit import accurate
-from armid.inference.search import Exploration, explore
+from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.whitening import whitened
 from armid.model import EFFECTS, Effect, Model
 from armid.model.effects.sensor import sensor_effects
@@ -59,6 +59,7 @@ class Inference:
 
     found: Exploration
     posterior: Posterior
+    standing: Hypotheses | None = None
 
     @property
     def best(self) -> Fit:
@@ -67,11 +68,21 @@ class Inference:
 
     @cached_property
     def in_force(self) -> Hypotheses:
-        """The most probable model whose parts all have names; where no model is right, the one that predicts best."""
+        """The most probable model whose parts all have names; where no model is right, the one that predicts best.
+
+        Where held-out records denied some of its parts, what stands of it.
+        """
+        if self.standing is not None:
+            return self.standing
         named = [m for m, _ in self.found.ranked() if not any(h.kind == "unknown" for h in m)]
         if self.posterior.probability("unknown") < MENTIONED:
             return named[0]
         return predicting_best(named, self.found.fits, self.found.library)
+
+    def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
+        """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
+        found = without_denied(self.found, denied, standing)
+        return Inference(found, posterior(found), standing)
 
     @property
     def probabilities(self) -> dict[str, Any]:

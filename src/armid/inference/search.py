@@ -60,9 +60,10 @@ BEAM = 3
 class Exploration:
     """Hold every model that was fitted.
 
-    fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. completed: models at
-    their estimates with all unknowns freed, and the weight of a square at which they were. refused: models
-    that diverge, are hopeless, or hold a fault that hardly moves its record.
+    fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale,
+    None: as the model shows it that leaves least. completed: models at their estimates with all unknowns freed, and the
+    weight of a square at which they were. refused: models that diverge, are hopeless, or hold a fault that hardly moves
+    its record.
     """
 
     library: Library
@@ -72,6 +73,7 @@ class Exploration:
     constants: list[Unknown] = field(default_factory=list)
     fits: dict[Hypotheses, Fit] = field(default_factory=dict)
     forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
+    noise: Scale | None = None
     completed: dict[Hypotheses, float] = field(default_factory=dict)
     refused: set[Hypotheses] = field(default_factory=set)
     _evidence: dict[tuple[Fit, Scale], float] = field(default_factory=dict)
@@ -83,6 +85,8 @@ class Exploration:
 
     def scale(self) -> Scale:
         """Return the scale of the model that leaves least: it shows what is noise."""
+        if self.noise is not None:
+            return self.noise
         best = min(self.fits.values(), key=lambda f: f.chi2 + f.records.data.log_cover)
         if best not in self._scale:
             self._scale[best] = scale_of(best)
@@ -150,6 +154,21 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
     return found
 
 
+def without_denied(found: Exploration, denied: Hypotheses, standing: Hypotheses) -> Exploration:
+    """Return what was explored without hypotheses that held-out records deny, and without larger sets than what stands.
+
+    What is left over then is something unknown: no other name was judged in place of those.
+    """
+    gone = {h.public for h in denied}
+    fits = {m: fit for m, fit in found.fits.items()
+            if len(m) <= len(standing) and not any(h.public in gone for h in m)}  # fmt: skip
+    forecasts = {m: [f for f in several if f.proposal.hypothesis.public not in gone]
+                 for m, several in found.forecasts.items() if m in fits and len(m) < len(standing)}  # fmt: skip
+    left = replace(found, fits=fits, forecasts=forecasts, noise=found.scale(), _evidence={})
+    add_beside(left, [m for m, _ in left.ranked()[:N_BESIDE]])
+    return left
+
+
 def add_unknown(found: Exploration) -> bool:
     """Add a signal without a form to the best models; tell whether there is a new one.
 
@@ -159,12 +178,17 @@ def add_unknown(found: Exploration) -> bool:
     ranked = found.ranked()
     if any(h.kind == "unknown" for m in found.fits for h in m):
         return False
-    library, scale, before = found.library, found.scale(), len(found.fits)
     best = ranked[0][0]
     models = [*simpler(found, best), *([frozenset[Hypothesis]()] if best else [])]
     if is_significant(found.fits[best]):
         models = [*(m for m, _ in ranked[:N_BESIDE]), *models]
-    for model in dict.fromkeys(models):
+    return add_beside(found, list(dict.fromkeys(models)))
+
+
+def add_beside(found: Exploration, models: Sequence[Hypotheses]) -> bool:
+    """Add a signal without a form to some models; tell whether there is a new one."""
+    library, scale, before = found.library, found.scale(), len(found.fits)
+    for model in models:
         fit = found.fits[model]
         about = expansion_of(fit, scale, library)
         ahead = sorted((forecast(about, p) for p in unknown.propose(fit, library)), key=lambda f: -f.posterior)

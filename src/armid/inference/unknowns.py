@@ -35,8 +35,7 @@ from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 
 # Step of the differences, in prior standard deviations.
 STEP = 1e-2
-# Fall of the weighted sum of squares at which a fit has arrived, and the share of the fall that was foretold below which
-# columns are taken anew.
+# Fall of the weighted sum of squares at which a fit has arrived. Columns are old below this share of a foretold fall.
 SETTLED, FORETOLD = 0.1, 0.7
 
 
@@ -241,9 +240,7 @@ def residuals_at(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: A
         rows = np.flatnonzero((V[:, free] == values).all(axis=1))
         records = moved(base, rest, values)
         shares = {u.product.names[0]: V[rows, i] * u.product.tolerance for i, u in enumerate(unknowns) if u.product}
-        signals = records.whole_signals(records.whole(Z[rows]), shares)
-        residuals = records.measured - records.with_rows(signals, Z[rows])
-        found |= dict(zip(rows.tolist(), residuals, strict=True))
+        found |= dict(zip(rows.tolist(), records.residuals(Z[rows], shares), strict=True))
     return np.array([found[row] for row in range(len(V))])
 
 

@@ -169,8 +169,13 @@ class WhiteRecords(LeastSquaresProblem):
         _, means, deviations = self.rows
         return np.append(self.weighted([r.measured for r in self.replays]), means / deviations)
 
-    def signals(self, Z: Array) -> Array:
-        return self.with_rows(self.weighted(self.simulated(Z)), Z)
+    def signals(self, Z: Array, shares: Mapping[str, Array] | None = None) -> Array:
+        places, _, deviations = self.rows
+        found = self.whole_signals(self.whole(Z), shares)
+        return np.hstack([found, self.values(Z)[:, places] / deviations]) if len(places) else found
+
+    def residuals(self, Z: Array, shares: Mapping[str, Array] | None = None) -> Array:
+        return np.asarray(self.measured - self.signals(np.atleast_2d(Z), shares))
 
     def weighted(self, signals: Sequence[Array]) -> Array:
         return self.data.white(signals)
@@ -178,11 +183,6 @@ class WhiteRecords(LeastSquaresProblem):
     def whole_signals(self, candidates: Array, shares: Mapping[str, Array] | None = None) -> Array:
         """Return whitened signals of whole candidates, (n_candidates, n_samples); shares: see `ReadyRecord.runs`."""
         return self.data.white(signals_of(self.replays, candidates, shares))
-
-    def with_rows(self, signals: Array, Z: Array) -> Array:
-        """Return signals of candidates with the values of the known parameters behind them."""
-        places, _, deviations = self.rows
-        return np.hstack([signals, self.values(Z)[:, places] / deviations]) if len(places) else signals
 
     def padded(self, columns: Array) -> Array:
         """Return columns of the samples, (n_samples, n), with zeros in the rows of known parameters."""

@@ -128,9 +128,13 @@ def close_loop(
     judged = [judge(found, each, campaign, within) for each in path]
     steps = steps_of(found, path, judged)
     kept = confirmed(judged)
-    after, before = judged[kept], judged[0]
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
     withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
+    if withdrawn is not None:
+        found, path = found.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
+        judged = [judge(found, each, campaign, within) for each in path]
+        steps = steps_of(found, path, judged)
+    after, before = judged[kept], judged[0]
     accused = [h for h in path[kept] if found.posterior.probability(*h.public) >= MENTIONED]
     suspects = [*suspects_of(accused, path[kept], found), *broken_suspects(campaign.records)]
     verdicts = (
