@@ -17,7 +17,8 @@ from armid.inference.library import Library
 from armid.inference.missing_signal import Segment, motions, segments
 from armid.inference.model import Fit, fit_from
 from armid.inference.refit import candidate_at, free_values, unless_diverged
-from armid.inference.whitening import Cover
+from armid.inference.unknowns import Freed, freed
+from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
 
 # Prior deviations: rms by which the signal moves all records, in units of the noise.
@@ -122,15 +123,33 @@ def refit(
     """Return the model with a signal without a form: fitted with its covariance, taken about its own estimate."""
     again, scale = fit, ahead.best(1)[0][1]
     for _ in range(2):
-        columns = signals_without_form(again, library).columns.get(which)
+        columns = signals_without_form(with_cover(again, None), library).columns.get(which)
         if columns is None:
             return None
-        data = replace(again.records.data, cover=Cover.of(scale * columns))
-        records = replace(again.records, data=data)
-        tried = unless_diverged(lambda: fit_from(records, fit.active, [again.z]))  # noqa: B023
+        posed = with_cover(again, Cover.of(scale * columns))
+        tried = unless_diverged(lambda: fitted(posed, fit.others, about.scale.weight))  # noqa: B023
         if tried is None:
             return None
-        plain = replace(tried.records, data=replace(data, cover=None))
-        covered = replace(tried, others=fit.others, base=fit.base)
-        again = replace(covered, records=plain)
-    return covered
+        again = tried
+    return again
+
+
+def with_cover(fit: Fit, cover: Cover | None) -> Fit:
+    """Return a fit whose records have another covariance, not fitted to it yet."""
+
+    def covered(records: WhiteRecords) -> WhiteRecords:
+        return replace(records, data=replace(records.data, cover=cover))
+
+    return replace(fit, records=covered(fit.records), base=None if fit.base is None else covered(fit.base))
+
+
+def fitted(fit: Fit, others: tuple[Freed, ...], weight: float) -> Fit:
+    """Return a fit brought to its estimate, its further unknowns free: under a covariance they do something else.
+
+    others: with columns that no covariance has changed.
+    """
+    cover = fit.records.data.cover
+    if fit.base is None or cover is None:
+        return fit_from(fit.records, fit.active, [fit.z])
+    changed = tuple(replace(now, column=cover.white(f.column)) for now, f in zip(fit.others, others, strict=True))
+    return freed(replace(fit, others=changed), fit.base, [f.unknown for f in others], weight)
