@@ -35,8 +35,8 @@ from armid.model import Array
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
 # Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
 N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 8, 3, 3, 3, 2
-# Best models to which a signal without a form is added.
-N_BESIDE = 2
+# Best models to which a signal without a form is added, of those with a name less too; signals of each.
+N_BESIDE, N_SIGNALS = 2, 2
 # Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 16, 8
 # Of records with more samples than this, and with so many constants within tolerances half, fewer models are expanded,
@@ -179,7 +179,7 @@ def add_unknown(found: Exploration) -> bool:
     if any(h.kind == "unknown" for m in found.fits for h in m):
         return False
     best = ranked[0][0]
-    models = [*simpler(found, best), *([frozenset[Hypothesis]()] if best else [])]
+    models = [*simpler(found, best)[:N_BESIDE], *([frozenset[Hypothesis]()] if best else [])]
     if is_significant(found.fits[best]):
         models = [*(m for m, _ in ranked[:N_BESIDE]), *models]
     return add_beside(found, list(dict.fromkeys(models)))
@@ -192,7 +192,7 @@ def add_beside(found: Exploration, models: Sequence[Hypotheses]) -> bool:
         fit = found.fits[model]
         about = expansion_of(fit, scale, library)
         ahead = sorted((forecast(about, p) for p in unknown.propose(fit, library)), key=lambda f: -f.posterior)
-        for one in ahead[:N_OTHERS]:
+        for one in ahead[:N_SIGNALS]:
             for key, make in trial_of(found, model, about, one, np.inf):
                 found.take(key, make())
     return len(found.fits) > before

@@ -37,6 +37,8 @@ from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 STEP = 1e-2
 # Fall of the weighted sum of squares at which a fit has arrived. Columns are old below this share of a foretold fall.
 SETTLED, FORETOLD = 0.1, 0.7
+# Most steps of a rough fit: from far away it takes 16 to come near.
+MOST_ROUGH = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,7 @@ def freed(
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
     (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
     damping, columns, is_new = FIRST, columns_about(base.plain, unknowns, values, z, kept), not kept
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_ROUGH if rough else MOST_STEPS):
         there = moved(base, unknowns, values)
         here, square, slope = normal_equations(there, residual, columns, values, z, weight)
         if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
