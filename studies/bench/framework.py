@@ -51,8 +51,8 @@ class Watched:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._thing, name)
 
-    def runs(self, candidates: NDArray[np.float64]) -> Any:
-        return self._timed(self._thing.runs, candidates)
+    def runs(self, candidates: NDArray[np.float64], shares: Any = None) -> Any:
+        return self._timed(self._thing.runs, candidates, shares)
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         return self._timed(self._thing, *arguments, **named)

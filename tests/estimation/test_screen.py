@@ -366,7 +366,7 @@ def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(
     run = Prepared.run
 
     def counted(self, population, *more, **named):
-        steps.append(len(population) * self.n_samples * self.settings[4])
+        steps.append(len(population) * self.n_samples * self.settings[3])
         return run(self, population, *more, **named)
 
     monkeypatch.setattr(Prepared, "run", counted)

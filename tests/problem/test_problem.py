@@ -35,9 +35,9 @@ class Counted:
     def __init__(self, ready):
         self.ready, self.simulated = ready, 0
 
-    def runs(self, candidates):
+    def runs(self, candidates, shares=None):
         self.simulated += len(candidates)
-        return self.ready.runs(candidates)
+        return self.ready.runs(candidates, shares)
 
     def __getattr__(self, name):
         return getattr(self.ready, name)
@@ -137,9 +137,9 @@ def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
     seen = []
     runs = ReadyRecord.runs
 
-    def watched(ready, candidates):
+    def watched(ready, candidates, *shares):
         seen.append(len(candidates))
-        return runs(ready, candidates)
+        return runs(ready, candidates, *shares)
 
     monkeypatch.setattr("armid.problem.problem.MOST_VALUES", 1000)
     monkeypatch.setattr(ReadyRecord, "runs", watched)

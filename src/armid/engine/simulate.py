@@ -152,7 +152,7 @@ class Prepared:
     states: bool
 
     def moved_constants(self, shares: Mapping[str, Array]) -> Array:
-        """Return the constants of candidates of which some differ by shares of their value, see `run`."""
+        """Return the constants of candidates, some with shares added to their value, see `run`."""
         order = list(self.model.constants)
         moved = np.tile(self.constants, (len(next(iter(shares.values()))), 1))
         for name, several in shares.items():
@@ -164,12 +164,15 @@ class Prepared:
         model = self.model
         candidates = as_population(model, population)
         n = len(candidates)
-        constants = np.atleast_2d(self.constants if constants is None else constants)
-        rows, places = arranged(candidates, constants, self.width, self.schedule.weights)
+        rows, places = arranged(candidates, self.width, self.schedule.weights)
+        # Constants of all candidates stand once for each lane.
+        lanes = np.where(places >= 0, places, n - 1) if constants is not None else np.zeros(self.width, dtype=np.int64)
+        columns = np.ascontiguousarray(np.atleast_2d(self.constants if constants is None else constants)[lanes].T)
         outputs = np.empty((len(model.plant.outputs), n, self.n_samples))
         switches = np.full((len(model.latches), rows.shape[1]), np.nan)
         trace = np.empty((len(model.states), n, self.n_samples) if self.states else (0, 0, 0))
-        given, n_groups = (rows.ravel(), rows.shape[1], *self.settings, places), rows.shape[1] // self.width
+        given = (rows.ravel(), rows.shape[1], columns.ravel(), columns.shape[1], *self.settings, places)
+        n_groups = rows.shape[1] // self.width
         repeats = np.zeros(n_groups)
         with compiling(model, self.kernel):
             run(self.kernel, given, (outputs, switches.ravel(), trace, repeats), n_groups, threads)
@@ -204,21 +207,17 @@ def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
 
 
 def arranged(
-    candidates: Array, constants: Array, width: int, weights: Array | None
+    candidates: Array, width: int, weights: Array | None
 ) -> tuple[Array, NDArray[np.int64]]:  # fmt: skip
-    """Return parameters and constants as rows, one column for each lane, and the candidate of each lane (-1: padding).
-
-    constants: of each candidate, or one row for all.
-    """
-    n, n_parameters = candidates.shape
+    """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
+    n = len(candidates)
     if n <= width:
         weights = None  # within one group the order saves nothing
     order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
     places = np.full(n + -n % width, -1)
     places[:n] = order
-    rows = np.empty((n_parameters + constants.shape[1], len(places)))
-    rows[:n_parameters, :n] = candidates.T if weights is None else candidates[order].T
-    rows[n_parameters:, :n] = (constants if weights is None or len(constants) < n else constants[order]).T
+    rows = np.empty((candidates.shape[1], len(places)))
+    rows[:, :n] = candidates.T if weights is None else candidates[order].T
     rows[:, n:] = rows[:, n - 1 : n]
     return rows, places
 
