@@ -143,6 +143,21 @@ class Expansion:
         """Posterior covariance of all unknowns, (n, n)."""
         return self.scale.variance(self.fit.chi2) * cho_solve(self.factor, np.eye(len(self.precision)))
 
+    @cached_property
+    def spread(self) -> Array:
+        """Posterior covariance of the free parameters alone, as it is told: within their box all values are alike.
+
+        The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide. No
+        deviation is larger than that of even odds over the box, range/sqrt(12).
+        """
+        n = int(self.kept.sum())
+        is_known = np.isin(np.arange(self.fit.n_free), self.fit.records.rows[0])[self.kept]
+        flat = self.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(self.precision) - n))
+        normal = self.scale.weight * self.unknowns.T @ self.unknowns + np.diag(flat)
+        found = self.scale.variance(self.fit.chi2) * np.linalg.inv(normal)[:n, :n]
+        shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(found), 1e-300)))
+        return np.asarray(found * np.outer(shrunk, shrunk))
+
     def beyond(self, columns: Array) -> tuple[Array, Array]:
         """Return inner products of columns, (n, n_samples), with themselves and the residual, beyond the unknowns.
 

@@ -134,7 +134,7 @@ class Inference:
         whole = expansion_of(fit, scale, found.library)
         alone = Expansion(replace(fit, others=()), scale, found.library, np.empty((len(fit.residual), 0)))
         n = fit.n_free
-        wide, narrow = (NORMAL_95 * span * np.sqrt(np.diag(e.covariance)[:n]) for e in (whole, alone))
+        wide, narrow = (NORMAL_95 * span * np.sqrt(np.diag(e.spread)[:n]) for e in (whole, alone))
         return {name: Interval(v - float(w), v + float(w), v - float(a), v + float(a))
                 for (name, v), w, a in zip(fit.values.items(), wide, narrow, strict=True)}  # fmt: skip
 

@@ -148,7 +148,7 @@ def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
     values = about.fit.values
     places = [list(values).index(n) for n in own]
     span = about.fit.records.span[places]
-    covariance = about.covariance[np.ix_(places, places)] * np.outer(span, span)
+    covariance = about.spread[np.ix_(places, places)] * np.outer(span, span)
     return np.array([values[n] for n in own]), covariance
 
 

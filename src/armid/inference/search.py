@@ -29,7 +29,7 @@ from armid.inference.library import EffectKey, Library
 from armid.inference.model import Fit
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
-from armid.inference.unknowns import Unknown, constants_of, freed, projected
+from armid.inference.unknowns import Unknown, constants_of, freed, polished, projected
 from armid.model import Array
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
@@ -475,9 +475,12 @@ def finish_all(found: Exploration) -> None:
         twins = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
         todo += [m for m in twins[:N_TWINS] if m not in todo and not is_complete(found, m) and has_shapes(found, m)]
         if not todo:
-            return
+            break
         for model in todo:
             complete(found, model)
+    weight, top = found.scale().weight, found.ranked()[0][1]
+    for model in [m for m, value in found.ranked()[:BEAM] if value > top - WINDOW]:
+        found.fits[model] = polished(found.fits[model], weight)
 
 
 def simpler(found: Exploration, model: Hypotheses) -> list[Hypotheses]:

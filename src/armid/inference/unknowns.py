@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, moved_replays, products
@@ -27,6 +28,7 @@ from armid.estimation.least_squares import (
     forward_slopes,
     step_in_box,
 )
+from armid.estimation.least_squares import STEP as Z_STEP
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
@@ -35,6 +37,8 @@ from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 
 # Step of the differences, in prior standard deviations.
 STEP = 1e-2
+# Of a fit that is polished: relative change at which it ends, and how far inside the box it stays, as a share.
+ARRIVED, INSIDE = 1e-8, 1e-6
 # Fall of the weighted sum of squares at which a fit has arrived. Columns are old below this share of a foretold fall.
 SETTLED, FORETOLD = 0.1, 0.7
 # Most steps of a rough fit: from far away it takes 16 to come near.
@@ -179,10 +183,55 @@ def freed(
             columns = columns_about(base.plain, unknowns, values, z, {})
     if not np.isfinite(cost):
         raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
+    return landed(fit, base, unknowns, values, z, columns, rough)
+
+
+def landed(
+    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, columns: Array, rough: bool
+) -> Fit:
+    """Return a fit with other values of its parameters and further unknowns."""
     records = moved(base, unknowns, values)
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
-    return replace(fit, records=records, z=z, residual=residual[: columns.shape[0]], base=base,
+    return replace(fit, records=records, z=z, residual=records.plain.residuals(z)[0], base=base,
                    others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
+
+
+def polished(fit: Fit, weight: float) -> Fit:
+    """Return a fit at its minimum: along a valley that bends, steps that gain next to nothing lead far.
+
+    By a trust region with all slopes taken anew at each step (Branch, Coleman, Li 1999,
+    doi:10.1137/S1064827595289108). Fits whose starts follow them stay as they are.
+    """
+    base = fit.base
+    if base is None or fits_starts(base.replays):
+        return fit
+    unknowns, n = [f.unknown for f in fit.others], len(fit.z)
+    here = np.concatenate([np.clip(fit.z, INSIDE, 1.0 - INSIDE), [f.value for f in fit.others]])
+    steps = np.repeat([Z_STEP, STEP], [n, len(unknowns)])
+    low, high = np.repeat([0.0, -np.inf], [n, len(unknowns)]), np.repeat([1.0, np.inf], [n, len(unknowns)])
+
+    def residuals(X: Array) -> Array:
+        found = residuals_at(base, unknowns, X[:, n:], X[:, :n])
+        return np.asarray(np.hstack([np.sqrt(weight) * found, X[:, n:]]))
+
+    def slopes(x: Array) -> Array:
+        centre = np.clip(x, low + steps, high - steps)
+        sides = residuals(np.concatenate([centre + np.diag(steps), centre - np.diag(steps)]))
+        return np.asarray(np.nan_to_num((sides[: len(x)] - sides[len(x) :]) / (2.0 * steps[:, np.newaxis])).T)
+
+    def residual(x: Array) -> Array:
+        return np.asarray(residuals(x[np.newaxis])[0])
+
+    found = least_squares(residual, here, slopes, (low, high), x_scale="jac",
+                          ftol=ARRIVED, xtol=ARRIVED, gtol=ARRIVED, max_nfev=MOST_STEPS)  # fmt: skip
+    z, values = found.x[:n], found.x[n:]
+    # what came to the edge of the inside is on the bound
+    z = np.clip(z + INSIDE * (2.0 * z - 1.0), 0.0, 1.0)
+    V, Z = np.array([[f.value for f in fit.others], values]), np.array([fit.z, z])
+    before, after = costs_at(base, unknowns, V, Z, weight)[0]
+    if not after < before:
+        return fit
+    return landed(fit, base, unknowns, values, z, columns_about(base.plain, unknowns, values, z, {}), fit.rough)
 
 
 def normal_equations(
