@@ -112,11 +112,15 @@ def page(plan: dict[str, Any], n_planned: int, n_closed: int, failed: Sequence[s
              {True: "yes", False: "no", None: ""}[s.met]] for s in lines]  # fmt: skip
     head = ["score", "group", "question", "campaigns", "value", "95 % interval", "target", "met"]
     asked = [s for s in lines if s.met is not None]
+    few = [
+        "The run was cut: of so few campaigns the intervals are wide, and a target that they touch may yet be missed."
+    ]
     text = [
         "# Are the probabilities to be bet on, and do the intervals hold?", "",
         f"{sum(bool(s.met) for s in asked)} of {len(asked)} targets are met: the interval touches the target.",
         f"Seed {plan['seed']}: {n_closed} of {n_planned} planned campaigns were closed; {len(failed)} ended in an "
         "error. All campaigns are synthetic. Intervals come from a bootstrap over campaigns.",
+        *(few if n_closed < n_planned else []),
         "", "![how often a name is right against its probability](reliability.png)", "",
         "| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(row) + " |" for row in rows), "",
         f"`python studies/calibration/run.py FOLDER --seed {plan['seed']} --size {plan['size']}` closes the campaigns, "
