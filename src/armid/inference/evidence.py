@@ -145,7 +145,7 @@ class Expansion:
 
     @cached_property
     def spread(self) -> Array:
-        """Posterior covariance of the free parameters alone, as it is told: within their box all values are alike.
+        """Posterior covariance of the free parameters alone, as it is reported: within their box all values are alike.
 
         The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide. No
         deviation is larger than that of even odds over the box, range/sqrt(12).
