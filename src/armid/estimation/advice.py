@@ -114,21 +114,25 @@ def advise(
     predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
     draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
     possible = [f for f in grid if all(f in known for known in predictions)]
-    ranks = {f: rank(predicted_powers(rivals, [p[f] for p in predictions], draws)) for f in possible}
+    powers = {f: predicted_powers(rivals, [p[f] for p in predictions], draws) for f in possible}
     most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
-    promising = sorted(possible, key=lambda f: ranks[f], reverse=True)[:most]
+    promising = sorted(possible, key=lambda f: rank(mean_of(powers[f], 0), powers[f]), reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
     found = side_by_side(lambda f: simulated(rivals, f, white, draws), promising, threads)
     each = [(f, *one) for f, one in zip(promising, found, strict=True)]
-    now = max(float(entropy(softmax([-0.5 * r.criterion for r in rivals]))), 1e-9)
-    each.sort(key=lambda e: rank(e[2], e[1] / now), reverse=True)
+    now = max(float(entropy(probabilities(rivals))), 1e-9)
+    each.sort(key=lambda e: rank(e[1] / now, e[2]), reverse=True)
     return tuple(advice_of(rivals, *one) for one in each)
 
 
-def rank(powers: Powers, gain: float | None = None) -> tuple[float, float]:
-    """Return what manoeuvres are ranked by: the share of the entropy that goes, None: the mean power; mean distance."""
-    power, delta = (float(np.mean([p[k] for p in powers.values()])) for k in (0, 1))
-    return round(power if gain is None else gain, 2), delta
+def rank(merit: float, powers: Powers) -> tuple[float, float]:
+    """Return what manoeuvres are ranked by: a merit in steps of a hundredth, then the mean distance over pairs."""
+    return round(merit, 2), mean_of(powers, 1)
+
+
+def mean_of(powers: Powers, place: int) -> float:
+    """Return the mean over pairs of the powers (place 0) or of the distances (1)."""
+    return float(np.mean([p[place] for p in powers.values()]))
 
 
 def advice_of(rivals: Sequence[Rival], feasible: Feasible, gain: float, powers: Powers) -> Advice:
@@ -250,13 +254,18 @@ def simulated(
     """Return gain and powers of one manoeuvre."""
     new = partial(whitened_signals, feasible, white)
     tried = [simulate_refits(rivals, i, new, draws) for i in range(len(rivals))]
-    now = softmax([-0.5 * r.criterion for r in rivals])
+    now = probabilities(rivals)
     after = sum(float(p) * left for p, (*_, left) in zip(now, tried, strict=True))
     chances, distances = (np.array([t[k] for t in tried]) for k in (0, 1))
     return float(entropy(now)) - after, {
         (a, b): (float(0.5 * (chances[a, b] + chances[b, a])), float(0.5 * (distances[a, b] + distances[b, a])))
         for a, b in combinations(range(len(rivals)), 2)
     }
+
+
+def probabilities(rivals: Sequence[Rival]) -> Array:
+    """Return the posterior over the rivals, (n_rivals,)."""
+    return np.asarray(softmax([-0.5 * r.criterion for r in rivals]))
 
 
 def entropy(shares: Array) -> Array:
@@ -276,7 +285,7 @@ def simulate_refits(
     """
     true = rivals[right]
     noises = normal_draws(len(rivals), N_NOISES).T
-    chances, distances, left = [], [], [float(entropy(softmax([-0.5 * r.criterion for r in rivals])))]
+    chances, distances, left = [], [], [float(entropy(probabilities(rivals)))]
     for draw in draws:
         seen = new(true, true.drawn(draw)[np.newaxis])[0]
         if not np.isfinite(seen).all():

@@ -134,9 +134,13 @@ class Expansion:
         return np.asarray(found)
 
     @cached_property
+    def information(self) -> Array:
+        """What the records know of all unknowns, the priors not counted, (n, n)."""
+        return np.asarray(self.scale.weight * self.unknowns.T @ self.unknowns)
+
+    @cached_property
     def factor(self) -> tuple[Array, bool]:
-        normal = self.scale.weight * self.unknowns.T @ self.unknowns
-        return cho_factor(normal + np.diag(self.precision), lower=True)
+        return cho_factor(self.information + np.diag(self.precision), lower=True)
 
     @cached_property
     def covariance(self) -> Array:
@@ -153,8 +157,7 @@ class Expansion:
         n = int(self.kept.sum())
         is_known = np.isin(np.arange(self.fit.n_free), self.fit.records.rows[0])[self.kept]
         flat = self.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(self.precision) - n))
-        normal = self.scale.weight * self.unknowns.T @ self.unknowns + np.diag(flat)
-        found = self.scale.variance(self.fit.chi2) * np.linalg.inv(normal)[:n, :n]
+        found = self.scale.variance(self.fit.chi2) * np.linalg.inv(self.information + np.diag(flat))[:n, :n]
         shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(found), 1e-300)))
         return np.asarray(found * np.outer(shrunk, shrunk))
 

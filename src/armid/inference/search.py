@@ -165,7 +165,7 @@ def without_denied(found: Exploration, denied: Hypotheses, standing: Hypotheses)
     forecasts = {m: [f for f in several if f.proposal.hypothesis.public not in gone]
                  for m, several in found.forecasts.items() if m in fits and len(m) < len(standing)}  # fmt: skip
     left = replace(found, fits=fits, forecasts=forecasts, noise=found.scale(), _evidence={})
-    add_beside(left, [m for m, _ in left.ranked()[:N_BESIDE]])
+    add_signals(left, [m for m, _ in left.ranked()[:N_BESIDE]])
     return left
 
 
@@ -182,11 +182,11 @@ def add_unknown(found: Exploration) -> bool:
     models = [*simpler(found, best)[:N_BESIDE], *([frozenset[Hypothesis]()] if best else [])]
     if is_significant(found.fits[best]):
         models = [*(m for m, _ in ranked[:N_BESIDE]), *models]
-    return add_beside(found, list(dict.fromkeys(models)))
+    return add_signals(found, list(dict.fromkeys(models)))
 
 
-def add_beside(found: Exploration, models: Sequence[Hypotheses]) -> bool:
-    """Add a signal without a form to some models; tell whether there is a new one."""
+def add_signals(found: Exploration, models: Sequence[Hypotheses]) -> bool:
+    """Add signals without a form to some models; return whether a model is new."""
     library, scale, before = found.library, found.scale(), len(found.fits)
     for model in models:
         fit = found.fits[model]

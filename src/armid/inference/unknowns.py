@@ -183,16 +183,17 @@ def freed(
             columns = columns_about(base.plain, unknowns, values, z, {})
     if not np.isfinite(cost):
         raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
-    return landed(fit, base, unknowns, values, z, columns, rough)
+    return landed(fit, base, unknowns, values, z, residual, columns, rough)
 
 
 def landed(
-    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, columns: Array, rough: bool
-) -> Fit:
-    """Return a fit with other values of its parameters and further unknowns."""
+    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, residual: Array, columns: Array,
+    rough: bool,
+) -> Fit:  # fmt: skip
+    """Return a fit with other values of its parameters and further unknowns; residual: there, see `costs_at`."""
     records = moved(base, unknowns, values)
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
-    return replace(fit, records=records, z=z, residual=records.plain.residuals(z)[0], base=base,
+    return replace(fit, records=records, z=z, residual=residual[: len(columns)], base=base,
                    others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
 
 
@@ -228,10 +229,11 @@ def polished(fit: Fit, weight: float) -> Fit:
     # what came to the edge of the inside is on the bound
     z = np.clip(z + INSIDE * (2.0 * z - 1.0), 0.0, 1.0)
     V, Z = np.array([[f.value for f in fit.others], values]), np.array([fit.z, z])
-    before, after = costs_at(base, unknowns, V, Z, weight)[0]
+    (before, after), (_, there) = costs_at(base, unknowns, V, Z, weight)
     if not after < before:
         return fit
-    return landed(fit, base, unknowns, values, z, columns_about(base.plain, unknowns, values, z, {}), fit.rough)
+    columns = columns_about(base.plain, unknowns, values, z, {})
+    return landed(fit, base, unknowns, values, z, there, columns, fit.rough)
 
 
 def normal_equations(

@@ -132,7 +132,8 @@ def close_loop(
     withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
     if withdrawn is not None:
         found, path = found.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
-        judged = [judge(found, each, campaign, within) for each in path]
+        judged = [replace(j, estimates=estimates(found, m, j.fit, j.significant, within))
+                  for m, j in zip(path, judged, strict=False)]  # fmt: skip
         steps = steps_of(found, path, judged)
     after, before = judged[kept], judged[0]
     accused = [h for h in path[kept] if found.posterior.probability(*h.public) >= MENTIONED]
