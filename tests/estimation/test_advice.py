@@ -214,8 +214,8 @@ def test_the_largest_set_that_is_told_apart_is_named(rivals):
     assert advice_of(three, feasible, 1.0, clear).separates == ("x", "y", "z")
     assert advice_of(three, feasible, 1.0, clear).power == 0.7
     partly = clear | {(0, 2): (OFTEN - 0.1, 1.0)}
-    told = advice_of(three, feasible, 1.0, partly)
-    assert (told.separates, told.power, told.delta) == (("x", "y"), 0.9, 5.0)
+    found = advice_of(three, feasible, 1.0, partly)
+    assert (found.separates, found.power, found.delta) == (("x", "y"), 0.9, 5.0)
     hardly = {pair: (0.1 * sum(pair), 1.0) for pair in clear}
     assert advice_of(three, feasible, 1.0, hardly) == Advice(
         dict(feasible.keys), feasible.name, 1.0, ("y", "z"), pytest.approx(0.3), 1.0

@@ -157,7 +157,10 @@ class Expansion:
         n = int(self.kept.sum())
         is_known = np.isin(np.arange(self.fit.n_free), self.fit.records.rows[0])[self.kept]
         flat = self.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(self.precision) - n))
-        found = self.scale.variance(self.fit.chi2) * np.linalg.inv(self.information + np.diag(flat))[:n, :n]
+        known, cover = self.information + np.diag(flat), self.fit.records.data.cover
+        if cover is not None:
+            known = known - cover.taken(self.unknowns, self.scale.weight)
+        found = self.scale.variance(self.fit.chi2) * np.linalg.inv(known)[:n, :n]
         shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(found), 1e-300)))
         return np.asarray(found * np.outer(shrunk, shrunk))
 

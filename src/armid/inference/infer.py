@@ -120,6 +120,8 @@ class Inference:
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
         has_constants = any(f.unknown.name.startswith(NAMED) for f in self.best.others)
         beside = CONSTANTS if has_constants or not sizes else f"size of {sizes[0]}"
+        if self.best.records.data.cover is not None:
+            beside = f"where something unknown acts{f', and {beside}' if self.best.others else ''}"
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
                 (low, high), noise = self.posterior.interval(name), 0.5 * (one.noise_high - one.noise_low) / NORMAL_95

@@ -19,16 +19,21 @@ from armid.problem.problem import signals_of
 from armid.record import Record
 from armid.record.noise import correlation_sum, new_share
 
+# Sum of squares, in units of the noise, from which on a signal is kept: the samples do not see smaller ones.
+SMALLEST = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Cover:
     """Hold the covariance B B' that a signal without a form adds to whitened noise: 1 + B B' = 1 + Q L Q'.
 
-    basis: Q, orthonormal, (n_samples, rank). sizes: L, (rank,).
+    basis: Q, orthonormal, (n_samples, rank). sizes: L, (rank,). elsewhere: orthogonal columns of signals that may act
+    instead, whitened, (n_samples, n): intervals count them, and no fit; None for none.
     """
 
     basis: Array
     sizes: Array
+    elsewhere: Array | None = None
 
     @classmethod
     def of(cls, columns: Array) -> "Cover":
@@ -40,6 +45,22 @@ class Cover:
         """Return signals divided by the root of the covariance, (..., n_samples)."""
         shares = 1.0 - 1.0 / np.sqrt(1.0 + self.sizes)
         return np.asarray(signals - ((signals @ self.basis) * shares) @ self.basis.T)
+
+    def with_elsewhere(self, columns: Array) -> "Cover":
+        """Return the cover with columns of signals that may act instead, each of one standard deviation."""
+        white = self.white(columns.T).T
+        squares, vectors = np.linalg.eigh(white.T @ white)
+        return replace(self, elsewhere=white @ vectors[:, np.searchsorted(squares, SMALLEST) :])
+
+    def taken(self, unknowns: Array, weight: float) -> Array:
+        """Return the information on unknowns, (n_samples, n), that signals elsewhere take away, (n, n).
+
+        weight: of each square.
+        """
+        if self.elsewhere is None:
+            return np.zeros((unknowns.shape[1],) * 2)
+        cross, squares = unknowns.T @ self.elsewhere, np.sum(self.elsewhere**2, axis=0)
+        return np.asarray(weight**2 * (cross / (1.0 + weight * squares)) @ cross.T)
 
 
 @dataclass(frozen=True, eq=False)

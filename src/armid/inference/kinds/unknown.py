@@ -25,6 +25,7 @@ from armid.model import Array
 SCALES = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 # Lengths over which the signal forgets, as shares of the median duration of a piece; of a curve, of its range.
 LENGTHS, LENGTH_OF_CURVE = (0.07, 0.2), 0.25
+TIME = "time"
 # Columns of a curve, knots under it, and the most columns of one piece in time.
 N_CURVE, N_KNOTS, MOST_IN_TIME = 6, 10, 20
 
@@ -60,11 +61,11 @@ def signals_without_form(fit: Fit, library: Library) -> Signals:
     duration = float(np.median([s.knots[-1] - s.knots[0] for s in whole]))
     for port in whole[0].gains:
         for share in LENGTHS:
-            found[port, f"time ({share:g} of a record)"] = white(block_diag(*(
+            found[port, f"{TIME} ({share:g} of a record)"] = white(block_diag(*(
                 s.gains[port] @ process(s.knots, share * duration, MOST_IN_TIME) for s in whole)))  # fmt: skip
         for variable in whole[0].variables:
             for factor in whole[0].factors:
-                if variable not in (factor, "time"):
+                if variable not in (factor, TIME):
                     name = variable if factor == "1" else f"{variable} x {factor}"
                     found[port, name] = white(over_variable(whole, port, variable, factor))
     sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in found.items()}
@@ -123,15 +124,22 @@ def refit(
     """Return the model with a signal without a form: fitted with its covariance, taken about its own estimate."""
     again, scale = fit, ahead.best(1)[0][1]
     for _ in range(2):
-        columns = signals_without_form(with_cover(again, None), library).columns.get(which)
+        every = signals_without_form(with_cover(again, None), library).columns
+        columns = every.get(which)
         if columns is None:
             return None
-        posed = with_cover(again, Cover.of(scale * columns))
+        cover = Cover.of(scale * columns)
+        posed = with_cover(again, cover)
         tried = unless_diverged(lambda: fitted(posed, fit.others, about.scale.weight))  # noqa: B023
         if tried is None:
             return None
         again = tried
-    return again
+    # The likeliest variable is a guess, and by a wrong one a model with wrong parameters can leave noise alone: its
+    # variance once more, spread evenly over the curves of all variables at all ports.
+    curves = [column for (_, variable), column in every.items() if not variable.startswith(TIME)]
+    if not curves:
+        return again
+    return with_cover(again, cover.with_elsewhere(scale / np.sqrt(len(curves)) * np.hstack(curves)))
 
 
 def with_cover(fit: Fit, cover: Cover | None) -> Fit:
