@@ -25,7 +25,7 @@ NUMERICS = {
         "LARGEST",
         "FORETOLD",
     ),
-    "budgets of computing": ("BUNDLE", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
+    "budgets of computing": ("APART", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS", "LINE", "MOST_BRIDGED", "STILL",
                               "EVEN", "MISFIT", "ENGINE_ERRORS", "CHANCE"),
     "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),

@@ -1,6 +1,6 @@
 """Names of the effects that may be missing."""
 
-from armid.inference.library import EffectKey
+from armid.inference.candidates import EffectKey
 
 
 def test_keys_and_what_they_own():

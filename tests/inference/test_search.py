@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from armid.inference import infer, search
+from armid.inference.candidates import EffectKey
 from armid.inference.decisions import WINDOW
 from armid.inference.hypothesis import Hypothesis
-from armid.inference.library import EffectKey, Library
+from armid.inference.library import Library
 from armid.inference.refit import best_along
 from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, is_outdone, next_model
 from armid.model import EFFECTS, Model

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from few_candidates import CANDIDATES, COMMON, TRUTH
 
+from armid.inference.candidates import bump_at
 from armid.inference.missing_signal import dependences, missing_signal, motions, segments
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion, details_of
@@ -58,7 +59,8 @@ def axis(tmp_path_factory):
 @pytest.fixture(scope="module")
 def whole(axis):
     model, space, ready = axis
-    return segments(model, space, np.empty(0), ready, [NOISE] * 3, ["torque", "output"])
+    tested = Model(model.plant, tuple(map(bump_at, model.plant.ports)))
+    return segments(tested, space, np.empty(0), ready, [NOISE] * 3, ["torque", "output"])
 
 
 def test_the_gain_of_a_force_is_its_impulse_over_the_mass(whole):

@@ -8,7 +8,7 @@ import pytest
 
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
-from armid.inference.library import EffectKey, constant_effects
+from armid.inference.candidates import EffectKey, constant_effects
 from armid.model import PLANTS, Manoeuvre, Model, Scales
 from armid.model.plants import flexible_link as link
 

@@ -4,6 +4,7 @@ simulate: a population through a manoeuvre, and quantities along a motion. calib
 generate, templates/kernel.py.jinja: the module of a model, its equations and the loop that integrates them.
 templates/delays.py.jinja, templates/history.py.jinja: what a module with late signals has besides.
 transpile: the source of an equation, made self-contained. compile: the module; cache: what of it is kept on disk.
+linked: functions of a module that are linked into others, and never made executable by themselves.
 simd, simd_math: vectors of candidates in numba, and their elementary functions.
 """
 

@@ -12,6 +12,8 @@ from numba import types
 from numba.core.errors import TypingError
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model, type_callable
 
+from armid.engine.linked import LINKED
+
 DOUBLE = ir.DoubleType()
 INT32 = ir.IntType(32)
 INT64 = ir.IntType(64)
@@ -221,12 +223,12 @@ def negate(typing_context, a):
     return elementwise(a, lambda builder, x: builder.fneg(x, flags=FLAGS), a)
 
 
-@overload(operator.neg)
+@overload(operator.neg, jit_options=LINKED)
 def lanes_neg(a):
     return (lambda a: negate(a)) if isinstance(a, Lanes) else None
 
 
-@overload(operator.pos)
+@overload(operator.pos, jit_options=LINKED)
 def lanes_pos(a):
     return (lambda a: a) if isinstance(a, Lanes) else None
 

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numba.extending import overload
 
+from armid.engine.linked import LINKED
 from armid.engine.simd import (
     Lanes,
     any_above,
@@ -33,7 +34,7 @@ from armid.engine.simd import (
     with_lane,
 )
 
-compiled = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+compiled = numba.njit(**LINKED)
 
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 SMALLEST, LARGEST = 2.2250738585072014e-308, 1.7976931348623157e308
@@ -173,7 +174,7 @@ def define_unary(names: tuple[Any, ...], implementation: Callable[..., Any]) -> 
     LANE_FUNCTIONS.update(names)
     for name in names:
 
-        @overload(name)
+        @overload(name, jit_options=LINKED)
         def act(x):
             return (lambda x: implementation(x)) if isinstance(x, Lanes) else None
 
@@ -183,7 +184,7 @@ def define_binary(names: tuple[Any, ...], implementation: Callable[..., Any]) ->
     LANE_FUNCTIONS.update(names)
     for name in names:
 
-        @overload(name)
+        @overload(name, jit_options=LINKED)
         def act(a, b):
             return (lambda a, b: implementation(a, b)) if mixes_lanes(a, b) else None
 
@@ -195,7 +196,7 @@ def define_extreme(name: Any, implementation: Callable[..., Any], passes_nan: bo
     """
     LANE_FUNCTIONS.add(name)
 
-    @overload(name)
+    @overload(name, jit_options=LINKED)
     def act(a, b):
         if not mixes_lanes(a, b):
             return None
@@ -208,44 +209,44 @@ def define_extreme(name: Any, implementation: Callable[..., Any], passes_nan: bo
         return lambda a, b: select(a != a, 0.5, b, implementation(a, b))
 
 
-@numba.njit
+@compiled
 def smaller(a, b):
     return select(a, b, b, a)
 
 
-@numba.njit
+@compiled
 def larger(a, b):
     return select(b, a, b, a)
 
 
-@numba.njit
+@compiled
 def both(a, b):
     return select(a != 0.0, 0.5, b != 0.0, 0.0)
 
 
-@numba.njit
+@compiled
 def either(a, b):
     return select(a != 0.0, 0.5, 1.0, b != 0.0)
 
 
-@numba.njit
+@compiled
 def with_sign(a, b):
     return select(-b, 0.0, -abs(a), abs(a))
 
 
-@numba.njit
+@compiled
 def length(a, b):
     """Return the root of the sum of squares, which must be neither too large nor too small for a double."""
     return square_root(a * a + b * b)
 
 
-@numba.njit
+@compiled
 def arctan2(y, x):
     half = lanes_arctan(y / x) + select(-x, 0.0, with_sign(np.pi, y), 0.0)
     return select(x == 0.0, 0.5, with_sign(0.5 * np.pi, y) * abs(lanes_sign(y)), half)
 
 
-@overload(np.where)
+@overload(np.where, jit_options=LINKED)
 def where(condition, a, b):
     """Choose by a condition; also for plain numbers, which numba's own `where` refuses."""
     if mixes_lanes(condition, a, b):
@@ -255,7 +256,7 @@ def where(condition, a, b):
     return None
 
 
-@overload(np.clip)
+@overload(np.clip, jit_options=LINKED)
 def clip(x, low, high):
     """Bound from below, then from above; also plain numbers, which numba's own `clip` returns as an array."""
     if mixes_lanes(x, low, high) or all(is_number(t) for t in (x, low, high)):
@@ -274,10 +275,10 @@ define_unary((np.cos, math.cos), lanes_cos)
 define_unary((np.arctan, math.atan), lanes_arctan)
 define_unary((np.tanh, math.tanh), lanes_tanh)
 define_unary((np.sign,), lanes_sign)
-define_unary((np.square,), numba.njit(lambda x: x * x))
-define_unary((np.reciprocal,), numba.njit(lambda x: 1.0 / x))
-define_unary((np.negative,), numba.njit(lambda x: -x))
-define_unary((np.logical_not, operator.invert), numba.njit(lambda x: x == 0.0))
+define_unary((np.square,), compiled(lambda x: x * x))
+define_unary((np.reciprocal,), compiled(lambda x: 1.0 / x))
+define_unary((np.negative,), compiled(lambda x: -x))
+define_unary((np.logical_not, operator.invert), compiled(lambda x: x == 0.0))
 define_binary((operator.pow, np.power, math.pow), lanes_power)
 define_binary((builtins.min,), smaller)
 define_binary((builtins.max,), larger)

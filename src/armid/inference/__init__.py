@@ -4,7 +4,7 @@ In reading order:
 
 infer         the whole way: campaign -> probabilities and intervals
 whitening     train records with their noise -> residuals whose noise is white
-library       the candidate effects, compiled together and ready to be tried
+library       the candidate effects, compiled together and ready to be tried; `candidates`: their keys and bundles
 hypothesis    what the declared model of the machine and its records may lack
 decisions     prior beliefs, from calibration.toml, and all other numbers that decide
 kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form

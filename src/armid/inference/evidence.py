@@ -21,9 +21,10 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
 
 from armid.estimation.constants import NAMED
+from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.hypothesis import Proposal
-from armid.inference.library import EffectKey, Library
+from armid.inference.library import Library
 from armid.inference.model import Fit
 from armid.model import Array
 

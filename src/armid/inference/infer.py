@@ -14,10 +14,11 @@ from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import Estimates, held_by_bound, spread_starts, with_fitted_starts
+from armid.inference.candidates import constant_effects
 from armid.inference.decisions import LISTED, MENTIONED
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
-from armid.inference.library import Library, constant_effects, library_of
+from armid.inference.library import Library, library_of
 from armid.inference.model import Fit, fit_from
 from armid.inference.posterior import CONSTANTS, Posterior, posterior
 from armid.inference.prediction import predicting_best

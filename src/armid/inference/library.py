@@ -1,23 +1,34 @@
 """The candidate effects, compiled together and ready to be tried on the train records.
 
-Compiling takes long however few effects a model holds (measured on the arm: 8 s with none, 32 s with all 38), so all
+Compiling takes long however few effects a model holds (measured on the arm: 5 s with none, 36 s with all 47), so all
 candidates that compose without a circle are compiled as one model: with all but two at their null values it is the
-model with the two. An effect at its null is skipped by the engine, so that it costs little: 0.12 ms for eight
-candidates and 1.5 s of motion with no effect in the model, 0.4 ms with 38.
+model with the two. An effect at its null is skipped by the engine, so that it costs little: 0.1 ms for eight
+candidates and 1.4 s of motion with no effect in the model, 0.25 ms with the 32 that have no states of their own, 0.6 ms
+with all.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain, product
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
-from armid.errors import ArmidError
 from armid.estimation.least_squares import side_by_side
+from armid.inference.candidates import (
+    PROBE,
+    Active,
+    EffectKey,
+    bump_at,
+    bundled,
+    compiled,
+    declared_keys,
+    idle,
+    joined,
+)
 from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import EFFECTS, Array, Effect, Manoeuvre, Model, Parameter, distinct
 from armid.model.parameter import powers_of
@@ -28,66 +39,6 @@ from armid.record import Override, Record
 
 S = TypeVar("S")
 T = TypeVar("T")
-# What the names of constants that are known roughly begin with, which are looked for as effects are.
-ROUGHLY, CONSTANT = "error_of_", "constant:"
-# More than the library holds: a model that grew for ever would take for ever to compile.
-BUNDLE = 60
-
-
-@dataclass(frozen=True, order=True)
-class EffectKey:
-    """Name an effect of a model that the loop fits.
-
-    name: of the effect. form: word of a published form, "" for the first one. free_shape: the parameters that the
-    effect's declaration fixes, such as the width over which a sign is smoothed, are fitted too.
-    """
-
-    name: str
-    form: str = ""
-    free_shape: bool = False
-
-    @property
-    def compiled(self) -> str:
-        return f"{self.name}_{self.form}" if self.form else self.name
-
-    @property
-    def declared(self) -> "EffectKey":
-        return replace(self, free_shape=False)
-
-    @property
-    def public(self) -> str:
-        """Name in reports, whatever the form."""
-        return self.name.replace(ROUGHLY, CONSTANT, 1) if self.name.startswith(ROUGHLY) else self.name
-
-    def owns(self, parameter: str) -> bool:
-        return parameter.startswith(f"{self.compiled}.")
-
-
-Active = tuple[EffectKey, ...]
-
-
-def declared_keys(active: Iterable[EffectKey]) -> set[EffectKey]:
-    """Return the effects of a model, whether or not their shapes are free."""
-    return {key.declared for key in active}
-
-
-def constant_effects(rough: Mapping[str, float]) -> dict[str, Effect]:
-    """Return an effect for each constant or parameter that is known roughly; rough: name -> relative half-range.
-
-    The plant has to know them roughly, too (`Plant.known_roughly`).
-    """
-    return {
-        f"{ROUGHLY}{name}": Effect(
-            f"{ROUGHLY}{name}", (Parameter("error", "1", -half, half, null=0.0, note="relative error"),),
-            {f"{name}_error": relative_error}, note=f"{name} is another than declared", source="[tolerances]",
-        )
-        for name, half in rough.items()
-    }  # fmt: skip
-
-
-def relative_error(error: float) -> float:
-    """Relative error of a constant."""
-    return error
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,21 +145,25 @@ class Library:
         return calibrated_replays(self.data.records, model, space, near, on_one, noise, hidden)
 
     def compiled_model(self, active: Active) -> Model:
-        """Return a model that holds the bundles of some candidates, or just them where bundles run in a circle."""
+        """Return a model that holds the first bundle with all of some candidates, or those alone where none has."""
         wanted = declared_keys(active)
-        held = [bundle for bundle in self.bundles if set(bundle) & wanted]
-        keys = tuple(chain.from_iterable(held or self.bundles[:1]))
+        apart = tuple(sorted(wanted, key=lambda k: k.compiled))
+        keys = next((bundle for bundle in self.bundles if wanted <= set(bundle)), apart)
         if keys not in self._models:
             self.say(f"preparing a model with {len(keys) or 'no'} candidates (compiled at its first use)")
-            try:
-                self._models[keys] = self.composed(keys)
-            except ArmidError:
-                keys = tuple(sorted(wanted, key=lambda k: k.compiled))
-                self._models.setdefault(keys, self.composed(keys))
+            effects = (*self.declared.effects, *(compiled(k, self.candidates[k]) for k in keys))
+            # A model of their own for the test signals would be one more to compile.
+            tests = map(bump_at, self.declared.plant.ports if keys in self.bundles[-1:] else ())
+            self._models[keys] = Model(self.declared.plant, (*effects, *tests))
         return self._models[keys]
 
-    def composed(self, keys: Active) -> Model:
-        return Model(self.declared.plant, (*self.declared.effects, *(compiled(k, self.candidates[k]) for k in keys)))
+    def with_test_signals(self, model: Model) -> Model:
+        """Return a model that holds all of another, and a test signal at each port."""
+        for keys in self.bundles[-1:]:
+            if model.effects[-1:] and model.parameters.keys() <= self.compiled_model(keys).parameters.keys():
+                return self.compiled_model(keys)
+        held = {e.name for e in model.effects}
+        return Model(model.plant, (*model.effects, *(p for p in map(bump_at, model.plant.ports) if p.name not in held)))
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""
@@ -222,7 +177,7 @@ class Library:
         for name, parameter in model.parameters.items():
             owner = self.owner(name)
             mine = next((k for k in active if k.declared == owner), None)
-            if owner is not None and mine is None:
+            if (owner is not None and mine is None) or name.startswith(PROBE):
                 space = space.with_fixed(name, idle(parameter))
             elif mine is not None and mine.free_shape and name in self.fixed_shapes(mine):
                 space = space.with_bounds(name, parameter.low, parameter.high)
@@ -322,45 +277,6 @@ def library_of(
 
     return Library(declared, applicable, data, bundled(declared, applicable), for_each_form(overrides),
                    for_each_form(bounds), for_each_form(fixed), threads, say, tolerances or {})  # fmt: skip
-
-
-def compiled(key: EffectKey, effect: Effect) -> Effect:
-    return replace(effect, name=key.compiled, forms=())
-
-
-def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Active, ...]:
-    """Return keys of candidates in bundles that compose without a circle.
-
-    Those without states of their own come first, so that the most used bundles stay the fastest.
-    """
-    each = [(key, compiled(key, effect)) for key, effect in effects.items()]
-    ordered = sorted(each, key=lambda pair: (len(pair[1].states), pair[1].name))
-    if 0 < len(ordered) <= BUNDLE and joined(declared, *(effect for _, effect in ordered)) is not None:
-        return (tuple(key for key, _ in ordered),)
-    bundles: list[tuple[Model, list[EffectKey]]] = []
-    for key, effect in ordered:
-        for i, (model, keys) in enumerate(bundles):
-            extended = joined(model, effect) if len(keys) < BUNDLE else None
-            if extended is not None:
-                bundles[i] = (extended, [*keys, key])
-                break
-        else:
-            bundles.append((declared + effect, [key]))
-    return tuple(tuple(keys) for _, keys in bundles)
-
-
-def joined(model: Model, *effects: Effect) -> Model | None:
-    """Return a model with effects, None where they cannot be composed."""
-    try:
-        return replace(model, effects=(*model.effects, *effects))
-    except ArmidError:
-        return None
-
-
-def idle(parameter: Parameter) -> float:
-    """Return where a parameter of an effect that is not in use rests."""
-    known = [v for v in (parameter.null, parameter.fixed, parameter.nominal) if v is not None]
-    return float(known[0] if known else 0.5 * (parameter.low + parameter.high))
 
 
 # Candidates of one calibration, the factor of a known value within which they lie, and the schedules that are tried.

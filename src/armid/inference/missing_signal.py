@@ -10,11 +10,12 @@ from scipy.linalg import block_diag
 
 from armid.engine import Schedule, Simulation, along, simulate
 from armid.estimation.least_squares import WeightedRecords
+from armid.inference.candidates import PROBE, idle
 from armid.inference.checks import variable_names
 from armid.inference.library import Library
 from armid.inference.model import Fit, beyond
 from armid.inference.refit import candidate_at, free_values
-from armid.model import Array, Effect, Model, Parameter
+from armid.model import Array, Model
 from armid.problem.problem import Replay, by_record, with_each
 from armid.problem.space import Space
 from armid.record import Piece
@@ -25,7 +26,6 @@ KNOT_S, MOST_KNOTS_OF_A_PIECE = 0.02, 240
 # A test signal may move the output by this share of the speed scale: far above rounding, hardly beyond linearity.
 MOVED = 1e-4
 SIZES = 10.0 ** np.arange(-12.0, 10.0)
-PROBE = "probe_"
 # Ports whose signals correlate above this are one; variables whose ranks do are one.
 SAME_PORT, SAME_VARIABLE = 0.9999, 0.999
 
@@ -115,7 +115,8 @@ def missing_from(lacking: Fit, library: Library) -> Missing:
     records = library.problem(lacking.active, lacking.values)
     model, levels = records.model, [level.rms for level in records.data.levels]
     ports = list(model.plant.ports)
-    whole = segments(model, records.space, free_values(records, lacking.values), records.replays, levels, ports)
+    x, tested = free_values(records, lacking.values), library.with_test_signals(model)
+    whole = segments(tested, records.space, x, records.replays, levels, ports)
     whole = motions(model, candidate_at(records, lacking.values), whole)
     # Pieces spread evenly over all, as many as the knots allow.
     most = max(1, int(MOST_KNOTS / np.mean([len(s.knots) for s in whole])))
@@ -130,20 +131,19 @@ def segments(
     """Return every piece of the train records with its residual, sensitivities and gains.
 
     x: free parameters, SI, (n_free,); levels: what residuals of each record are divided by [its unit].
+    model: with a test signal at each port, see `Library.with_test_signals`.
     A port at which no signal moves the output has no gain, nor has one whose signals do what those of an earlier port
-    do, a factor aside. All ports together cost one compiled model, none where the model holds the test signals already.
+    do, a factor aside.
     """
     level_of = dict(zip(replays, levels, strict=True))
     whole = [segment_of(outputs, [level_of[r] for r in outputs], i, k, space, x)
              for i, (ready, outputs) in enumerate(by_record(replays).items())
              for k in range(len(ready.record.pieces))]  # fmt: skip
-    known = dict(zip(space.names, space.complete(x[np.newaxis])[0], strict=True))
-    held = {e.name for e in model.effects}
-    probes = [p for p in map(bump_at, ports) if p.name not in held]
-    extended = Model(model.plant, (*model.effects, *probes)) if probes else model
+    known = {n: idle(p) for n, p in model.parameters.items()}
+    known |= dict(zip(space.names, space.complete(x[np.newaxis])[0], strict=True))
     kept: list[Array] = []
     for port in ports:
-        probe = Probe(extended, known, f"{PROBE}{port}")
+        probe = Probe(model, known, f"{PROBE}{port}")
         size = probe.fitting_size(whole[0])
         if size is None:
             continue
@@ -175,20 +175,6 @@ def segment_of(
                    jacobian / level[:, np.newaxis], {}, group)  # fmt: skip
 
 
-def bump(time, size, centre, width):  # type: ignore[no-untyped-def]
-    """Return a triangle of a height at a time [s], width to either side [s]."""
-    return size * np.maximum(0.0, 1.0 - np.abs(time - centre) / width)
-
-
-def bump_at(port: str) -> Effect:
-    """Return the test signal as an effect at a port."""
-    parameters = (
-        Parameter("size", "1", -1.0, 1.0, null=0.0), Parameter("centre", "s", 0.0, 1.0),
-        Parameter("width", "s", 1e-3, 1.0),
-    )  # fmt: skip
-    return Effect(f"{PROBE}{port}", parameters, {port: bump}, note="a triangle in time")
-
-
 @dataclass(frozen=True, eq=False)
 class Probe:
     """Hold a model with a test signal at each port, and which of them is meant; known: name -> value of the others."""
@@ -201,7 +187,7 @@ class Probe:
         """Simulate a segment without the test signal, then with it for each size or centre."""
         sizes, centres = np.broadcast_arrays(np.atleast_1d(size), np.atleast_1d(centre))
         names = list(self.model.parameters)
-        rows = np.tile([self.known.get(n, 0.0) for n in names], (len(sizes) + 1, 1))
+        rows = np.tile([self.known[n] for n in names], (len(sizes) + 1, 1))
         rows[:, [i for i, n in enumerate(names) if n.startswith(PROBE) and n.endswith(".width")]] = width
         rows[1:, names.index(f"{self.name}.size")], rows[1:, names.index(f"{self.name}.centre")] = sizes, centres
         return simulate(self.model, segment.piece.manoeuvre, rows, segment.schedule)

@@ -12,7 +12,8 @@ from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.information import start_changes
 from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
-from armid.inference.library import Active, EffectKey, calibrated_replays, finest, is_finer
+from armid.inference.candidates import Active, EffectKey
+from armid.inference.library import calibrated_replays, finest, is_finer
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.problem.problem import by_record, with_each

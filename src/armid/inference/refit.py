@@ -9,7 +9,8 @@ import numpy as np
 
 from armid.errors import ArmidError
 from armid.estimation.least_squares import descend
-from armid.inference.library import Activation, Active, EffectKey, Library, idle, points_within
+from armid.inference.candidates import Active, EffectKey, idle
+from armid.inference.library import Activation, Library, points_within
 from armid.inference.model import Fit, fit_from, with_own_starts
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array

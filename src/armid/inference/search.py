@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from armid.estimation.constants import NAMED
+from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
 from armid.inference.evidence import (
@@ -25,7 +26,7 @@ from armid.inference.evidence import (
 )
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior, words
 from armid.inference.kinds import drifts, effects, records, unknown
-from armid.inference.library import EffectKey, Library
+from armid.inference.library import Library
 from armid.inference.model import Fit
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape

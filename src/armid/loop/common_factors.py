@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from armid.estimation.constants import STEP, common_factors
-from armid.inference.library import ROUGHLY, Library
+from armid.inference.candidates import ERROR_OF
+from armid.inference.library import Library
 from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.refit import candidate_at
 from armid.inference.whitening import WhiteRecords
@@ -23,17 +24,17 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
         owner = library.owner(name)
         if owner is None:
             own[name] = slope(fit, fit.records, name, value)
-        elif owner.name.startswith(ROUGHLY):
-            own[owner.name.removeprefix(ROUGHLY)] = slope(fit, fit.records, name, 1.0 + value)
+        elif owner.name.startswith(ERROR_OF):
+            own[owner.name.removeprefix(ERROR_OF)] = slope(fit, fit.records, name, 1.0 + value)
         else:
             strengths.append(slope(fit, fit.records, name, value))
     pieces = {r.record.file: r.pieces for r in fit.records.replays}
     for key in library.candidates:
-        if key.name.startswith(ROUGHLY) and key not in fit.active:
+        if key.name.startswith(ERROR_OF) and key not in fit.active:
             records = library.problem((*fit.active, key), fit.values)
             there = replace(records, replays=with_each(records.replays, lambda r: replace(
                 r, record=replace(r.record, pieces=pieces[r.record.file]))))  # fmt: skip
-            own[key.name.removeprefix(ROUGHLY)] = slope(fit, there, f"{key.compiled}.error", 1.0)
+            own[key.name.removeprefix(ERROR_OF)] = slope(fit, there, f"{key.compiled}.error", 1.0)
     if not own:
         return ()
     basis, _ = decomposed(np.column_stack(strengths))

@@ -6,10 +6,11 @@ from functools import partial
 import numpy as np
 
 from armid.estimation.least_squares import descend
+from armid.inference.candidates import EffectKey
 from armid.inference.decisions import calibration
 from armid.inference.evidence import SCALES, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
-from armid.inference.library import EffectKey, Library, activation_grid
+from armid.inference.library import Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
 from armid.inference.refit import free_values, responses, unless_diverged
 from armid.inference.unknowns import freed, moved, projected

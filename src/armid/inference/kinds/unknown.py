@@ -44,7 +44,8 @@ def signals_without_form(fit: Fit, library: Library) -> Signals:
     model, n = records.model, len(fit.residual)
     ports = list(model.plant.ports)
     levels = [level.rms for level in records.data.levels]
-    whole = segments(model, records.space, free_values(records, fit.values), records.replays, levels, ports)
+    x, tested = free_values(records, fit.values), library.with_test_signals(model)
+    whole = segments(tested, records.space, x, records.replays, levels, ports)
     whole = motions(model, candidate_at(records, fit.values), whole)
     if sum(len(s.residual) for s in whole) != n:
         return Signals({})
