@@ -114,3 +114,16 @@ def test_constants_in_tolerances_widen_the_intervals_and_may_be_off(stand, infer
 def test_a_prior_of_an_unknown_effect_is_refused(inferred):
     with pytest.raises(ArmidError, match="tild"):
         inferred(priors={"tild": 0.5})
+
+
+def test_what_held_out_records_miss_may_be_their_own_fault_or_something_unknown(inferred):
+    found = inferred("supply_sag=0.03")
+    one, every = (found.after_holdout(over).posterior for over in ([True, False, False], [True, True, True]))
+    before = found.posterior
+    assert before.probability("unknown") < 0.01 < one.probability("unknown") < 0.5
+    assert every.probability("unknown") > 0.95
+    for after in (one, every):
+        share = (1.0 - after.probability("unknown")) / (1.0 - before.probability("unknown"))
+        name = after.probability("effect", "supply_sag")
+        assert name == pytest.approx(share * before.probability("effect", "supply_sag"))
+    assert found.after_holdout([True]).in_force == found.in_force

@@ -68,6 +68,8 @@ def test_nothing_is_missing_where_noise_has_a_colour_that_no_rest_shows(tmp_path
     clean, _ = swinging(tmp_path / "clean", 0.0)
     found = close_loop(Model(clean.plant), clean, candidates)
     assert (found.verdict, found.also, found.steps, found.suspects) == ("no_discrepancy", (), (), ())
+    # how the held-out record starts is known from few samples: that is doubt, and no misfit
+    assert found.before.holdout.doubted
     estimate = found.before.estimates[0]
     assert estimate.low < INERTIA < estimate.high
     damped, _ = swinging(tmp_path / "damped", 0.01)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armid.inference.checks import Residuals
-from armid.inference.decisions import EXPLAINS, NOT_CARRIED, OUTSIDE
+from armid.inference.decisions import EXPLAINS, NOT_CARRIED, OUTSIDE, OVER_NOISE
 from armid.inference.model import Fit
 from armid.inference.whitening import WhiteRecords
 from armid.units import shown
@@ -72,6 +72,17 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
         found.append(Missed(replay.name, factor, (float(np.sqrt(np.mean(raw**2))), before), replay.record.unit,
                             outside(train, holdout, inside), changes(fit, holdout, inside)))  # fmt: skip
     return found
+
+
+def over_noise(train: Residuals, holdout: Residuals) -> list[bool]:
+    """Return of each held-out record whether it is missed by more than noise, as it is there and on train records."""
+    outputs, found = [o.name for o in train.model.plant.outputs], dict[str, bool]()
+    for replay, raw in zip(holdout.replays, holdout.raw, strict=True):
+        name, file = outputs[replay.place], replay.record.file
+        seen = train.errors.outputs[name].rmse if name in train.errors.outputs else 0.0
+        is_noise = float(np.sqrt(np.mean(raw**2))) <= OVER_NOISE * max(holdout.noise_of[name], seen)
+        found[file] = found.get(file, False) or not is_noise
+    return list(found.values())
 
 
 def rms_of(seen: Residuals, place: int) -> float:

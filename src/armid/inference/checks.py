@@ -43,8 +43,8 @@ class Residuals:
 
     candidate: whole, SI. residual: whitened, measured minus simulated, (n_samples,). basis: what the fit has absorbed,
     (n_samples, n_absorbed), with no columns on records that it has not seen. doubted: whether the residual, and not the
-    raw one, tells of size: it is divided by the doubt of a prediction that tolerances of constants make large. fitted:
-    those of the train records, where these are held out.
+    raw one, tells of size: it is divided by the doubt of a prediction, which tolerances of constants and measured
+    starts make large. fitted: those of the train records, where these are held out.
     """
 
     data: WhitenedData
@@ -236,12 +236,14 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     _, values, right = np.linalg.svd(np.vstack([np.hstack([fit.jacobian, known]), prior]), full_matrices=False)
     good = values > 1e-7 * values.max(initial=0.0)
     spread = np.hstack([slopes, unseen.reshape(len(residual), len(within))]) @ (right[good].T / values[good])
-    spread = np.column_stack([spread, *start_changes(posed, fit.z)])
+    starts = list(start_changes(posed, fit.z))
+    spread = np.column_stack([spread, *starts])
     # A simulation that diverges there is not held to any doubt.
     spread = spread[:, np.isfinite(residual).all() & np.isfinite(spread).all(axis=0)]
     base, sizes, _ = np.linalg.svd(spread, full_matrices=False)
     left = residual - base @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (base.T @ residual))
-    return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)), bool(within),
+    return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)),
+                     bool(within) or len(starts) > 0,
                      train_residuals(fit))  # fmt: skip
 
 

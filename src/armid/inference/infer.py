@@ -1,8 +1,9 @@
 """Infer what a declared model lacks: the models that the train records ask for, and how probable each is."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import comb
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import Estimates, held_by_bound, spread_starts, with_fitted_starts
 from armid.inference.candidates import constant_effects
-from armid.inference.decisions import LISTED, MENTIONED
+from armid.inference.decisions import LISTED, MENTIONED, calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.library import Library, library_of
@@ -84,6 +85,28 @@ class Inference:
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
         found = without_denied(self.found, denied, standing)
         return Inference(found, posterior(found), standing)
+
+    def after_holdout(self, over: Sequence[bool]) -> "Inference":
+        """Return what is probable where some of the records held out are missed by more than noise.
+
+        These may be faulty, each for itself, or the model is wrong: then any share of them may be missed, all shares
+        being equally likely. P(k of n | wrong) = 1/((n + 1) C(n, k)), P(k of n | faults) = f**k (1 - f)**(n - k).
+
+        Parameters
+        ----------
+        over : sequence of bool
+            Of each held-out record, whether it is missed.
+
+        Returns
+        -------
+        Inference
+            With the same model in force.
+        """
+        expected, n, k = calibration().expected, len(over), sum(over)
+        fault = min(expected["record"] / (n + len(self.found.declared.records.data.records)), 0.5)
+        wrong = expected["unknown"] / ((n + 1) * comb(n, k))
+        faults = (1.0 - expected["unknown"]) * fault**k * (1.0 - fault) ** (n - k)
+        return Inference(self.found, posterior(self.found, wrong / (wrong + faults)), self.in_force)
 
     @property
     def probabilities(self) -> dict[str, Any]:
@@ -293,8 +316,8 @@ def rescaled(library: Library, declared: Fit) -> Library:
         return library
     largest = 0.0
     for replay in declared.records.replays:
-        for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
-            effort = along(model, piece.manoeuvre, declared.candidate, calibration.schedule, ["drive_effort"])
+        for piece, found in zip(replay.pieces, replay.calibrations, strict=True):
+            effort = along(model, piece.manoeuvre, declared.candidate, found.schedule, ["drive_effort"])
             largest = max(largest, float(np.nanmax(np.abs(effort["drive_effort"]), initial=0.0)))
     if not np.isfinite(largest) or largest <= 0.0 or 1.0 / ALIKE < largest / plant.scales.effort < ALIKE:
         return library

@@ -5,7 +5,7 @@ order. A parameter's interval holds 95 % of the mixture of all (Hoeting and othe
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,8 @@ from armid.model import Array
 
 # Models of a smaller weight than this, relative to the best, do not count.
 NEGLIGIBLE = float(np.log(1e-6))
+# Something that nobody knows, wherever it acts.
+UNSEEN = frozenset({("unknown", "output")})
 # What further unknowns of a model are, in words.
 CONSTANTS = "constants within tolerances"
 
@@ -124,14 +126,17 @@ class Posterior:
         return sorted(shares.items(), key=lambda pair: (-pair[1], pair[0]))
 
 
-def posterior(found: Exploration) -> Posterior:
-    """Return the mixture of all fitted models, and of the hypotheses that were forecast with the expanded ones."""
+def posterior(found: Exploration, wrong: float = 0.0) -> Posterior:
+    """Return the mixture of all fitted models, and of the hypotheses that were forecast with the expanded ones.
+
+    wrong: probability that something unknown acts that the train records do not show.
+    """
     library, scale = found.library, found.scale()
     own = tuple(n for n in found.declared.values if library.owner(n) is None)
     ranked, atoms = found.ranked(), []
     top = ranked[0][1]
     # What the best model leaves beyond doubt has a covariance of its own: nobody knows what it is.
-    left = frozenset({("unknown", "output")} if is_certain(found.fits[ranked[0][0]]) else ())
+    left = UNSEEN if is_certain(found.fits[ranked[0][0]]) else frozenset()
     for model, value in ranked:
         if value < top + NEGLIGIBLE:
             continue
@@ -140,6 +145,9 @@ def posterior(found: Exploration) -> Posterior:
         names = frozenset(h.public for h in model) | left
         atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
         atoms += beside(found, model, value, about, own, mean, covariance, top, left)
+    if wrong > 0.0:
+        atoms = [replace(a, log_prior=a.log_prior + np.log(p), names=a.names | more) for a in atoms
+                 for p, more in ((1.0 - wrong, frozenset()), (wrong, UNSEEN))]  # fmt: skip
     return Posterior(tuple(atoms), own, calibration().temperature)
 
 

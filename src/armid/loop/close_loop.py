@@ -13,7 +13,7 @@ from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import held_by_bound
 from armid.estimation.mends import Suspicion
 from armid.estimation.screen import AS_GOOD, given_twice, screen
-from armid.inference.carry_over import missed_sentences
+from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WITHIN
 from armid.inference.hypothesis import Hypotheses, Hypothesis
@@ -142,7 +142,9 @@ def close_loop(
         (IMPLAUSIBLE, UNEXPLAINED) if implausible else verdicts_of(found, accused, after, steps[:kept], withdrawn)
     )
     if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
-        steps = tuple(replace(step, claimed=False) for step in steps)
+        assert after.holdout is not None
+        found = found.after_holdout(over_noise(after.train, after.holdout))
+        steps = tuple(replace(step, claimed=False) for step in steps_of(found, path, judged))
     every = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))

@@ -223,7 +223,7 @@ def estimates(
     told = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
-        if owner is not None and owner not in active:
+        if name not in library.declared.parameters and owner not in active:
             continue
         public = name if owner is None else f"{owner.public}.{name.partition('.')[2]}"
         if name not in known:
