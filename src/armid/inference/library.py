@@ -152,18 +152,25 @@ class Library:
         if keys not in self._models:
             self.say(f"preparing a model with {len(keys) or 'no'} candidates (compiled at its first use)")
             effects = (*self.declared.effects, *(compiled(k, self.candidates[k]) for k in keys))
-            # A model of their own for the test signals would be one more to compile.
-            tests = map(bump_at, self.declared.plant.ports if keys in self.bundles[-1:] else ())
+            tests = map(bump_at, self.declared.plant.ports if keys in self.tested else ())
             self._models[keys] = Model(self.declared.plant, (*effects, *tests))
         return self._models[keys]
 
+    @property
+    def tested(self) -> tuple[Active, ...]:
+        """The bundle whose model holds the test signals too, which would be one more to compile; of several the last.
+
+        The model of an only bundle is that of all fits, and is faster without them.
+        """
+        return self.bundles[1:][-1:]
+
     def with_test_signals(self, model: Model) -> Model:
         """Return a model that holds all of another, and a test signal at each port."""
-        for keys in self.bundles[-1:]:
-            if model.effects[-1:] and model.parameters.keys() <= self.compiled_model(keys).parameters.keys():
-                return self.compiled_model(keys)
-        held = {e.name for e in model.effects}
-        return Model(model.plant, (*model.effects, *(p for p in map(bump_at, model.plant.ports) if p.name not in held)))
+        whole = [self.compiled_model(keys) for keys in self.tested]
+        tests = (bump_at(port) for port in model.plant.ports)
+        return next((w for w in whole if model.parameters.keys() <= w.parameters.keys()), None) or Model(
+            model.plant, (*model.effects, *tests)
+        )
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""
