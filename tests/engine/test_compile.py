@@ -18,6 +18,7 @@ from armid.engine import cache_folder, compile_model, simulate
 from armid.engine.cache import keep, read_whole, unusable, write_whole
 from armid.engine.compile import load_module, module_name
 from armid.engine.generate import kernel_parts
+from armid.engine.linked import LINKED, LinkedLibrary
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
 
 SCRIPT = """
@@ -226,3 +227,14 @@ def test_models_run_in_packed_instructions(plant, least, times, monkeypatch: pyt
     packed, scalar = packed_and_scalar(model, Manoeuvre(0.001, 9, inputs=inputs), monkeypatch)
     assert packed > least
     assert packed > times * scalar
+
+
+def test_a_linked_function_is_part_of_those_that_call_it_and_has_no_code_of_its_own():
+    inner = numba.njit(**LINKED)(lambda x: 2.0 * x + 1.0)
+    middle = numba.njit(**LINKED)(lambda x: inner(x) ** 2)
+    outer = numba.njit(lambda x: middle(x) + inner(x))
+    assert outer(3.0) == 56.0
+    for function in (inner, middle):
+        (compiled,) = function.overloads.values()
+        assert isinstance(compiled.library, LinkedLibrary)
+        assert not compiled.library.codegen._engine.is_symbol_defined(compiled.fndesc.mangled_name)
