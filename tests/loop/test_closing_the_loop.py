@@ -121,6 +121,7 @@ def test_holdout_records_decide_nothing(closed):
     assert fits_of(again) == fits_of(found)
     before, after = (report_of(f)["probabilities"] for f in (found, again))
     assert after["effects_beside_unknown"] == pytest.approx(before["effects_beside_unknown"])
+    assert after["constants"] == before["constants"]
     assert after["unknown"] > before["unknown"]
     assert (again.verdict, again.also) == ("does_not_carry_over", ())
     assert not any(s.claimed for s in again.steps)

@@ -272,23 +272,26 @@ class Emitter:
 
     def sum_lines(self, port: Node, spared: set[str]) -> list[str]:
         """Return the lines that sum what acts at a port: an inactive effect costs a glance, not a sum."""
-        name, lines = variable(port.key), [f"{variable(port.key)} = splat(0.0)"]
+        name = variable(port.key)
+        lines = [f"{name} = splat(0.0)"]
         for key in port.terms:
-            if key not in spared:
+            if key in spared:
+                lines.append(f"if used_{self.graph.nodes[key].owner}: {name} = {name} + {self.where_used(key)}")
+            else:
                 lines.append(f"{name} = {name} + {variable(key)}")
-                continue
-            owner = self.graph.nodes[key].owner
-            taken = f"select(using_{owner}, 0.5, {self.expression(key)}, 0.0)"
-            lines.append(f"if used_{owner}: {name} = {name} + {taken}")
         return lines
 
     def line(self, key: str, static: bool) -> str:
         """Return the line that gives a node its value; what moves in an effect that no lane uses is left out."""
-        node, value = self.graph.nodes[key], self.expression(key)
+        node = self.graph.nodes[key]
         if static or node.owner not in self.strengths or node.kind not in IDLE:
-            return f"{variable(key)} = {value}"
-        taken = f"select(using_{node.owner}, 0.5, {value}, {IDLE[node.kind]})"
-        return f"{variable(key)} = {taken} if used_{node.owner} else splat({IDLE[node.kind]})"
+            return f"{variable(key)} = {self.expression(key)}"
+        return f"{variable(key)} = {self.where_used(key)} if used_{node.owner} else splat({IDLE[node.kind]})"
+
+    def where_used(self, key: str) -> str:
+        """Return the value of a node of an effect in the lanes that use it, in the others what it is where it rests."""
+        node = self.graph.nodes[key]
+        return f"select(using_{node.owner}, 0.5, {self.expression(key)}, {IDLE[node.kind]})"
 
     def expression(self, key: str) -> str:
         node = self.graph.nodes[key]

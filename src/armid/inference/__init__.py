@@ -12,10 +12,10 @@ model         a model at its estimate; `unknowns`: constants, faults and drifts,
 evidence      how probable the records are in a model, and what a hypothesis more would do to that
 search        which models are fitted
 posterior     probabilities of hypotheses and sets; intervals that count what may be missing
-checks        whether a residual is more than noise, and where; `carry_over`: on records held out
+checks        whether a residual is more than noise, and where
+carry_over    what a model predicts of what its fit has not seen: records held out, parts left out in turn
 
-Also here: prediction (which model is put in force where none is right), refit
-(starts of fits), missing_signal (the signal that a model lacks at each port).
+Also here: refit (starts of fits), missing_signal (the signal that a model lacks at each port).
 """
 
 from armid.inference.infer import Inference, infer

@@ -1,15 +1,31 @@
-"""Does a model carry over to the records held out? By which factor they are missed, and what is new in them."""
+"""What a model predicts of what its fit has not seen: records held out, and parts left out in turn.
+
+Of a held-out record that is missed: by which factor, and what is new in it.
+
+Where the best model leaves more than noise, evidence compares models that are all wrong, and effects that bend to what
+is missing win on the records that they saw. There the model in force is the one that predicts parts left out of its fit
+(Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x), with the fewest effects within one standard error of the best
+(Breiman and others 1984).
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from armid.estimation.least_squares import descend
 from armid.inference.checks import Residuals
 from armid.inference.decisions import EXPLAINS, NOT_CARRIED, OUTSIDE, OVER_NOISE
-from armid.inference.model import Fit
-from armid.inference.whitening import WhiteRecords
+from armid.inference.hypothesis import Hypotheses
+from armid.inference.library import Library
+from armid.inference.model import ROUGHLY, Fit
+from armid.inference.whitening import WhitenedData, WhiteRecords
+from armid.model import Array
 from armid.units import shown
+
+# Parts that are left out in turn; models of each number of effects that are compared.
+MOST_PARTS, MOST_OF_SIZE = 5, 3
 
 
 @dataclass(frozen=True)
@@ -77,12 +93,17 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
 def over_noise(train: Residuals, holdout: Residuals) -> list[bool]:
     """Return of each held-out record whether it is missed by more than noise, as it is there and on train records."""
     outputs, found = [o.name for o in train.model.plant.outputs], dict[str, bool]()
+    least = least_noise(train, holdout)
     for replay, raw in zip(holdout.replays, holdout.raw, strict=True):
-        name, file = outputs[replay.place], replay.record.file
-        seen = train.errors.outputs[name].rmse if name in train.errors.outputs else 0.0
-        is_noise = float(np.sqrt(np.mean(raw**2))) <= OVER_NOISE * max(holdout.noise_of[name], seen)
-        found[file] = found.get(file, False) or not is_noise
+        is_noise = float(np.sqrt(np.mean(raw**2))) <= OVER_NOISE * least[outputs[replay.place]]
+        found[replay.record.file] = found.get(replay.record.file, False) or not is_noise
     return list(found.values())
+
+
+def least_noise(train: Residuals, holdout: Residuals) -> dict[str, float]:
+    """Return the least that the noise of each output held out can be, rms: it may be known from differences alone."""
+    seen = train.errors.outputs
+    return {n: max(rms, seen[n].rmse if n in seen else 0.0) for n, rms in holdout.noise_of.items()}
 
 
 def rms_of(seen: Residuals, place: int) -> float:
@@ -128,3 +149,54 @@ def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
         if taken > EXPLAINS:
             found[name] = (taken, moved * float(fit.records.span[i]) / abs(value))
     return {name: change for name, (_, change) in sorted(found.items(), key=lambda pair: -pair[1][0])}
+
+
+def predicting_best(
+    ranked: Sequence[Hypotheses], fits: dict[Hypotheses, Fit], library: Library
+) -> Hypotheses:  # fmt: skip
+    """Return the model with the fewest effects that predicts as the best does, within one standard error.
+
+    ranked: models without an unknown signal, the most probable first.
+    """
+    sizes: dict[int, list[Hypotheses]] = {}
+    for model in ranked:
+        of_size = sizes.setdefault(len(model), [])
+        if len(of_size) < MOST_OF_SIZE:
+            of_size.append(model)
+    compared = [m for n in sorted(sizes) for m in sizes[n]]
+    library.say(f"comparing what {len(compared)} models predict of parts left out of their fit")
+    missed = library.each(lambda m: misses(fits[m]), compared)
+    best = missed[int(np.argmin([np.mean(x) for x in missed]))]
+
+    def is_near(own: Array) -> bool:
+        apart = own - best
+        return bool(np.mean(apart) <= np.std(apart, ddof=1) / np.sqrt(len(apart)))
+
+    near = [(len(m), float(np.mean(x)), i) for i, (m, x) in enumerate(zip(compared, missed, strict=True)) if is_near(x)]
+    return compared[min(near)[2]]
+
+
+def parts_of(data: WhitenedData) -> list[NDArray[np.int64]]:
+    """Return what is left out in turn, as numbers of samples: manoeuvres with their repeats, or blocks of time."""
+    names = [r.manoeuvre_file for r in data.each]
+    each = data.by_record(np.arange(data.edges[-1]))
+    distinct = list(dict.fromkeys(names))
+    if len(distinct) > 1:
+        # of many manoeuvres several are left out together, spread over the campaign
+        groups = [distinct[i::MOST_PARTS] for i in range(min(MOST_PARTS, len(distinct)))]
+        return [np.concatenate([x for x, n in zip(each, names, strict=True) if n in group]) for group in groups]
+    blocks = [np.array_split(x, MOST_PARTS) for x in each]
+    return [np.concatenate(block) for block in zip(*blocks, strict=True)]
+
+
+def misses(fit: Fit) -> Array:
+    """Return the mean square by which a model misses each part, fitted without it, (n_parts,)."""
+    data, found = fit.records.data, []
+    for part in parts_of(data):
+        sound = data.sound.copy()
+        sound[part] = 0.0
+        posed = replace(fit.records, data=replace(data, sound=sound))
+        z = descend(posed, [fit.z], ROUGHLY) if fit.n_free else fit.z
+        left = fit.records.plain.residuals(z)[0][part]
+        found.append(float(np.mean(left**2)) if np.isfinite(left).all() else np.inf)
+    return np.array(found)

@@ -243,8 +243,7 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     base, sizes, _ = np.linalg.svd(spread, full_matrices=False)
     left = residual - base @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (base.T @ residual))
     return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)),
-                     bool(within) or len(starts) > 0,
-                     train_residuals(fit))  # fmt: skip
+                     bool(within or starts), train_residuals(fit))  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import Estimates, held_by_bound, spread_starts, with_fitted_starts
 from armid.inference.candidates import constant_effects
+from armid.inference.carry_over import predicting_best
 from armid.inference.decisions import LISTED, MENTIONED, calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.library import Library, library_of
 from armid.inference.model import Fit, fit_from
 from armid.inference.posterior import CONSTANTS, Posterior, posterior
-from armid.inference.prediction import predicting_best
 from armid.inference.refit import accurate
 from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.whitening import whitened
@@ -106,7 +106,7 @@ class Inference:
         fault = min(expected["record"] / (n + len(self.found.declared.records.data.records)), 0.5)
         wrong = expected["unknown"] / ((n + 1) * comb(n, k))
         faults = (1.0 - expected["unknown"]) * fault**k * (1.0 - fault) ** (n - k)
-        return Inference(self.found, posterior(self.found, wrong / (wrong + faults)), self.in_force)
+        return replace(self, posterior=self.posterior.with_unseen(wrong / (wrong + faults)), standing=self.in_force)
 
     @property
     def probabilities(self) -> dict[str, Any]:

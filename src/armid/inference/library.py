@@ -166,11 +166,10 @@ class Library:
 
     def with_test_signals(self, model: Model) -> Model:
         """Return a model that holds all of another, and a test signal at each port."""
-        whole = [self.compiled_model(keys) for keys in self.tested]
-        tests = (bump_at(port) for port in model.plant.ports)
-        return next((w for w in whole if model.parameters.keys() <= w.parameters.keys()), None) or Model(
-            model.plant, (*model.effects, *tests)
-        )
+        for whole in map(self.compiled_model, self.tested):
+            if model.parameters.keys() <= whole.parameters.keys():
+                return whole
+        return Model(model.plant, (*model.effects, *map(bump_at, model.plant.ports)))
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""

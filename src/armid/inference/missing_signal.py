@@ -15,6 +15,7 @@ from armid.inference.checks import variable_names
 from armid.inference.library import Library
 from armid.inference.model import Fit, beyond
 from armid.inference.refit import candidate_at, free_values
+from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.problem.problem import Replay, by_record, with_each
 from armid.problem.space import Space
@@ -112,17 +113,20 @@ def missing_from(lacking: Fit, library: Library) -> Missing:
 
     Each port costs a simulation for every knot of every piece.
     """
-    records = library.problem(lacking.active, lacking.values)
-    model, levels = records.model, [level.rms for level in records.data.levels]
-    ports = list(model.plant.ports)
-    x, tested = free_values(records, lacking.values), library.with_test_signals(model)
-    whole = segments(tested, records.space, x, records.replays, levels, ports)
-    whole = motions(model, candidate_at(records, lacking.values), whole)
+    whole = segments_about(library.problem(lacking.active, lacking.values), lacking.values, library)
     # Pieces spread evenly over all, as many as the knots allow.
     most = max(1, int(MOST_KNOTS / np.mean([len(s.knots) for s in whole])))
     shown = [whole[i] for i in np.unique(np.linspace(0, len(whole) - 1, min(most, len(whole))).astype(int))]
     signals = sorted((missing_signal(shown, port) for port in whole[0].gains), key=lambda s: -s.share)
     return Missing(lacking, tuple(shown), tuple(signals), tuple(dependences(whole)))
+
+
+def segments_about(records: WhiteRecords, values: Mapping[str, float], library: Library) -> list[Segment]:
+    """Return every piece of the train records about values of the free parameters, SI, with gains and motions."""
+    tested, levels = library.with_test_signals(records.model), [level.rms for level in records.data.levels]
+    x, ports = free_values(records, values), list(records.model.plant.ports)
+    whole = segments(tested, records.space, x, records.replays, levels, ports)
+    return motions(records.model, candidate_at(records, values), whole)
 
 
 def segments(

@@ -74,6 +74,12 @@ class Posterior:
             total += weight * any(k == kind and name in (None, n) for k, n in names)
         return min(total, 1.0)
 
+    def with_unseen(self, wrong: float) -> "Posterior":
+        """Return the mixture where something unknown acts, with a probability, that the train records do not show."""
+        shares = ((1.0 - wrong, frozenset[tuple[str, str]]()), (wrong, UNSEEN))
+        return replace(self, atoms=tuple(replace(a, log_prior=a.log_prior + np.log(p), names=a.names | more)
+                                         for a in self.atoms for p, more in shares))  # fmt: skip
+
     @property
     def nothing(self) -> float:
         return self.sets.get(frozenset(), 0.0)
@@ -126,11 +132,8 @@ class Posterior:
         return sorted(shares.items(), key=lambda pair: (-pair[1], pair[0]))
 
 
-def posterior(found: Exploration, wrong: float = 0.0) -> Posterior:
-    """Return the mixture of all fitted models, and of the hypotheses that were forecast with the expanded ones.
-
-    wrong: probability that something unknown acts that the train records do not show.
-    """
+def posterior(found: Exploration) -> Posterior:
+    """Return the mixture of all fitted models, and of the hypotheses that were forecast with the expanded ones."""
     library, scale = found.library, found.scale()
     own = tuple(n for n in found.declared.values if library.owner(n) is None)
     ranked, atoms = found.ranked(), []
@@ -145,9 +148,6 @@ def posterior(found: Exploration, wrong: float = 0.0) -> Posterior:
         names = frozenset(h.public for h in model) | left
         atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
         atoms += beside(found, model, value, about, own, mean, covariance, top, left)
-    if wrong > 0.0:
-        atoms = [replace(a, log_prior=a.log_prior + np.log(p), names=a.names | more) for a in atoms
-                 for p, more in ((1.0 - wrong, frozenset()), (wrong, UNSEEN))]  # fmt: skip
     return Posterior(tuple(atoms), own, calibration().temperature)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from armid.estimation.advice import Advice
 from armid.estimation.identify import JointErrors, errors_by_file, record_errors
 from armid.estimation.least_squares import held_by_bound
-from armid.inference.carry_over import Missed, missed_records
+from armid.inference.carry_over import Missed, least_noise, missed_records
 from armid.inference.checks import Diagnosis, Residuals
 from armid.inference.decisions import CLAIMED, MENTIONED, OVER_NOISE
 from armid.inference.hypothesis import Hypotheses, words
@@ -117,9 +117,7 @@ class Judgement:
             return False
         if self.diagnosis.significant:
             return bool(self.missed)
-        # what differences tell of the noise is the least that it can be
-        seen = self.train_error.outputs
-        least = {n: max(rms, seen[n].rmse if n in seen else 0.0) for n, rms in unseen.noise_of.items()}
+        least = least_noise(self.train, unseen)
         return any(e.rmse > OVER_NOISE * least[n] for n, e in unseen.errors.outputs.items())
 
 

@@ -14,9 +14,9 @@ from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
-from armid.inference.missing_signal import Segment, motions, segments
+from armid.inference.missing_signal import Segment, segments_about
 from armid.inference.model import Fit, fit_from
-from armid.inference.refit import candidate_at, free_values, unless_diverged
+from armid.inference.refit import unless_diverged
 from armid.inference.unknowns import Freed, freed
 from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
@@ -40,16 +40,11 @@ class Signals:
 @lru_cache(maxsize=4)
 def signals_without_form(fit: Fit, library: Library) -> Signals:
     """Return the columns of signals at every port, scaled so that each moves all records by the noise rms."""
-    records = fit.records
-    model, n = records.model, len(fit.residual)
-    ports = list(model.plant.ports)
-    levels = [level.rms for level in records.data.levels]
-    x, tested = free_values(records, fit.values), library.with_test_signals(model)
-    whole = segments(tested, records.space, x, records.replays, levels, ports)
-    whole = motions(model, candidate_at(records, fit.values), whole)
+    records, n = fit.records, len(fit.residual)
+    whole = segments_about(records, fit.values, library)
     if sum(len(s.residual) for s in whole) != n:
         return Signals({})
-    level = np.repeat(levels, [sum(lengths) for lengths in records.data.lengths])
+    level = np.repeat([level.rms for level in records.data.levels], [sum(lengths) for lengths in records.data.lengths])
     order = places_of(whole, fit)
 
     def white(column: Array) -> Array:
