@@ -144,26 +144,30 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
     return records.residual_and_slopes(records.shares(x))[1]
 
 
-def start_changes(records: LeastSquaresProblem, z: Array) -> Iterator[Array]:
-    """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,)."""
+def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) -> Iterator[Array]:
+    """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,).
+
+    bent: after each slope also what the same move to either side does alike. Where a motion doubles quickly, as near
+    an upper rest, the slope alone tells too little (Julier, Uhlmann 2004, doi:10.1109/JPROC.2003.823141).
+    """
     candidate = records.whole(z[np.newaxis])
     for ready, outputs in by_record(records.replays).items():
         edges = {r: np.cumsum([0, *r.record.lengths]) for r in outputs}
-        # a speed held for a second is the size of a position
-        move = 1e-4 * ready.model.plant.scales.speed
         for index, (piece, calibration) in enumerate(zip(ready.record.pieces, ready.calibrations, strict=True)):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
                 start = piece.manoeuvre.constants.get(name, 0.0)
-                either = (piece.with_constants({name: start + side}).manoeuvre for side in (move, -move))
-                above, below = (simulate(ready.model, m, candidate, calibration.schedule).outputs[:, 0]
-                                for m in either)  # fmt: skip
-                changes = [np.zeros(r.record.n_samples) for r in records.replays]
-                slopes = (above - below) / (2.0 * move)
-                for change, r in zip(changes, records.replays, strict=True):
-                    if r in edges:
-                        own = deviation * slopes[r.place, r.record.samples[index]]
-                        change[edges[r][index] : edges[r][index + 1]] = own
-                yield records.weighted(changes)
+                moves = (deviation, -deviation, 0.0) if bent else (deviation, -deviation)
+                above, below, *at = (
+                    simulate(ready.model, piece.with_constants({name: start + move}).manoeuvre, candidate,
+                             calibration.schedule).outputs[:, 0] for move in moves
+                )  # fmt: skip
+                for response in (0.5 * (above - below), *(0.5 * (above + below) - same for same in at)):
+                    changes = [np.zeros(r.record.n_samples) for r in records.replays]
+                    for change, r in zip(changes, records.replays, strict=True):
+                        if r in edges:
+                            own = response[r.place, r.record.samples[index]]
+                            change[edges[r][index] : edges[r][index + 1]] = own
+                    yield records.weighted(changes)
 
 
 def inverse(matrix: Array) -> Array:

@@ -236,7 +236,7 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     _, values, right = np.linalg.svd(np.vstack([np.hstack([fit.jacobian, known]), prior]), full_matrices=False)
     good = values > 1e-7 * values.max(initial=0.0)
     spread = np.hstack([slopes, unseen.reshape(len(residual), len(within))]) @ (right[good].T / values[good])
-    starts = list(start_changes(posed, fit.z))
+    starts = list(start_changes(posed, fit.z, bent=True))
     spread = np.column_stack([spread, *starts])
     # A simulation that diverges there is not held to any doubt.
     spread = spread[:, np.isfinite(residual).all() & np.isfinite(spread).all(axis=0)]

@@ -130,10 +130,9 @@ def close_loop(
     kept = confirmed(judged)
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
     withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
-    if withdrawn is not None:
+    if kept < len(path) - 1:  # a model of faults alone has no step
         found, path = found.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
-        judged = [replace(j, estimates=estimates(found, m, j.fit, j.significant, within))
-                  for m, j in zip(path, judged, strict=False)]  # fmt: skip
+        judged = rejudged(found, path, judged, within)
         steps = steps_of(found, path, judged)
     after, before = judged[kept], judged[0]
     accused = [h for h in path[kept] if found.posterior.probability(*h.public) >= MENTIONED]
@@ -144,6 +143,8 @@ def close_loop(
     if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
         assert after.holdout is not None
         found = found.after_holdout(over_noise(after.train, after.holdout))
+        judged = rejudged(found, path, judged, within)
+        after, before = judged[kept], judged[0]
         steps = tuple(replace(step, claimed=False) for step in steps_of(found, path, judged))
     every = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
@@ -200,6 +201,14 @@ def judge(found: Inference, model: Hypotheses, campaign: Campaign, within: float
     effects = (library.candidates[k.declared] for k in fit.active)
     extended = Model(library.declared.plant, (*library.declared.effects, *effects))
     return Judgement(fit, extended, estimates(found, model, fit, remains, within), seen, unseen)
+
+
+def rejudged(
+    found: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement], within: float
+) -> list[Judgement]:  # fmt: skip
+    """Return the models of a path with the estimates that an inference gives them; the errors stay."""
+    pairs = zip(path, judged, strict=False)  # after a withdrawal the path is shorter
+    return [replace(j, estimates=estimates(found, m, j.fit, j.significant, within)) for m, j in pairs]
 
 
 def steps_of(found: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement]) -> tuple[Step, ...]:
