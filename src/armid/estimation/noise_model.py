@@ -19,8 +19,9 @@ from armid.model import Array, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Noise, Record
-from armid.record.noise import correlation_sum, new_share
+from armid.record.noise import correlation_sum, difference_rms, new_share
 from armid.record.record import NOISE_FREE
+from armid.record.sensor import step_of
 
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 HIDES_ENGINE = 5e-5
@@ -87,13 +88,40 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
     plant: the sizes of its outputs give the floor below which the engine's error would count as a discrepancy. others:
     records of the same sensors whose rests count too.
     """
+    pooled = {sensor: pooled_level([r for r in (*records, *others) if sensor_of(r) == sensor],
+                                   least_noise(sensor, plant)) for sensor in set(map(sensor_of, records))}  # fmt: skip
+    return tuple(pooled[sensor_of(r)] for r in records)
+
+
+def sensor_of(record: Record) -> tuple[str, float]:
+    """Return the output and the sampling interval of a record: its noise is that of all records with the same."""
+    return record.output, record.manoeuvre.interval
+
+
+def least_noise(sensor: tuple[str, float], plant: Plant) -> float:
+    """Return the noise that hides the engine's own error."""
     sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
-    sensors = [(r.output, r.manoeuvre.interval) for r in records]
-    pooled = {
-        (output, t): pooled_level([r for r in (*records, *others) if (r.output, r.manoeuvre.interval) == (output, t)],
-                                  HIDES_ENGINE * sizes[output]) for output, t in set(sensors)
-    }  # fmt: skip
-    return tuple(pooled[sensor] for sensor in sensors)
+    return HIDES_ENGINE * sizes[sensor[0]]
+
+
+def levels_left(
+    levels: Sequence[NoiseModel], replays: Sequence[Replay], left: Sequence[Array]
+) -> tuple[NoiseModel, ...]:  # fmt: skip
+    """Return the noise of each record where no rest tells it: that in what a model leaves, where this is less.
+
+    Of a fast motion with few samples the differences hold the motion too; what a model leaves holds less of it.
+    left: of each record, its unit, not whitened.
+    """
+    each: dict[tuple[str, float], list[float]] = {}
+    for replay, part in zip(replays, left, strict=True):
+        step = step_of(replay.measured) / np.sqrt(12.0)
+        each.setdefault(sensor_of(replay.record), []).append(max(difference_rms(part), step))
+    found = []
+    for replay, level in zip(replays, levels, strict=True):
+        sensor = sensor_of(replay.record)
+        rms = max(float(np.median(each[sensor])), least_noise(sensor, replay.model.plant))
+        found.append(level if level.known or level.rms <= rms else white_level(rms, 0))
+    return tuple(found)
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:

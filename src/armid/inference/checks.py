@@ -225,7 +225,7 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
         return None
     plant, tolerances = library.declared.plant, library.tolerances
     records = tuple(moved_record(r, plant, fit.constants) for r in records)
-    data = whitened(records, plant, library.data.records)
+    data = whitened(records, plant, library.data)
     ready = calibrated_replays(records, fit.model, fit.records.space, fit.values)
     posed = WhiteRecords(ready, fit.records.space, data)
     residual, slopes = posed.residual_and_slopes(fit.z)

@@ -15,8 +15,10 @@ from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import Estimates, held_by_bound, spread_starts, with_fitted_starts
+from armid.estimation.noise_model import levels_left
 from armid.inference.candidates import constant_effects
 from armid.inference.carry_over import predicting_best
+from armid.inference.checks import train_residuals
 from armid.inference.decisions import LISTED, MENTIONED, calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
@@ -269,7 +271,7 @@ def prepared(
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
     library = replace(library, reach=REACH, priors=chances, known=known)
     posed = library.problem(())
-    return with_scales(library.about(with_fitted_starts(posed.replays, posed.space), library.misfit))
+    return with_noise(*with_scales(library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)))
 
 
 def inferred(library: Library, declared: Fit) -> Inference:
@@ -307,6 +309,16 @@ def with_scales(library: Library) -> tuple[Library, Fit]:
         library = replace(library, widened={**library.widened, **wider}, _problems={})
         fit = declared_fit(library)
     return library, fit
+
+
+def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
+    """Return the library with the noise that the declared fit shows where no rest tells it, and that fit."""
+    seen = train_residuals(declared)
+    levels = levels_left(library.data.levels, seen.replays, seen.raw)
+    if levels == library.data.levels:
+        return library, declared
+    library = replace(library, data=replace(library.data, levels=levels), _problems={})
+    return library, declared_fit(library)
 
 
 def rescaled(library: Library, declared: Fit) -> Library:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from functools import reduce
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,8 +13,6 @@ from armid.inference.library import Activation, Library, points_within
 from armid.inference.model import Fit, fit_from, with_own_starts
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
-
-T = TypeVar("T")
 
 
 def finished(fit: Fit, library: Library) -> Fit:
@@ -111,12 +108,16 @@ def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -
     return np.asarray(tried[np.argmin(records.chi2(tried))])
 
 
-def unless_diverged(trial: Callable[[], T]) -> T | None:
-    """Return what a fit gives, None where each of its starts diverges or it cannot be composed."""
+def unless_diverged(trial: Callable[[], Fit | None]) -> Fit | None:
+    """Return what a fit gives, None where each of its starts diverges or it cannot be composed.
+
+    Where everything about an estimate diverges nothing tells how far it may be off: it is none.
+    """
     try:
-        return trial()
+        fit = trial()
     except ArmidError:
         return None
+    return None if fit is None or (fit.n_free and not fit.jacobian.any()) else fit
 
 
 def responses(current: Fit, records: WhiteRecords, grid: Sequence[Activation]) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
-from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels
+from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, sensor_of
 from armid.model import Array, Plant
 from armid.problem.problem import signals_of
 from armid.record import Record
@@ -144,10 +144,14 @@ class WhitenedData:
         return np.concatenate(found)
 
 
-def whitened(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> WhitenedData:
-    """Return records with their noise; others: records of the same sensors whose rests tell of their noise too."""
-    each, more = (tuple(one for r in some for one in r.each) for some in (records, others))
+def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | None = None) -> WhitenedData:
+    """Return records with their noise; trained: records of the same sensors, which tell of their noise too."""
+    each, more = (tuple(one for r in some for one in r.each) for some in (records, trained.records if trained else ()))
     levels = noise_levels(each, plant, more)
+    if trained is not None:
+        theirs = dict(zip(map(sensor_of, more), trained.levels, strict=True))
+        levels = tuple(level if level.known else theirs.get(sensor_of(r), level)
+                       for r, level in zip(each, levels, strict=True))  # fmt: skip
     sound = np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
     return WhitenedData(tuple(records), levels, sound)
 
