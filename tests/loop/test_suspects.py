@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -67,6 +68,17 @@ def test_a_fault_of_a_record_held_out_does_not_carry_over(campaign, sound):
     assert found.next_steps[0].startswith("lower_low_voltage.csv does not carry over")
     # it decides nothing
     assert found.parameters == sound.parameters
+
+
+def test_a_fault_that_held_out_records_deny_is_gone_whole(campaign, monkeypatch):
+    """Without an effect there is no step to withdraw; the intervals count that the record may be faulty."""
+    monkeypatch.setattr(import_module("armid.loop.close_loop"), "is_denied", lambda *_: True)
+    found = close_loop(Model(ARM), with_fault(campaign, "short.csv", Fault("late"), 0.004), CANDIDATES, curve=False)
+    assert (found.suspects, found.withdrawn, found.inference.in_force) == ((), None, frozenset())
+    assert found.inference.probabilities["records"] == {}
+    intervals = found.inference.intervals
+    for e in found.after.estimates:
+        assert (e.low, e.high) == (min(intervals[e.name].low, e.value), max(intervals[e.name].high, e.value))
 
 
 @pytest.mark.parametrize(("file", "kind", "value"), [("short.csv", "late", 0.004), ("raise.csv", "offset", 0.02)])

@@ -111,7 +111,7 @@ def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -
 def unless_diverged(trial: Callable[[], Fit | None]) -> Fit | None:
     """Return what a fit gives, None where each of its starts diverges or it cannot be composed.
 
-    Where everything about an estimate diverges nothing tells how far it may be off: it is none.
+    Where everything about an estimate diverges nothing tells how far it may be off, and it does not count.
     """
     try:
         fit = trial()
