@@ -12,7 +12,7 @@ Adding a column X with a strength of prior deviation s to a fit with residual r 
     2 ln B = (X'r)^2 / (|X|^2 + 1/s^2) - ln(1 + s^2 |X|^2),     X beyond what the unknowns of the fit can do.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -216,6 +216,11 @@ class Forecast:
     def total(self) -> float:
         """Log Bayes factor of the hypothesis, without its prior odds."""
         return float(logsumexp(self.log_factor))
+
+    @property
+    def without_columns(self) -> "Forecast":
+        """Itself without the columns of its proposal: of long records they take most of the memory of a search."""
+        return replace(self, proposal=replace(self.proposal, columns=np.empty((0, 0))))
 
     @property
     def posterior(self) -> float:

@@ -8,6 +8,7 @@ leads is fitted again, as a forecast ranks and does not judge.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -77,8 +78,8 @@ class Exploration:
     noise: Scale | None = None
     completed: dict[Hypotheses, float] = field(default_factory=dict)
     refused: set[Hypotheses] = field(default_factory=set)
-    _evidence: dict[tuple[Fit, Scale], float] = field(default_factory=dict)
-    _scale: dict[Fit, Scale] = field(default_factory=dict)
+    _evidence: WeakKeyDictionary[Fit, dict[Scale, float]] = field(default_factory=WeakKeyDictionary)
+    _scale: WeakKeyDictionary[Fit, Scale] = field(default_factory=WeakKeyDictionary)
 
     @property
     def declared(self) -> Fit:
@@ -96,10 +97,10 @@ class Exploration:
     def log_posterior(self, model: Hypotheses, scale: Scale | None = None) -> float:
         """Return the log posterior of a model, up to a constant."""
         fit, scale = self.fits[model], scale or self.scale()
-        key = (fit, scale)
-        if key not in self._evidence:
-            self._evidence[key] = log_evidence(expansion_of(fit, scale, self.library))
-        return self._evidence[key] + log_prior(model)
+        known = self._evidence.setdefault(fit, {})
+        if scale not in known:
+            known[scale] = log_evidence(expansion_of(fit, scale, self.library))
+        return known[scale] + log_prior(model)
 
     def ranked(self) -> list[tuple[Hypotheses, float]]:
         """Return the models with their log posteriors, the best first."""
@@ -165,7 +166,7 @@ def without_denied(found: Exploration, denied: Hypotheses, standing: Hypotheses)
             if len(m) <= len(standing) and not any(h.public in gone for h in m)}  # fmt: skip
     forecasts = {m: [f for f in several if f.proposal.hypothesis.public not in gone]
                  for m, several in found.forecasts.items() if m in fits and len(m) < len(standing)}  # fmt: skip
-    left = replace(found, fits=fits, forecasts=forecasts, noise=found.scale(), _evidence={})
+    left = replace(found, fits=fits, forecasts=forecasts, noise=found.scale(), _evidence=WeakKeyDictionary())
     add_signals(left, [m for m, _ in left.ranked()[:N_BESIDE]])
     return left
 
@@ -242,7 +243,7 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     ahead = [forecast(about, p) for p in proposals]
     ahead_held = [forecast(held, p) for p in proposals]
     beside = [forecast(about, p) for p in others]
-    found.forecasts[model] = [*ahead, *beside]
+    found.forecasts[model] = [f.without_columns for f in (*ahead, *beside)]
     limit = limit_of(found, scale)
     trials: list[Trial] = []
     if is_significant(fit):
