@@ -1,5 +1,6 @@
 """Which models are fitted: those in the window, free shapes, other forms, pairs; what is kept of them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,10 +9,12 @@ import pytest
 from armid.inference import infer, search
 from armid.inference.candidates import EffectKey
 from armid.inference.decisions import WINDOW
+from armid.inference.evidence import expansion_of, forecast
 from armid.inference.hypothesis import Hypothesis
+from armid.inference.kinds import records
 from armid.inference.library import Library
 from armid.inference.refit import best_along
-from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, is_outdone, next_model
+from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, drops, is_outdone, next_model
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
@@ -51,6 +54,27 @@ def test_another_form_of_an_effect_takes_its_place(stand):
 
 
 @pytest.mark.slow
+def test_a_fault_that_an_effect_makes_needless_is_dropped(stand, monkeypatch):
+    """It took the place of the effect and keeps it with no size: a sound record would be accused."""
+    campaign = replace(read_campaign(stand(*MANOEUVRES, "--effect", "supply_sag=0.03")), tolerances={})
+    found = infer(Model(campaign.plant), campaign, {"supply_sag": EFFECTS["supply_sag"]}).found
+    best, _ = found.ranked()[0]
+    assert {h.public for h in best} == {("effect", "supply_sag")}
+    right = found.fits.pop(best)
+    about = expansion_of(right, found.scale(), found.library)
+    monkeypatch.setattr(records, "MOVES", 0.0)
+    offset = next(p for p in records.propose(right, found.faults, found.library) if "offset" in p.hypothesis.name)
+    faulty = best | {offset.hypothesis}
+    found.fits[faulty] = offset.refit(right, about, forecast(about, offset), np.inf)
+    assert [f.unknown.name for f in found.fits[faulty].others] == [offset.hypothesis.name]
+    trials = dict(drops(found, faulty))
+    again = trials[best]()
+    assert again.others == ()
+    assert again.chi2 == pytest.approx(right.chi2, rel=1e-3)
+    found.fits[best] = again
+    assert found.log_posterior(best) > found.log_posterior(faulty)
+
+
 class Narrow:
     """A sum of squares with a narrow valley along its second parameter."""
 

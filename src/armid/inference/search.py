@@ -28,7 +28,7 @@ from armid.inference.evidence import (
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior, words
 from armid.inference.kinds import drifts, effects, records, unknown
 from armid.inference.library import Library
-from armid.inference.model import Fit
+from armid.inference.model import Fit, fit_from
 from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
 from armid.inference.refit import freed as freed_shape
 from armid.inference.unknowns import Unknown, constants_of, freed, polished, projected
@@ -257,7 +257,7 @@ def expand(found: Exploration, model: Hypotheses) -> None:
     is_far = is_significant(fit) and not is_near(found)
     if is_far and model == ranked[0][0]:  # before the drops: it fits what it stands on
         trials += exchanges(found, model, fit, limit)
-    trials += drops(found, model, fit)
+    trials += drops(found, model)
     if not is_far and found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
         forms = effects.propose_forms(fit, found.known, library)
         trials += swaps(found, model, fit, scale, [*proposals, *forms], limit)
@@ -325,19 +325,36 @@ def trial_of(
     return [(key, partial(ahead.proposal.refit, about.fit, about, ahead, limit, *begun))]
 
 
-def drops(found: Exploration, model: Hypotheses, fit: Fit) -> list[Trial]:
-    """Return the fits of a model without one of its effects."""
-    trials: list[Trial] = []
+def drops(found: Exploration, model: Hypotheses) -> list[Trial]:
+    """Return the fits of a model without one of its effects, faults or drifts.
+
+    A fault that took the place of an effect keeps it when the effect has come, with no size: then a fit tries without.
+    """
+    fit, weight, trials = found.fits[model], found.scale().weight, list[Trial]()
+    sizes = {f.unknown.name for f in fit.others}
     for hypothesis in sorted(model):
         key = model - {hypothesis}
-        if hypothesis.kind == "effect" and key not in found.fits:
-            trials.append((key, partial(without, fit, hypothesis, found.library, found.scale().weight)))
+        is_known = key in found.fits or key in found.refused
+        if not is_known and (hypothesis.kind == "effect" or name_of_size(hypothesis) in sizes):
+            trials.append((key, partial(without, fit, hypothesis, found.library, weight)))
     return trials
 
 
 def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -> Fit | None:
-    active = tuple(k for k in fit.active if k.declared != hypothesis.means)
-    return near(fit, active, [fit.values], library, weight)
+    """Return a fit without an effect, or without the size of a fault or drift."""
+    if hypothesis.kind == "effect":
+        active = tuple(k for k in fit.active if k.declared != hypothesis.means)
+        return near(fit, active, [fit.values], library, weight)
+    assert fit.base is not None
+    kept, posed = [f.unknown for f in fit.others if f.unknown.name != name_of_size(hypothesis)], fit.base
+    if kept:
+        return unless_diverged(lambda: freed(fit, posed, kept, weight, rough=True))
+    return unless_diverged(lambda: fit_from(posed, fit.active, [fit.z], rough=True))
+
+
+def name_of_size(hypothesis: Hypothesis) -> str:
+    """Return the name of the unknown that is the size of a fault or drift."""
+    return drifts.name_of(hypothesis) if hypothesis.kind == "drift" else hypothesis.name
 
 
 def near(
@@ -468,6 +485,10 @@ def finish(found: Exploration) -> None:
 def finish_all(found: Exploration) -> None:
     """Bring all models that may count to their estimates, all unknowns freed."""
     while True:
+        ranked = found.ranked()
+        for key, make in drops(found, ranked[0][0]):
+            if not found.take(key, make()):
+                found.refused.add(key)
         ranked = found.ranked()
         todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(found, m)
                 and not is_outdone(m, value, ranked)]  # fmt: skip

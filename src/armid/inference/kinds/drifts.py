@@ -63,7 +63,7 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
     order, names, found = order_of(fit.records), list(fit.values), []
     for hypothesis in known:
         what: OfParameter = hypothesis.means
-        if f"drift of {hypothesis.name}" in held or (what.product is None and what.name not in names):
+        if name_of(hypothesis) in held or (what.product is None and what.name not in names):
             continue
         slope = what.product.slope if what.product is not None else fit.jacobian[:, names.index(what.name)]
         column = LARGEST * slope * order
@@ -76,13 +76,18 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
     base, what, again, weight = fit.base or fit.records, hypothesis.means, fit, about.scale.weight
     for is_first in (True, False, False):
-        unknown = Unknown(f"drift of {hypothesis.name}", partial(what.moved, again))
+        unknown = Unknown(name_of(hypothesis), partial(what.moved, again))
         others = [f.unknown for f in fit.others if f.unknown.name != unknown.name]
         tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, is_first))  # noqa: B023
         if tried is None:
             return None
         again = tried
     return again
+
+
+def name_of(hypothesis: Hypothesis) -> str:
+    """Return the name of the unknown that is the size of a drift."""
+    return f"drift of {hypothesis.name}"
 
 
 def order_of(records: WhiteRecords) -> Array:
