@@ -19,9 +19,8 @@ from armid.model import Array, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Noise, Record
-from armid.record.noise import correlation_sum, difference_rms, new_share
+from armid.record.noise import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, new_share
 from armid.record.record import NOISE_FREE
-from armid.record.sensor import step_of
 
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 HIDES_ENGINE = 5e-5
@@ -114,8 +113,9 @@ def levels_left(
     """
     each: dict[tuple[str, float], list[float]] = {}
     for replay, part in zip(replays, left, strict=True):
-        step = step_of(replay.measured) / np.sqrt(12.0)
-        each.setdefault(sensor_of(replay.record), []).append(max(difference_rms(part), step))
+        step, moved = replay.record.signals[0].sensor.step / np.sqrt(12.0), changing(replay.measured)
+        told = part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part
+        each.setdefault(sensor_of(replay.record), []).append(max(difference_rms(told), step))
     found = []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)

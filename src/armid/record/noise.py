@@ -130,7 +130,7 @@ def difference_rms(motion: Array, times: Array | None = None) -> float:
     is stuck tells nothing of its noise.
     times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
     """
-    moved = ~in_runs(np.append(np.diff(motion) == 0.0, False), REPEATED - 1)
+    moved = changing(motion)
     if FEWEST_REST_SAMPLES <= moved.sum() < motion.size:
         apart = difference_rms(motion[moved], None if times is None else times[moved])
         if apart > step_of(motion):
@@ -145,6 +145,11 @@ def difference_rms(motion: Array, times: Array | None = None) -> float:
         if len(estimates) > 1 and estimates[-1] > 0.1 * estimates[-2]:
             return float(estimates[-2])
     return float(estimates[-1])
+
+
+def changing(motion: Array) -> Mask:
+    """Return which samples stand in no run of equal ones, (n_samples,)."""
+    return ~in_runs(np.append(np.diff(motion) == 0.0, False), REPEATED - 1)
 
 
 def divided_differences(values: Array, times: Array, order: int) -> Array:
