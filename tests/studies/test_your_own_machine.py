@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from armid.contract.check import check_thing
-from armid.contract.equations import check_effect
+from armid.contract.equations import check_effects
 from armid.loop import close_loop
 from armid.model import EFFECTS, Model, Output, is_late_as_a_whole
 from armid.model.effect import zero
@@ -59,10 +59,11 @@ def test_the_plant_keeps_the_contract(plugin):
 def test_a_late_voltage_is_no_late_torque(folder, plugin):
     """Told as one, for want of a port at the winding, it would give another inertia, of which nobody may be sure."""
     boom = load_registry([plugin]).plants["boom"]
-    for name in ("controller_delay", "drive_lag"):
-        points = list(check_effect(EFFECTS[name], {"boom": boom}))
-        assert [f.sentence for f in points if not f.passed] == []
-        assert any(f.name == "compiled on boom in rad/s in the form voltage" for f in points), points
+    late = [EFFECTS[name] for name in ("controller_delay", "drive_lag")]
+    points = list(check_effects(late, {"boom": boom}))
+    assert [(name, f.sentence) for name, f in points if not f.passed] == []
+    compiled = {name for name, f in points if f.name == "compiled on boom in rad/s in the form voltage"}
+    assert compiled == {"controller_delay", "drive_lag"}
     ports = {name: unit for name, unit in boom.ports.items() if name != "winding"}
     torque_alone = replace(boom, ports=ports, quantities={**boom.quantities, "winding": zero})
     assert (is_late_as_a_whole(boom), is_late_as_a_whole(torque_alone)) == (False, True)

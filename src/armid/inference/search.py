@@ -325,14 +325,14 @@ def trial_of(
     return [(key, partial(ahead.proposal.refit, about.fit, about, ahead, limit, *begun))]
 
 
-def drops(found: Exploration, model: Hypotheses) -> list[Trial]:
+def drops(found: Exploration, model: Hypotheses, kinds: Sequence[str] = ("effect", "record", "drift")) -> list[Trial]:
     """Return the fits of a model without one of its effects, faults or drifts.
 
     A fault that took the place of an effect keeps it when the effect has come, with no size: then a fit tries without.
     """
     fit, weight, trials = found.fits[model], found.scale().weight, list[Trial]()
     sizes = {f.unknown.name for f in fit.others}
-    for hypothesis in sorted(model):
+    for hypothesis in sorted(h for h in model if h.kind in kinds):
         key = model - {hypothesis}
         is_known = key in found.fits or key in found.refused
         if not is_known and (hypothesis.kind == "effect" or name_of_size(hypothesis) in sizes):
@@ -486,7 +486,7 @@ def finish_all(found: Exploration) -> None:
     """Bring all models that may count to their estimates, all unknowns freed."""
     while True:
         ranked = found.ranked()
-        for key, make in drops(found, ranked[0][0]):
+        for key, make in drops(found, ranked[0][0], ("record", "drift")):
             if not found.take(key, make()):
                 found.refused.add(key)
         ranked = found.ranked()
