@@ -314,6 +314,20 @@ def test_table_1_is_that_of_the_committed_csv(readme, root):
                 assert float(shown) == pytest.approx(value, rel=10.0 ** (1 - digits)), (variant, parameter, kind)
 
 
+def test_measured_machines_are_those_of_the_committed_table(readme, root):
+    """Errors before and after, as studies/measured/run.py printed them."""
+    lines = (root / "results" / "measured" / "table.md").read_text(encoding="utf-8").splitlines()[2:]
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
+    told = {name: (before, after) for name, _, _, before, after, *_ in cells}
+    order = ("emps", "dfki", "dfki_without_ddp", "dfki_without_direct_collocation", "quarter_drone",
+             "quanser_flexible_link", "bam_xl330", "cluj_bldc")  # fmt: skip
+    assert set(order) == set(told)
+    rows = [line.split("|")[2:4] for line in readme.partition("## Measured machines")[2].splitlines() if "|" in line]
+    for name, row in zip(order, rows[2:], strict=True):
+        for shown, wanted in zip(row, told[name], strict=True):
+            assert [float(x) for x in shown.split(",")] == [float(x) for x in wanted.split()], name
+
+
 def test_the_package_says_who_made_it_where_it_runs_and_its_workflows_call_ci(readme, root):
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     (author,) = project["authors"]
