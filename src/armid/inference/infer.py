@@ -318,7 +318,7 @@ def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
     if levels == library.data.levels:
         return library, declared
     library = replace(library, data=replace(library.data, levels=levels), _problems={})
-    return library, declared_fit(library)
+    return library, accurate(fit_from(library.problem(()), (), [declared.z]), library)
 
 
 def rescaled(library: Library, declared: Fit) -> Library:
