@@ -152,6 +152,9 @@ class Inference:
             if name in self.posterior.parameters:
                 (low, high), noise = self.posterior.interval(name), 0.5 * (one.noise_high - one.noise_low) / NORMAL_95
                 causes = tuple(self.posterior.causes(name, noise, beside))
+                # Outside its box a parameter is nothing that a machine can have.
+                space = self.found.fits[self.in_force].records.space
+                low, high = np.clip((low, high), space.low[space.index(name)], space.high[space.index(name)]).tolist()
                 found[name] = replace(one, low=low, high=high, causes=causes)
         return found
 
