@@ -318,13 +318,13 @@ def test_measured_machines_are_those_of_the_committed_table(readme, root):
     """Errors before and after, as studies/measured/run.py printed them."""
     lines = (root / "results" / "measured" / "table.md").read_text(encoding="utf-8").splitlines()[2:]
     cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
-    told = {name: (before, after) for name, _, _, before, after, *_ in cells}
+    table = {name: (before, after) for name, _, _, before, after, *_ in cells}
     order = ("emps", "dfki", "dfki_without_ddp", "dfki_without_direct_collocation", "quarter_drone",
              "quanser_flexible_link", "bam_xl330", "cluj_bldc")  # fmt: skip
-    assert set(order) == set(told)
+    assert set(order) == set(table)
     rows = [line.split("|")[2:4] for line in readme.partition("## Measured machines")[2].splitlines() if "|" in line]
     for name, row in zip(order, rows[2:], strict=True):
-        for shown, wanted in zip(row, told[name], strict=True):
+        for shown, wanted in zip(row, table[name], strict=True):
             assert [float(x) for x in shown.split(",")] == [float(x) for x in wanted.split()], name
 
 

@@ -49,7 +49,7 @@ def test_noise_without_a_rest_is_that_of_what_the_declared_model_leaves(fast, fi
     assert [level.rms for level in unseen.data.levels] == [library.data.levels[0].rms]
 
 
-def test_an_estimate_about_which_everything_diverges_is_none(fitted):
+def test_an_estimate_does_not_count_where_every_candidate_near_it_diverges(fitted):
     _, declared = fitted
     assert unless_diverged(lambda: declared) is declared
     alone = type(declared)(declared.active, declared.records, declared.z, declared.residual)

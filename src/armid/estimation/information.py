@@ -147,12 +147,11 @@ def sensitivities(replay: Replay, space: Space, x: Array) -> Array:
 def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) -> Iterator[Array]:
     """Yield what one standard deviation of each measured start constant does to the weighted signal, (n_samples,).
 
-    bent: after each slope also what the same move to either side does alike. Where a motion doubles quickly, as near
-    an upper rest, the slope alone tells too little (Julier, Uhlmann 2004, doi:10.1109/JPROC.2003.823141).
+    bent: yield half the second difference after each slope. Near an unstable rest the slope alone is too small a
+    doubt (Julier, Uhlmann 2004, doi:10.1109/JPROC.2003.823141).
     """
     candidate = records.whole(z[np.newaxis])
     for ready, outputs in by_record(records.replays).items():
-        edges = {r: np.cumsum([0, *r.record.lengths]) for r in outputs}
         for index, (piece, calibration) in enumerate(zip(ready.record.pieces, ready.calibrations, strict=True)):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
                 start = piece.manoeuvre.constants.get(name, 0.0)
@@ -161,13 +160,24 @@ def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) ->
                     simulate(ready.model, piece.with_constants({name: start + move}).manoeuvre, candidate,
                              calibration.schedule).outputs[:, 0] for move in moves
                 )  # fmt: skip
-                for response in (0.5 * (above - below), *(0.5 * (above + below) - same for same in at)):
-                    changes = [np.zeros(r.record.n_samples) for r in records.replays]
-                    for change, r in zip(changes, records.replays, strict=True):
-                        if r in edges:
-                            own = response[r.place, r.record.samples[index]]
-                            change[edges[r][index] : edges[r][index + 1]] = own
-                    yield records.weighted(changes)
+                yield change_of_piece(records, outputs, index, 0.5 * (above - below))
+                for same in at:
+                    yield change_of_piece(records, outputs, index, 0.5 * (above + below) - same)
+
+
+def change_of_piece(
+    records: LeastSquaresProblem, outputs: Sequence[Replay], index: int, response: Array
+) -> Array:  # fmt: skip
+    """Return the change of the weighted signal where one piece of one record changes, (n_samples,).
+
+    outputs: of that record. index: of the piece. response: change of its outputs, (n_outputs, n_times).
+    """
+    changes = [np.zeros(r.record.n_samples) for r in records.replays]
+    for change, r in zip(changes, records.replays, strict=True):
+        if r in outputs:
+            first = sum(r.record.lengths[:index])
+            change[first : first + r.record.lengths[index]] = response[r.place, r.record.samples[index]]
+    return records.weighted(changes)
 
 
 def inverse(matrix: Array) -> Array:

@@ -88,7 +88,7 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
     records of the same sensors whose rests count too.
     """
     pooled = {sensor: pooled_level([r for r in (*records, *others) if sensor_of(r) == sensor],
-                                   least_noise(sensor, plant)) for sensor in set(map(sensor_of, records))}  # fmt: skip
+                                   noise_floor(sensor, plant)) for sensor in set(map(sensor_of, records))}  # fmt: skip
     return tuple(pooled[sensor_of(r)] for r in records)
 
 
@@ -97,7 +97,7 @@ def sensor_of(record: Record) -> tuple[str, float]:
     return record.output, record.manoeuvre.interval
 
 
-def least_noise(sensor: tuple[str, float], plant: Plant) -> float:
+def noise_floor(sensor: tuple[str, float], plant: Plant) -> float:
     """Return the noise that hides the engine's own error."""
     sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
     return HIDES_ENGINE * sizes[sensor[0]]
@@ -114,12 +114,12 @@ def levels_left(
     each: dict[tuple[str, float], list[float]] = {}
     for replay, part in zip(replays, left, strict=True):
         step, moved = replay.record.signals[0].sensor.step / np.sqrt(12.0), changing(replay.measured)
-        told = part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part
-        each.setdefault(sensor_of(replay.record), []).append(max(difference_rms(told), step))
+        sampled = part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part
+        each.setdefault(sensor_of(replay.record), []).append(max(difference_rms(sampled), step))
     found = []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
-        rms = max(float(np.median(each[sensor])), least_noise(sensor, replay.model.plant))
+        rms = max(float(np.median(each[sensor])), noise_floor(sensor, replay.model.plant))
         found.append(level if level.known or level.rms <= rms else white_level(rms, 0))
     return tuple(found)
 

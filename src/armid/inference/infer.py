@@ -142,7 +142,7 @@ class Inference:
     @cached_property
     def intervals(self) -> dict[str, Interval]:
         """Of each parameter of the declared model, about the model in force."""
-        found = {}
+        found, space = {}, self.found.fits[self.in_force].records.space
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
         has_constants = any(f.unknown.name.startswith(NAMED) for f in self.best.others)
         beside = CONSTANTS if has_constants or not sizes else f"size of {sizes[0]}"
@@ -152,9 +152,9 @@ class Inference:
             if name in self.posterior.parameters:
                 (low, high), noise = self.posterior.interval(name), 0.5 * (one.noise_high - one.noise_low) / NORMAL_95
                 causes = tuple(self.posterior.causes(name, noise, beside))
-                # Outside its box a parameter is nothing that a machine can have.
-                space = self.found.fits[self.in_force].records.space
-                low, high = np.clip((low, high), space.low[space.index(name)], space.high[space.index(name)]).tolist()
+                # No machine has a parameter outside its box.
+                place = space.index(name)
+                low, high = np.clip((low, high), space.low[place], space.high[place]).tolist()
                 found[name] = replace(one, low=low, high=high, causes=causes)
         return found
 
@@ -316,6 +316,8 @@ def with_scales(library: Library) -> tuple[Library, Fit]:
 
 def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
     """Return the library with the noise that the declared fit shows where no rest tells it, and that fit."""
+    if library.data.known:
+        return library, declared
     seen = train_residuals(declared)
     levels = levels_left(library.data.levels, seen.replays, seen.raw)
     if levels == library.data.levels:

@@ -111,7 +111,7 @@ def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -
 def unless_diverged(trial: Callable[[], Fit | None]) -> Fit | None:
     """Return what a fit gives, None where each of its starts diverges or it cannot be composed.
 
-    Where everything about an estimate diverges nothing tells how far it may be off, and it does not count.
+    An estimate does not count where every candidate near it diverges: its uncertainty cannot be found.
     """
     try:
         fit = trial()

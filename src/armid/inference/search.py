@@ -121,6 +121,11 @@ class Exploration:
         self.fits[model] = fit
         return True
 
+    def take_or_refuse(self, model: Hypotheses, fit: Fit | None) -> None:
+        """Keep a fit as `take` does; refuse a model that has none."""
+        if not self.take(model, fit) and model not in self.fits:
+            self.refused.add(model)
+
 
 def explore(library: Library, declared: Fit, most: int | None = None) -> Exploration:
     """Return the models that the train records ask for, from the declared one on.
@@ -263,9 +268,7 @@ def expand(found: Exploration, model: Hypotheses) -> None:
         trials += swaps(found, model, fit, scale, [*proposals, *forms], limit)
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
-        found.take(key, again)
-        if again is None and key not in found.fits:
-            found.refused.add(key)
+        found.take_or_refuse(key, again)
     for key, again in pairs(found, model, about, ahead):
         found.take(key, again)
 
@@ -328,7 +331,7 @@ def trial_of(
 def drops(found: Exploration, model: Hypotheses, kinds: Sequence[str] = ("effect", "record", "drift")) -> list[Trial]:
     """Return the fits of a model without one of its effects, faults or drifts.
 
-    A fault that took the place of an effect keeps it when the effect has come, with no size: then a fit tries without.
+    A fault that imitated an effect keeps its place with a size of 0 when the effect is added.
     """
     fit, weight, trials = found.fits[model], found.scale().weight, list[Trial]()
     sizes = {f.unknown.name for f in fit.others}
@@ -345,11 +348,10 @@ def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -
     if hypothesis.kind == "effect":
         active = tuple(k for k in fit.active if k.declared != hypothesis.means)
         return near(fit, active, [fit.values], library, weight)
-    assert fit.base is not None
-    kept, posed = [f.unknown for f in fit.others if f.unknown.name != name_of_size(hypothesis)], fit.base
-    if kept:
-        return unless_diverged(lambda: freed(fit, posed, kept, weight, rough=True))
-    return unless_diverged(lambda: fit_from(posed, fit.active, [fit.z], rough=True))
+    base, kept = fit.base, [f.unknown for f in fit.others if f.unknown.name != name_of_size(hypothesis)]
+    assert base is not None
+    return unless_diverged(lambda: freed(fit, base, kept, weight, rough=True) if kept else
+                           fit_from(base, fit.active, [fit.z], rough=True))  # fmt: skip
 
 
 def name_of_size(hypothesis: Hypothesis) -> str:
@@ -487,8 +489,7 @@ def finish_all(found: Exploration) -> None:
     while True:
         ranked = found.ranked()
         for key, make in drops(found, ranked[0][0], ("record", "drift")):
-            if not found.take(key, make()):
-                found.refused.add(key)
+            found.take_or_refuse(key, make())
         ranked = found.ranked()
         todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(found, m)
                 and not is_outdone(m, value, ranked)]  # fmt: skip
