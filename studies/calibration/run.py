@@ -95,8 +95,9 @@ def kept_of(found: ClosedLoop) -> dict[str, Any]:
     report, mixture = report_of(found), found.inference.posterior
     atoms = [
         {"log_evidence": a.log_evidence, "log_prior": a.log_prior, "names": sorted(a.names),
-         "mean": a.mean, "deviation": a.deviation}
-        for a, weight in zip(mixture.atoms, mixture.weights, strict=True) if weight >= LEAST
+         "mean": a.mean, "deviation": deviation}
+        for a, weight, deviation in zip(mixture.atoms, mixture.weights, mixture.deviations, strict=True)
+        if weight >= LEAST
     ]  # fmt: skip
     kept = {key: report[key] for key in KEPT} | {"parameter_names": mixture.parameters, "mixture": atoms}
     return kept | {"leaves_more": found.after.diagnosis.significant}

@@ -1,5 +1,6 @@
 """The evidence against exact formulas of linear models, and the mixture against samples of it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -122,6 +123,23 @@ def test_the_mixture_has_the_quantiles_of_its_samples():
     assert found.of_kind("effect") == pytest.approx({"a": 0.6, "b": 0.3, "c": 0.1})
     causes = dict(found.causes("p", 1.0))
     assert sum(causes.values()) == pytest.approx(1.0, abs=0.15)
+
+
+def test_where_something_unknown_acts_a_move_of_the_names_is_doubted_whole():
+    """All between the declared estimate and as far on the other side is equally likely; a complete model is not."""
+    named, beside = frozenset({("effect", "a")}), frozenset({("effect", "a"), ("unknown", "torque")})
+    complete, wrong = (
+        Posterior((Atom(0.0, 0.0, names, np.array([5.0]), np.array([0.1])),), ("p",), declared=np.array([8.0]))
+        for names in (named, beside)
+    )
+    assert complete.interval("p") == pytest.approx((5.0 - 0.196, 5.0 + 0.196), abs=1e-3)
+    low, high = wrong.interval("p")
+    drawn = RNG.uniform(2.0, 8.0, 200_000) + RNG.normal(0.0, 0.1, 200_000)
+    assert high - 5.0 == pytest.approx(1.96 * np.std(drawn), rel=0.01)
+    assert low < 2.0
+    assert high > 8.0
+    assert replace(wrong, known=0.5).interval("p") == pytest.approx((5.0 - 0.98, 5.0 + 0.98), abs=1e-3)
+    assert dict(wrong.causes("p", 0.1, "something unknown"))["something unknown"] > 0.99
 
 
 def test_the_causes_of_a_width_are_shares_of_it():

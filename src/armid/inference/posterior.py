@@ -41,18 +41,42 @@ class Atom:
 class Posterior:
     """Hold the mixture.
 
-    parameters: names of those of the declared model, in the order of the atoms' values. temperature: log evidence is
-    divided by it.
+    parameters: names of those of the declared model, in the order of the atoms' values. declared: what its own fit says
+    of them, None where nothing is doubted by it. known: deviation of each before the records, as a prior or its box
+    says. temperature: log evidence is divided by it.
     """
 
     atoms: tuple[Atom, ...]
     parameters: tuple[str, ...]
     temperature: float = 1.0
+    declared: Array | None = None
+    known: Array | float = np.inf
 
     @cached_property
     def weights(self) -> Array:
         each = np.array([a.log_evidence / self.temperature + a.log_prior for a in self.atoms])
         return np.asarray(np.exp(each - logsumexp(each)))
+
+    @cached_property
+    def means(self) -> Array:
+        """Mean of each parameter in each model, (n_atoms, n_parameters)."""
+        return np.array([a.mean for a in self.atoms])
+
+    @cached_property
+    def deviations(self) -> Array:
+        """Deviation of each parameter in each model, (n_atoms, n_parameters).
+
+        Where something unknown acts, every model is wrong, and names stand in for what nobody knows: that they moved a
+        parameter tells how far a form of the model moves it, and not where to. Everything between the estimate of the
+        declared model and as far on the other side is then equally likely: a variance of a third of the move squared,
+        up to what was known before.
+        """
+        own = np.array([a.deviation for a in self.atoms])
+        if self.declared is None:
+            return own
+        wrong = np.array([any(kind == "unknown" for kind, _ in a.names) for a in self.atoms])
+        moved = np.where(wrong[:, np.newaxis], self.means - self.declared, 0.0)
+        return np.asarray(np.maximum(own, np.minimum(np.sqrt(own**2 + moved**2 / 3.0), self.known)))
 
     @cached_property
     def sets(self) -> dict[frozenset[tuple[str, str]], float]:
@@ -93,8 +117,7 @@ class Posterior:
     def quantile(self, parameter: str, share: float) -> float:
         """Return the value below which a share of the mixture lies."""
         i = self.parameters.index(parameter)
-        means, deviations = (np.array([getattr(a, what)[i] for a in self.atoms]) for what in ("mean", "deviation"))
-        deviations = np.maximum(deviations, 1e-300)
+        means, deviations = self.means[:, i], np.maximum(self.deviations[:, i], 1e-300)
         low, high = float((means - 40.0 * deviations).min()), float((means + 40.0 * deviations).max())
         for _ in range(200):
             middle = 0.5 * (low + high)
@@ -112,15 +135,15 @@ class Posterior:
         noise: deviation by noise alone, SI. beside: name of the other unknowns of the most probable model.
         """
         i = self.parameters.index(parameter)
-        best = self.atoms[int(np.argmax(self.weights))]
-        means, deviations = (np.array([getattr(a, what)[i] for a in self.atoms]) for what in ("mean", "deviation"))
-        whole, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), best.deviation[i] ** 2
+        first = int(np.argmax(self.weights))
+        best, means, deviations = self.atoms[first], self.means[:, i], self.deviations[:, i]
+        whole, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), deviations[first] ** 2
         if max(whole, own) <= 0.0:
             return []
         away: dict[str, float] = {}
-        for atom, weight in zip(self.atoms, self.weights, strict=True):
+        for j, (atom, weight) in enumerate(zip(self.atoms, self.weights, strict=True)):
             names = sorted(name for _, name in atom.names ^ best.names)
-            more = weight * ((atom.mean[i] - best.mean[i]) ** 2 + atom.deviation[i] ** 2 - own)
+            more = weight * ((means[j] - means[first]) ** 2 + deviations[j] ** 2 - own)
             for name in names:
                 away[name] = away.get(name, 0.0) + float(more) / len(names)
         # Only what widens an interval is a cause; other models share their part of the variance in these proportions.
@@ -148,7 +171,10 @@ def posterior(found: Exploration) -> Posterior:
         names = frozenset(h.public for h in model) | left
         atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
         atoms += beside(found, model, value, about, own, mean, covariance, top, left)
-    return Posterior(tuple(atoms), own, calibration().temperature)
+    space, declared = found.declared.records.space, np.array([found.declared.values[n] for n in own])
+    boxes = {n: float(np.ptp([space.low[space.index(n)], space.high[space.index(n)]])) / np.sqrt(12.0) for n in own}
+    known = np.array([library.known[n][1] if n in library.known else boxes[n] for n in own])
+    return Posterior(tuple(atoms), own, calibration().temperature, declared, known)
 
 
 def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
