@@ -26,8 +26,20 @@ class Straight:
     def plain(self):
         return self
 
-    def residuals(self, Z, *_):
-        return np.tile(self.residual, (len(np.atleast_2d(Z)), 1))
+    data = plain
+
+    @property
+    def measured(self):
+        return self.residual
+
+    def whole(self, Z):
+        return Z
+
+    def white(self, signals):
+        return signals
+
+    def with_known(self, _, Z):
+        return np.zeros((len(Z), len(self.residual)))
 
     def padded(self, columns):
         return columns

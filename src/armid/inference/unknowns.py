@@ -32,7 +32,7 @@ from armid.estimation.least_squares import STEP as Z_STEP
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
-from armid.problem.problem import ReadyRecord, with_each
+from armid.problem.problem import ReadyRecord, signals_of_each, with_each
 from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 
 # Step of the differences, in prior standard deviations.
@@ -284,16 +284,18 @@ def costs_at(
 def residuals_at(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: Array) -> Array:
     """Return the whitened residuals of candidates, each with its own values of the unknowns, (n_candidates, n).
 
-    V: (n_candidates, n_unknowns). Candidates that differ in parameters and constants alone are simulated side by side.
+    V: (n_candidates, n_unknowns). Candidates are simulated side by side.
     """
     free = np.array([u.product is None for u in unknowns], dtype=np.bool_)
-    rest = [u for u in unknowns if u.product is None]
-    found: dict[int, Array] = {}
+    rest, forms = [u for u in unknowns if u.product is None], []
     for values in dict.fromkeys(map(tuple, V[:, free])):
-        rows = np.flatnonzero((V[:, free] == values).all(axis=1))
-        records = moved(base, rest, values)
-        shares = {u.product.names[0]: V[rows, i] * u.product.tolerance for i, u in enumerate(unknowns) if u.product}
-        found |= dict(zip(rows.tolist(), records.residuals(Z[rows], shares), strict=True))
+        forms.append((moved(base, rest, values), np.flatnonzero((V[:, free] == values).all(axis=1))))
+    shares = {u.product.names[0]: V[:, i] * u.product.tolerance for i, u in enumerate(unknowns) if u.product}
+    signals = signals_of_each([(records.replays, rows) for records, rows in forms], base.whole(Z), shares)
+    found: dict[int, Array] = {}
+    for (records, rows), own in zip(forms, signals, strict=True):
+        white = records.with_known(records.data.white(own), Z[rows])
+        found |= dict(zip(rows.tolist(), records.measured - white, strict=True))
     return np.array([found[row] for row in range(len(V))])
 
 

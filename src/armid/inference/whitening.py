@@ -195,9 +195,12 @@ class WhiteRecords(LeastSquaresProblem):
         return np.append(self.weighted([r.measured for r in self.replays]), means / deviations)
 
     def signals(self, Z: Array, shares: Mapping[str, Array] | None = None) -> Array:
+        return self.with_known(self.whole_signals(self.whole(Z), shares), Z)
+
+    def with_known(self, signals: Array, Z: Array) -> Array:
+        """Return whitened signals of candidates with the rows of known parameters behind them."""
         places, _, deviations = self.rows
-        found = self.whole_signals(self.whole(Z), shares)
-        return np.hstack([found, self.values(Z)[:, places] / deviations]) if len(places) else found
+        return np.hstack([signals, self.values(Z)[:, places] / deviations]) if len(places) else signals
 
     def residuals(self, Z: Array, shares: Mapping[str, Array] | None = None) -> Array:
         return np.asarray(self.measured - self.signals(np.atleast_2d(Z), shares))

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armid.engine import Calibration, Prepared, Schedule, Simulation, accuracy_against, calibrate, prepare, probes
 from armid.errors import ArmidError, nearest
@@ -31,9 +31,22 @@ class ReadyRecord:
 
         shares: by which share of its value a constant differs from the record's, name -> (n_candidates,).
         """
-        runs = [p.run(candidates, self.threads, p.moved_constants(shares) if shares else None) for p in self.prepared]
+        return self.corrected(self.simulated(candidates, shares))
+
+    def simulated(self, candidates: Array, shares: Mapping[str, Array] | None = None) -> list[Simulation]:
+        """Return what `runs` does, from the starts that the pieces have."""
+        return [p.run(candidates, self.threads, p.moved_constants(shares) if shares else None) for p in self.prepared]
+
+    def corrected(self, runs: Sequence[Simulation]) -> list[Simulation]:
+        """Return the simulation of each piece with its start corrected where it is fitted."""
         pairs = [(run, piece.correction) for run, piece in zip(runs, self.record.pieces, strict=True)]
         return [run if c is None else replace(run, outputs=c.corrected(run.outputs)) for run, c in pairs]
+
+    @property
+    def simulates(self) -> tuple[int, ...]:
+        """What its simulations depend on: records that share it differ in what was measured alone."""
+        pairs = zip(self.record.pieces, self.calibrations, strict=True)
+        return tuple(id(each) for piece, c in pairs for each in (piece.manoeuvre, c))
 
     @cached_property
     def prepared(self) -> tuple[Prepared, ...]:
@@ -186,6 +199,28 @@ def signals_of(
     """
     runs = {ready: ready.runs(candidates, shares) for ready in by_record(replays)}
     return [replay.seen(runs[replay.ready]) for replay in replays]
+
+
+def signals_of_each(
+    forms: Sequence[tuple[Sequence[Replay], NDArray[np.int64]]], candidates: Array, shares: Mapping[str, Array]
+) -> list[list[Array]]:
+    """Return what `signals_of` does for several forms of the same records, of each its rows of the candidates.
+
+    A record that differs in what was measured alone is simulated once for all forms, its candidates side by side.
+    """
+    found: dict[int, dict[ReadyRecord, list[Simulation]]] = {i: {} for i in range(len(forms))}
+    for alike in zip(*(by_record(form) for form, _ in forms), strict=True):
+        groups: dict[tuple[int, ...], list[int]] = {}
+        for i, ready in enumerate(alike):
+            groups.setdefault(ready.simulates, []).append(i)
+        for members in groups.values():
+            rows = np.concatenate([forms[i][1] for i in members])
+            runs = alike[members[0]].simulated(candidates[rows], {n: several[rows] for n, several in shares.items()})
+            edges = np.cumsum([0, *(len(forms[i][1]) for i in members)])
+            for i, first, end in zip(members, edges, edges[1:], strict=False):
+                own = [replace(run, outputs=run.outputs[:, first:end]) for run in runs]
+                found[i][alike[i]] = alike[i].corrected(own)
+    return [[replay.seen(found[i][replay.ready]) for replay in form] for i, (form, _) in enumerate(forms)]
 
 
 def residuals(replays: Sequence[Replay], space: Space, X: ArrayLike, weights: ArrayLike) -> Array:

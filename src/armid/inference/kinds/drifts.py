@@ -21,6 +21,8 @@ from armid.model import Array
 FEWEST = 4
 # Its largest plausible size, as a share of the range or of the constant; prior deviations as shares of that.
 LARGEST, SCALES = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
+# Smallest size about which its effect is taken: of smaller ones rounding would speak.
+LEAST = 0.01
 
 
 @dataclass(frozen=True)
@@ -30,19 +32,39 @@ class OfParameter:
     name: str
     product: Product | None = None
 
-    def moved(self, fit: Fit, records: WhiteRecords, value: float) -> WhiteRecords:
-        """Return records as they would be in the middle of the campaign; fit: about which."""
-        firsts, found = [i for i, replay in enumerate(records.replays) if replay.index == 0], records
+    def undone(self, fit: Fit, size: float) -> "Undone":
+        """Return what takes the drift out of records, taken about a fit and a size of it."""
+        records = fit.base or fit.records
+        firsts, changes = [i for i, replay in enumerate(records.replays) if replay.index == 0], []
         at, names = records.shares(free_values(records, fit.values)), records.space.free_names
         for place, index in enumerate(firsts):
-            share = value * LARGEST * (place / (len(firsts) - 1.0) - 0.5)
-            Z, shares = np.tile(at, (2, 1)), {name: np.full(2, off) for name, off in fit.constants.items()}
+            share = size * LARGEST * (place / (len(firsts) - 1.0) - 0.5) * np.array([0.0, 0.5, 1.0])
+            Z, shares = np.tile(at, (3, 1)), {name: np.full(3, off) for name, off in fit.constants.items()}
             if self.product is not None:
                 name = self.product.names[0]
-                shares[name] = (1.0 + fit.constants.get(name, 0.0)) * np.array([1.0, 1.0 + share]) - 1.0
+                shares[name] = (1.0 + fit.constants.get(name, 0.0)) * (1.0 + share) - 1.0
             else:
-                Z[1] += share * np.array([name == self.name for name in names])
-            found = with_measured(found, index, [x - y for x, y in simulated_file(records, index, Z, shares)])
+                Z += np.outer(share, [name == self.name for name in names])
+            changes.append((index, tuple(x[0] - x[1:] for x in simulated_file(records, index, Z, shares))))
+        return Undone(size, tuple(changes))
+
+
+@dataclass(frozen=True, eq=False)
+class Undone:
+    """Return records as they would be in the middle of the campaign: a parabola through no drift, a half and a whole.
+
+    size: of the whole. changes: of each file its index, and of each of its signals what a half and the whole change,
+    (2, n_samples).
+    """
+
+    size: float
+    changes: tuple[tuple[int, tuple[Array, ...]], ...]
+
+    def __call__(self, records: WhiteRecords, value: float) -> WhiteRecords:
+        share, found = value / self.size, records
+        weights = np.array([4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)])
+        for index, changes in self.changes:
+            found = with_measured(found, index, [weights @ change for change in changes])
         return found
 
 
@@ -74,14 +96,15 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
 
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
     """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
-    base, what, again, weight = fit.base or fit.records, hypothesis.means, fit, about.scale.weight
+    base, again, weight, size = fit.base or fit.records, fit, about.scale.weight, ahead.best(1)[0][1]
+    others = [f.unknown for f in fit.others if f.unknown.name != name_of(hypothesis)]
     for is_first in (True, False, False):
-        unknown = Unknown(name_of(hypothesis), partial(what.moved, again))
-        others = [f.unknown for f in fit.others if f.unknown.name != unknown.name]
+        size = float(np.copysign(np.clip(abs(size), LEAST, 1.0), size))
+        unknown = Unknown(name_of(hypothesis), hypothesis.means.undone(again, size))
         tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, is_first))  # noqa: B023
         if tried is None:
             return None
-        again = tried
+        again, size = tried, tried.others[-1].value
     return again
 
 
