@@ -325,6 +325,21 @@ def axis(write_axis, tmp_path):
     return campaign
 
 
+@pytest.mark.filterwarnings("ignore:every train record")
+@pytest.mark.parametrize("bounds", [{"mass": (1.0, 50.0)}, {"mass": (1.0, 4.0), "viscous.slope": (0.0, 20.0)}])
+def test_the_interval_of_noise_alone_is_that_of_identify_and_of_identifiability(axis, bounds):
+    """With friction that nobody declared, and without: what the model leaves counts as noise in all three."""
+    campaign, known = axis(), {"effects": ["viscous"] if "viscous.slope" in bounds else [], "bounds": bounds}
+    mass = armid.close_loop(campaign, candidates=["coulomb"], **known).before.estimates[0]
+    fitted = armid.identify(campaign, identifier="least_squares", budget=300, **known).parameters["mass"]
+    examined = armid.examine(campaign, **known)
+    centre, half = (dict(zip(examined.space.free_names, each, strict=True))["mass"]
+                    for each in (examined.x, examined.information.half_width))  # fmt: skip
+    width = mass.noise_high - mass.noise_low
+    for low, high in ((fitted.low, fitted.high), (centre - half, centre + half)):
+        assert (low, high) == pytest.approx((mass.noise_low, mass.noise_high), abs=0.01 * width)
+
+
 def test_friction_that_takes_the_whole_drive_is_named_though_its_range_is_half_of_that(axis):
     """At its steady speed of 1.6 m/s the axis loses all of its 8 N: 5 N s/m, where the range ends at 2.5."""
     campaign = axis()

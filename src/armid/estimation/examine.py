@@ -1,6 +1,7 @@
 """Examine what the train records of a campaign say about the parameters, and what one more would."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import ClassVar
 
@@ -11,8 +12,14 @@ from armid.errors import ArmidError, nearest
 from armid.estimation.constants import columns_of, common_factors, products
 from armid.estimation.design import SHRINKAGE, VOLUME, WORST, Motions, Offer, expected_levels, manoeuvre_grid, offers
 from armid.estimation.information import SINGULAR, Information, information_at, information_of, normalised
-from armid.estimation.least_squares import WeightedRecords, estimate, held_by_bound, refine, with_fitted_starts
-from armid.estimation.noise_model import level_weights, levels_of
+from armid.estimation.least_squares import (
+    WeightedRecords,
+    estimate,
+    held_by_bound,
+    weighted_records,
+    with_fitted_starts,
+)
+from armid.estimation.noise_model import Level, level_weights, levels_of
 from armid.estimation.profile import Profile, profiles
 from armid.model import Array, Model
 from armid.problem.problem import Replay, replays
@@ -135,8 +142,8 @@ def examine(
 ) -> Examination:
     """Examine the train records of a campaign; holdout records are not looked at.
 
-    x: free parameters at which sensitivities are taken, SI, (n_free,); None: the least-squares estimate, the records
-    weighed by how far they scatter about it. noise: rms to assume in place of what was measured. by: how offers are
+    x: free parameters at which sensitivities are taken, SI, (n_free,); None: the least-squares estimate, that of
+    `identify`. noise: rms to assume in place of what was measured. by: how offers are
     ranked, see `Offer`. accuracy: "standard" or "fine", of the engine; None: as the noise of each record asks for.
     """
     if not space.free.any():
@@ -152,8 +159,7 @@ def examine(
     train = replays(campaign.train, model, space, accuracy)
     if x is None:
         train = with_fitted_starts(train, space)
-        first = estimate(train, space)
-        start = refine(train, space, first, level_weights(levels_of(train, space, first, noise)))
+        start = estimate(train, space)
     else:
         start = np.asarray(x, dtype=np.float64)
         train = with_starts(train, space.complete(start[np.newaxis])[0])
@@ -163,13 +169,13 @@ def examine(
                 raise ArmidError(
                     f"{name} is {value:g}, a value from {a:g} to {b:g} is expected: other bounds can be given"
                 )
-    records = WeightedRecords(train, space, level_weights(levels_of(train, space, start, noise)))
+    records = as_scattered(weighted_records(train, space), levels_of(train, space, start, noise))
     if not np.isfinite(records.chi2(records.shares(start))[0]):
         raise ArmidError("the simulation diverges at the point that was given: another point is expected")
     z, found = profiles(records, records.shares(start))
     minimum = records.values(z)
     at = minimum if x is None else start
-    information = information_at(train, space, at, levels_of(train, space, at, noise))
+    information = information_at(train, space, at, levels_of(train, space, at, noise), records.weights)
     weighed = WeightedRecords(train, space, level_weights(information.levels))
     z_at = weighed.shares(at)
     residual, slopes = weighed.residual_and_slopes(z_at)
@@ -184,3 +190,14 @@ def examine(
                        groups(information.fisher, space.free_names),
                        common_factors(space.free_names, relative, within) if within else (),
                        wider if within else information.deviation, found, bought, by)  # fmt: skip
+
+
+def as_scattered(records: WeightedRecords, levels: Sequence[Level]) -> WeightedRecords:
+    """Return records whose chi2 counts effective samples as they scatter, their weights in the same proportions.
+
+    A sum of squares of another level has its minimum at the same place; of all records together its scatter is right.
+    """
+    weights = np.array(records.weights)
+    excess = (weights / level_weights(levels)) ** 2
+    scale = np.sqrt(np.average(excess, weights=[r.record.n_samples for r in records.replays]))
+    return replace(records, weights=tuple((weights / scale).tolist()))

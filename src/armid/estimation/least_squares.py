@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from armid.engine import probes
 from armid.errors import ArmidError
+from armid.estimation.noise_model import sensor_of
 from armid.model import Array, Model
 from armid.problem.problem import Replay, output_sizes, signals_of
 from armid.problem.space import Space
@@ -135,11 +136,16 @@ def weighted_records(
 ) -> WeightedRecords:
     """Return records with weights; None: 1/noise rms, or alike for all where a record has no noise to weigh by.
 
-    Alike: 1, or where records hold several outputs 1 over the size of the output.
+    The noise of a record is that of all records of its sensor. Alike: 1, or where records hold several outputs 1 over
+    the size of the output.
     """
     if weights is None:
-        levels = np.array([r.record.noise.rms for r in replays])
-        weights = list(1.0 / (levels if levels.all() else output_sizes(replays)))
+        each: dict[tuple[str, float], list[float]] = {}
+        for r in replays:
+            each.setdefault(sensor_of(r.record), []).append(r.record.noise.rms)
+        known = all(map(all, each.values()))
+        levels = [float(np.sqrt(np.mean(np.square(each[sensor_of(r.record)])))) for r in replays]
+        weights = list(1.0 / (np.array(levels) if known else output_sizes(replays)))
     return WeightedRecords(replays, space, tuple(map(float, weights)))
 
 

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
-from armid.estimation.information import NORMAL_95
+from armid.estimation.information import NORMAL_95, information_at
 from armid.estimation.least_squares import Estimates, held_by_bound, spread_starts, with_fitted_starts
 from armid.estimation.noise_model import levels_left
 from armid.inference.candidates import constant_effects
@@ -142,7 +142,10 @@ class Inference:
     @cached_property
     def intervals(self) -> dict[str, Interval]:
         """Of each parameter of the declared model, about the model in force."""
-        found, space = {}, self.found.fits[self.in_force].records.space
+        fit, found = self.found.fits[self.in_force], {}
+        alone = Expansion(replace(fit, others=()), self.found.scale(), self.found.library,
+                          np.empty((len(fit.residual), 0)))  # fmt: skip
+        of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(alone.spread)), strict=True))
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
         has_constants = any(f.unknown.name.startswith(NAMED) for f in self.best.others)
         beside = CONSTANTS if has_constants or not sizes else f"size of {sizes[0]}"
@@ -150,22 +153,24 @@ class Inference:
             beside = f"where something unknown acts{f', and {beside}' if self.best.others else ''}"
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
-                (low, high), noise = self.posterior.interval(name), 0.5 * (one.noise_high - one.noise_low) / NORMAL_95
-                causes = tuple(self.posterior.causes(name, noise, beside))
+                causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
                 # No machine has a parameter outside its box.
-                place = space.index(name)
-                low, high = np.clip((low, high), space.low[place], space.high[place]).tolist()
+                place, space = fit.records.space.index(name), fit.records.space
+                low, high = np.clip(self.posterior.interval(name), space.low[place], space.high[place]).tolist()
                 found[name] = replace(one, low=low, high=high, causes=causes)
         return found
 
     def of_fit(self, model: Hypotheses) -> dict[str, Interval]:
-        """Return the intervals of all parameters of one model, were it true: with its constants, and of noise alone."""
+        """Return the intervals of all parameters of one model, were it true: with its constants, and of noise alone.
+
+        That of noise is the one of `identify`: what the model leaves counts as noise.
+        """
         found, fit = self.found, self.found.fits[model]
-        scale, span = found.scale(), fit.records.span
-        whole = expansion_of(fit, scale, found.library)
-        alone = Expansion(replace(fit, others=()), scale, found.library, np.empty((len(fit.residual), 0)))
-        n = fit.n_free
-        wide, narrow = (NORMAL_95 * span * np.sqrt(np.diag(e.spread)[:n]) for e in (whole, alone))
+        whole, n = expansion_of(fit, found.scale(), found.library), fit.n_free
+        weights = [1.0 / level.rms for level in fit.records.data.levels]
+        narrow = information_at(fit.records.replays, fit.records.space, fit.x, weights=weights).half_width
+        wide = NORMAL_95 * fit.records.span * np.sqrt(np.diag(whole.spread)[:n])
+        wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))
         return {name: Interval(v - float(w), v + float(w), v - float(a), v + float(a))
                 for (name, v), w, a in zip(fit.values.items(), wide, narrow, strict=True)}  # fmt: skip
 

@@ -237,11 +237,14 @@ def estimates(
         if not max(value - low, high - value) <= within * abs(value):
             wide = f"its interval reaches further than {within:.0%} from the value"
             doubts.append(f"{wide} ({'; '.join(causes)})" if causes else wide)
-        ends = (low, high) if np.isfinite(high - low) else (None, None)
-        told.append(
-            Estimate(public, value, unit, ends[0], ends[1], tuple(doubts), one.noise_low, one.noise_high, causes)
-        )
+        ends, of_noise = shown_ends(low, high), shown_ends(one.noise_low, one.noise_high)
+        told.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))
     return tuple(told)
+
+
+def shown_ends(low: float, high: float) -> tuple[float | None, float | None]:
+    """Return the ends of an interval, None for one that has none."""
+    return (low, high) if np.isfinite(high - low) else (None, None)
 
 
 def words_of(cause: str) -> str:
