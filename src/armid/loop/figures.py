@@ -69,7 +69,7 @@ def motion_figure(found: ClosedLoop) -> Any:
         axis.set_title(f"{replay.name} ({replay.record.role})", fontsize="medium")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
     names = " + ".join(found.effects) or "no effect added"
-    figure.suptitle(f"{found.campaign.name}: measured and simulated, before and after ({names})", fontsize="large")
+    entitle(figure, f"{found.campaign.name}: measured and simulated, before and after ({names})")
     return figure
 
 
@@ -88,7 +88,7 @@ def residual_figure(found: ClosedLoop) -> Any:
         axis.set_title(title, fontsize="medium")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
     names = " + ".join(found.effects) or "no effect added"
-    figure.suptitle(f"{found.campaign.name}: residual before and after ({names})", fontsize="large")
+    entitle(figure, f"{found.campaign.name}: residual before and after ({names})")
     return figure
 
 
@@ -134,7 +134,7 @@ def diagnosis_figure(found: ClosedLoop) -> Any:
     of = "noise" if before.noise_known else "the residual"
     axes[-1, 0].set_xlabel(f"mean square / that of {of}")
     legend_below(figure, 2)
-    figure.suptitle(f"{found.campaign.name}: where the discrepancy is (1 is noise)", fontsize="large")
+    entitle(figure, f"{found.campaign.name}: where the discrepancy is (1 is noise)")
     return figure
 
 
@@ -154,7 +154,7 @@ def against_figure(found: ClosedLoop) -> Any:
         axis.axhline(0.0, color=GREY, lw=0.8)
         axis.set(xlabel=f"{name} [{unit}]", ylabel=f"residual [{signal_unit}]")
     legend_below(figure, 2)
-    figure.suptitle(f"{found.campaign.name}: residual against speed and position", fontsize="large")
+    entitle(figure, f"{found.campaign.name}: residual against speed and position")
     return figure
 
 
@@ -210,7 +210,7 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
         axis.set(xlabel=f"{name} [{unit}]", ylim=(len(labels) - 0.5, -0.5))
         axis.ticklabel_format(axis="x", useOffset=False)
         axis.tick_params(axis="x", labelrotation=30, labelsize="small")
-    figure.suptitle(f"{campaign}: 95 % intervals by model, and over all", fontsize="medium")
+    entitle(figure, f"{campaign}: 95 % intervals by model, and over all")
     return figure
 
 
@@ -250,7 +250,7 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]],
         axes[0].set_axis_off()
     known = "; dashed: true" if any(name in truth for name, *_ in each) else ""
     title = f"{campaign}: deviation from the value after, 95 % intervals (open: not trusted{known})"
-    figure.suptitle(fill(title, int(LETTERS_PER_INCH * figure.get_figwidth())), fontsize="medium")
+    entitle(figure, title)
     return figure
 
 
@@ -326,3 +326,8 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
 def unit_of(variable: str, model: Any) -> str:
     units = {s.name: s.unit for s in model.plant.states} | {i.name: i.unit for i in model.plant.inputs}
     return str(units.get(variable, "s" if variable == "time" else model.plant.scales.effort_unit))
+
+
+def entitle(figure: Any, text: str) -> None:
+    """Write the title of a figure, over as many lines as its width asks for."""
+    figure.suptitle(fill(text, int(LETTERS_PER_INCH * figure.get_figwidth())), fontsize="medium")
