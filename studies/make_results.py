@@ -72,7 +72,7 @@ RECIPES = {
         (ADVISED, f"{STAND} advised {ADVISED} --seed 7 --base {ADVICE} --reports out/advice/reports"),
     )),
     "benchmark": study("benchmark", "ecdf", "critical_difference_0_3_deg_s"), "best_chain": study("best_chain"),
-    "coverage": Recipe(("python studies/interval_coverage.py --out out/coverage --noises 52",)),
+    "coverage": Recipe(("python studies/interval_coverage.py --out out/coverage",)),
     "blind": scored("blind", "held_out", before=((BLIND, f"{STAND} blind {BLIND} --seed 179"),)),
     "cramer_rao": study("cramer_rao", "cramer_rao"), "fitness": study("fitness", "fitness"),
     "dfki_pendulum": loop("dfki_pendulum", "residuals", campaign="out/campaigns/dfki"),
