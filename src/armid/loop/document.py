@@ -241,7 +241,7 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
              value_text(before[name], struck=True) if name in before else "") for name, p in after.items()]  # fmt: skip
     note = (
         "Values with 95 % intervals over all models; of noise alone, as `identify` gives it: were the model in force "
-        "true. Struck (~ ~) where the interval does not hold: a bound holds the value."
+        "true. Struck (~ ~) where it may not hold: a discrepancy remains, or a bound holds the value."
     )
     return table("Parameters", ["parameter", "after", "of noise alone", "trusted", "before"], rows, note)
 

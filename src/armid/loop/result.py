@@ -229,7 +229,8 @@ def estimates(
             continue
         one = known[name]
         low, high = min(one.low, value), max(one.high, value)
-        causes = tuple(f"{words_of(cause)}, {share:.0%}" for cause, share in one.causes[:MOST_CAUSES])
+        seen = [(cause, share) for cause, share in one.causes[:MOST_CAUSES] if round(share, 2)]
+        causes = tuple(f"{words_of(cause)}, {share:.0%}" for cause, share in seen)
         doubts = [REMAINS] if discrepancy and (model != found.in_force or is_unknown) else []
         if owner is not None and found.posterior.probability("effect", owner.public) < CLAIMED:
             doubts.append(f"{owner.public} is not certain")
