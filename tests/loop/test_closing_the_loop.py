@@ -290,6 +290,7 @@ def test_a_parameter_at_its_limit_is_told_and_no_name_rests_on_it(stand):
     assert not any(step.claimed for step in found.steps)
     (told,) = [e for e in found.after.estimates if e.name == "supply_sag.resistance"]
     assert not told.trusted
+    assert told.high == pytest.approx(0.05)
     assert (wider.verdict, wider.effects, wider.next_steps) == ("explained", ("supply_sag",), ())
     assert wider.parameters["supply_sag.resistance"] == pytest.approx(0.08, rel=0.01)
 

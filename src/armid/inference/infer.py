@@ -154,7 +154,6 @@ class Inference:
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
-                # No machine has a parameter outside its box.
                 place, space = fit.records.space.index(name), fit.records.space
                 low, high = np.clip(self.posterior.interval(name), space.low[place], space.high[place]).tolist()
                 found[name] = replace(one, low=low, high=high, causes=causes)
@@ -170,9 +169,13 @@ class Inference:
         weights = [1.0 / level.rms for level in fit.records.data.levels]
         narrow = information_at(fit.records.replays, fit.records.space, fit.x, weights=weights).half_width
         wide = NORMAL_95 * fit.records.span * np.sqrt(np.diag(whole.spread)[:n])
-        wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))
-        return {name: Interval(v - float(w), v + float(w), v - float(a), v + float(a))
-                for (name, v), w, a in zip(fit.values.items(), wide, narrow, strict=True)}  # fmt: skip
+        wide, space = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0)), fit.records.space
+        # No machine has a parameter outside its box.
+        low, high = (
+            np.clip(fit.x + side * wide, space.low[space.free], space.high[space.free]) for side in (-1.0, 1.0)
+        )
+        ends = np.array([low, high, fit.x - narrow, fit.x + narrow]).T.tolist()
+        return {name: Interval(*each) for name, each in zip(fit.values, ends, strict=True)}
 
     @property
     def sentence(self) -> str:
