@@ -33,9 +33,9 @@ ROOT = Path(__file__).parents[1]
 NOT_TRACED = ("bench", "contract", "engine", "estimation", "identifiers", "model", "problem")
 # Those that take longest come first, so that two processes end together.
 LONGEST = (
-    "test_the_small_blind_suite", "test_every_effect_keeps_its_contract", "test_a_runner_killed_twenty_times",
-    "test_the_notebook_runs", "test_the_small_table", "test_every_snippet_runs_and_every_output_is_true",
-    "test_random_candidates_agree_with_the_test_stand",
+    "test_a_late_voltage_is_no_late_torque", "test_the_small_blind_suite", "test_every_effect_keeps_its_contract",
+    "test_a_runner_killed_twenty_times", "test_the_notebook_runs", "test_the_small_table",
+    "test_every_snippet_runs_and_every_output_is_true", "test_random_candidates_agree_with_the_test_stand",
 )  # fmt: skip
 Array = NDArray[np.float64]
 AXIS_TOML = """\

@@ -143,8 +143,8 @@ def examine(
     """Examine the train records of a campaign; holdout records are not looked at.
 
     x: free parameters at which sensitivities are taken, SI, (n_free,); None: the least-squares estimate, that of
-    `identify`. noise: rms to assume in place of what was measured. by: how offers are
-    ranked, see `Offer`. accuracy: "standard" or "fine", of the engine; None: as the noise of each record asks for.
+    `identify`. noise: rms to assume in place of what was measured. by: how offers are ranked, see `Offer`. accuracy:
+    "standard" or "fine", of the engine; None: as the noise of each record asks for.
     """
     if not space.free.any():
         raise ArmidError("no parameter is free: at least one is expected to be examined")

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import combinations
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -15,12 +14,10 @@ from armid.problem.fitness import SIMILARITIES
 from armid.problem.problem import Replay, judged_by
 from armid.problem.space import Space
 from armid.report.document import points, record_axes, small_axes
-from armid.report.style import GREY, OKABE_ITO, PALE, legend_below, panels, pyplot
+from armid.report.style import GREY, OKABE_ITO, PALE, entitle, legend_below, panels, pyplot
 from armid.units import scale_of, shown
 
 MOST_FITS_DRAWN = 8
-# Letters of a title that fit above one column.
-LINE = 60
 MOST_PAIRS = 6
 # Title and caption of the ellipses.
 PAIRS = (
@@ -54,7 +51,7 @@ def fit_figure(found: Identification) -> Any:
     model = " + ".join([found.model.plant.name, *(e.name for e in found.model.effects)])
     some = "" if len(replays) == there_are else f" ({len(replays)} of {there_are} records)"
     title = f"{found.campaign.name}: {model}, {found.identifier} on {found.fitness.name}{some}"
-    figure.suptitle(fill(title, LINE * (1 if len(replays) == 1 else 2)), fontsize="large")
+    entitle(figure, title, "large")
     return figure
 
 

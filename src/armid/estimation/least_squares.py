@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from armid.engine import probes
 from armid.errors import ArmidError
-from armid.estimation.noise_model import sensor_of
+from armid.estimation.noise_model import by_sensor, sensor_of
 from armid.model import Array, Model
 from armid.problem.problem import Replay, output_sizes, signals_of
 from armid.problem.space import Space
@@ -140,12 +140,11 @@ def weighted_records(
     the size of the output.
     """
     if weights is None:
-        each: dict[tuple[str, float], list[float]] = {}
-        for r in replays:
-            each.setdefault(sensor_of(r.record), []).append(r.record.noise.rms)
-        known = all(map(all, each.values()))
-        levels = [float(np.sqrt(np.mean(np.square(each[sensor_of(r.record)])))) for r in replays]
-        weights = list(1.0 / (np.array(levels) if known else output_sizes(replays)))
+        records = [r.record for r in replays]
+        levels = [r.noise.rms for r in records]
+        each = by_sensor(records, levels)
+        pooled = np.array([np.sqrt(np.mean(np.square(each[sensor_of(r)]))) for r in records])
+        weights = list(1.0 / (pooled if all(levels) else output_sizes(replays)))
     return WeightedRecords(replays, space, tuple(map(float, weights)))
 
 

@@ -97,6 +97,14 @@ def sensor_of(record: Record) -> tuple[str, float]:
     return record.output, record.manoeuvre.interval
 
 
+def by_sensor(records: Sequence[Record], values: Sequence[float]) -> dict[tuple[str, float], list[float]]:
+    """Return the values of the records of each sensor."""
+    found: dict[tuple[str, float], list[float]] = {}
+    for record, value in zip(records, values, strict=True):
+        found.setdefault(sensor_of(record), []).append(value)
+    return found
+
+
 def noise_floor(sensor: tuple[str, float], plant: Plant) -> float:
     """Return the noise that hides the engine's own error."""
     sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
@@ -111,12 +119,12 @@ def levels_left(
     Of a fast motion with few samples the differences hold the motion too; what a model leaves holds less of it.
     left: of each record, its unit, not whitened.
     """
-    each: dict[tuple[str, float], list[float]] = {}
+    least = []
     for replay, part in zip(replays, left, strict=True):
         step, moved = replay.record.signals[0].sensor.step / np.sqrt(12.0), changing(replay.measured)
         sampled = part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part
-        each.setdefault(sensor_of(replay.record), []).append(max(difference_rms(sampled), step))
-    found = []
+        least.append(max(difference_rms(sampled), step))
+    each, found = by_sensor([r.record for r in replays], least), []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
         rms = max(float(np.median(each[sensor])), noise_floor(sensor, replay.model.plant))

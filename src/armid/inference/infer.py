@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
-from armid.estimation.information import NORMAL_95, information_at
+from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import Estimates, held_by_bound, spread_starts, with_fitted_starts
 from armid.estimation.noise_model import levels_left
 from armid.inference.candidates import constant_effects
@@ -30,6 +30,7 @@ from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.whitening import whitened
 from armid.model import EFFECTS, Effect, Model
 from armid.model.effects.sensor import sensor_effects
+from armid.problem.space import Space
 from armid.record import Campaign
 
 # By which factor strengths that scale with the machine may exceed their declared range.
@@ -154,8 +155,7 @@ class Inference:
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
-                place, space = fit.records.space.index(name), fit.records.space
-                low, high = np.clip(self.posterior.interval(name), space.low[place], space.high[place]).tolist()
+                low, high = in_box(fit.records.space, name, *self.posterior.interval(name))
                 found[name] = replace(one, low=low, high=high, causes=causes)
         return found
 
@@ -166,16 +166,11 @@ class Inference:
         """
         found, fit = self.found, self.found.fits[model]
         whole, n = expansion_of(fit, found.scale(), found.library), fit.n_free
-        weights = [1.0 / level.rms for level in fit.records.data.levels]
-        narrow = information_at(fit.records.replays, fit.records.space, fit.x, weights=weights).half_width
-        wide = NORMAL_95 * fit.records.span * np.sqrt(np.diag(whole.spread)[:n])
-        wide, space = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0)), fit.records.space
-        # No machine has a parameter outside its box.
-        low, high = (
-            np.clip(fit.x + side * wide, space.low[space.free], space.high[space.free]) for side in (-1.0, 1.0)
-        )
-        ends = np.array([low, high, fit.x - narrow, fit.x + narrow]).T.tolist()
-        return {name: Interval(*each) for name, each in zip(fit.values, ends, strict=True)}
+        narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(whole.spread)[:n])
+        wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))
+        triples = zip(fit.values.items(), wide.tolist(), narrow.tolist(), strict=True)
+        return {name: Interval(*in_box(fit.records.space, name, v - w, v + w), v - a, v + a)
+                for (name, v), w, a in triples}  # fmt: skip
 
     @property
     def sentence(self) -> str:
@@ -184,6 +179,12 @@ class Inference:
 
     def __repr__(self) -> str:
         return self.sentence
+
+
+def in_box(space: Space, name: str, low: float, high: float) -> tuple[float, float]:
+    """Return the part of an interval that lies in the box: no machine has a parameter outside it."""
+    least, most = (float(ends[space.index(name)]) for ends in (space.low, space.high))
+    return min(max(low, least), most), min(max(high, least), most)
 
 
 def sentence_of(chances: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
-from armid.estimation.information import start_changes
+from armid.estimation.information import information_at, start_changes
 from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
 from armid.inference.candidates import Active, EffectKey
 from armid.inference.library import calibrated_replays, finest, is_finer
@@ -115,6 +115,12 @@ class Fit:
         """
         changes = list(start_changes(self.records.plain, self.z))
         return np.column_stack(changes) if changes else np.empty((len(self.residual), 0))
+
+    @cached_property
+    def noise_half_width(self) -> Array:
+        """Half of the 95 % interval of noise alone, SI, (n_free,): that of `identify`, where what is left is noise."""
+        weights = [1.0 / level.rms for level in self.records.data.levels]
+        return information_at(self.records.replays, self.records.space, self.x, weights=weights).half_width
 
     def is_at_a_limit(self, key: EffectKey) -> bool:
         """Whether a limit holds a strength of one of its effects; a shape may be as sharp as it can be."""

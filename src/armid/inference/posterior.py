@@ -171,10 +171,11 @@ def posterior(found: Exploration) -> Posterior:
         names = frozenset(h.public for h in model) | left
         atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
         atoms += beside(found, model, value, about, own, mean, covariance, top, left)
-    space, declared = found.declared.records.space, np.array([found.declared.values[n] for n in own])
-    boxes = {n: float(np.ptp([space.low[space.index(n)], space.high[space.index(n)]])) / np.sqrt(12.0) for n in own}
-    known = np.array([library.known[n][1] if n in library.known else boxes[n] for n in own])
-    return Posterior(tuple(atoms), own, calibration().temperature, declared, known)
+    fit = found.declared
+    known = dict(zip(fit.values, fit.records.span / np.sqrt(12.0), strict=True))
+    known |= {name: deviation for name, (_, deviation) in library.known.items()}
+    declared, before = (np.array([each[n] for n in own]) for each in (fit.values, known))
+    return Posterior(tuple(atoms), own, calibration().temperature, declared, before)
 
 
 def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from armid.loop.result import ClosedLoop
 from armid.model import Array
 from armid.problem.problem import Replay
 from armid.report.document import points, record_axes, small_axes, value_text
-from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, legend_below, log_axis, panels, pyplot
+from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, entitle, legend_below, log_axis, panels, pyplot
 from armid.units import shown
 
 LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", OKABE_ITO["blue"]))
@@ -24,8 +24,6 @@ MOST_RECORDS, MOST_NAMED, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
 # Of the mean residual over a variable, and the least bar of the diagnosis.
 MOST_PARTS, LEAST_RATIO = 30, 1e-3
 PARAMETERS_A_ROW = 4
-# Of a title in medium letters.
-LETTERS_PER_INCH = 9.0
 
 
 def figures_of(
@@ -326,8 +324,3 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
 def unit_of(variable: str, model: Any) -> str:
     units = {s.name: s.unit for s in model.plant.states} | {i.name: i.unit for i in model.plant.inputs}
     return str(units.get(variable, "s" if variable == "time" else model.plant.scales.effort_unit))
-
-
-def entitle(figure: Any, text: str) -> None:
-    """Write the title of a figure, over as many lines as its width asks for."""
-    figure.suptitle(fill(text, int(LETTERS_PER_INCH * figure.get_figwidth())), fontsize="medium")

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -217,7 +218,7 @@ def signals_of_each(
             rows = np.concatenate([forms[i][1] for i in members])
             runs = alike[members[0]].simulated(candidates[rows], {n: several[rows] for n, several in shares.items()})
             edges = np.cumsum([0, *(len(forms[i][1]) for i in members)])
-            for i, first, end in zip(members, edges, edges[1:], strict=False):
+            for i, (first, end) in zip(members, pairwise(edges), strict=True):
                 own = [replace(run, outputs=run.outputs[:, first:end]) for run in runs]
                 found[i][alike[i]] = alike[i].corrected(own)
     return [[replay.seen(found[i][replay.ready]) for replay in form] for i, (form, _) in enumerate(forms)]

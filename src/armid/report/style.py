@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextvars import ContextVar
 from io import StringIO
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ MARKERS = "osD^vPX"
 INK, PALE, GREY = "#222222", "0.75", "0.6"
 DPI = 130
 MANY_MARKS = 1_000
+# Of a title.
+LETTERS_PER_INCH = 9.0
 MOST_POINTS = 1_000
 # Largest ratio of the ends of a logarithmic axis with plain numbers.
 MOST_PLAIN = 300.0
@@ -249,6 +252,11 @@ MOST_NAMED = 6
 def row_names(axis: Any, i: int, names: Sequence[str]) -> None:
     names_here = i % 2 == 0 or PRINTED.get() == "single"
     axis.set_yticks(range(len(names)), names if names_here else [""] * len(names))
+
+
+def entitle(figure: Any, text: str, size: str = "medium") -> None:
+    """Write the title of a figure, over as many lines as its width asks for; size: of the letters."""
+    figure.suptitle(fill(text, int(LETTERS_PER_INCH * figure.get_figwidth())), fontsize=size)
 
 
 def legend_below(figure: Any, ncols: int, handles: Sequence[Any] | None = None) -> None:

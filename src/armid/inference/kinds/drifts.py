@@ -22,7 +22,7 @@ FEWEST = 4
 # Its largest plausible size, as a share of the range or of the constant; prior deviations as shares of that.
 LARGEST, SCALES = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
 # Smallest size about which its effect is taken: of smaller ones rounding would speak.
-LEAST = 0.01
+LEAST_SIZE = 0.01
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     base, again, weight, size = fit.base or fit.records, fit, about.scale.weight, ahead.best(1)[0][1]
     others = [f.unknown for f in fit.others if f.unknown.name != name_of(hypothesis)]
     for is_first in (True, False, False):
-        size = float(np.copysign(np.clip(abs(size), LEAST, 1.0), size))
+        size = float(np.copysign(np.clip(abs(size), LEAST_SIZE, 1.0), size))
         unknown = Unknown(name_of(hypothesis), hypothesis.means.undone(again, size))
         tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, is_first))  # noqa: B023
         if tried is None:
