@@ -345,6 +345,14 @@ def test_a_bar_is_drawn_when_it_is_asked_for(axis, monkeypatch, capsys):
     assert max(used) <= 60
 
 
+def test_a_line_says_what_an_examination_does(axis, monkeypatch, capsys):
+    monkeypatch.setattr("armid.progress.console", lambda: Console(file=sys.stderr, force_terminal=True, width=100))
+    armid.examine(axis, progress=True)
+    assert "manoeuvres for the next record" in capsys.readouterr().err
+    armid.examine(axis)
+    assert capsys.readouterr().err == ""
+
+
 def test_the_log_is_printed_from_a_level_on(capsys):
     try:
         armid.set_log_level("info")

@@ -290,9 +290,9 @@ def identifier_of(given: Any, registry: Registry) -> Any:
 def examine(
     campaign: "CampaignLike", model: Model | None = None, space: "Space | None" = None,
     x: "Mapping[str, float] | ArrayLike | None" = None, noise: float | None = None, by: str = "volume",
-    accuracy: str | None = None, *, where: str = "x", effects: Named = (), plugins: Iterable[str] = (),
-    window: Window | None = None, bounds: Bounds | None = None, fix: Mapping[str, float] | None = None,
-    plant: str | Plant | None = None, units: str | None = None,
+    accuracy: str | None = None, progress: bool = False, *, where: str = "x", effects: Named = (),
+    plugins: Iterable[str] = (), window: Window | None = None, bounds: Bounds | None = None,
+    fix: Mapping[str, float] | None = None, plant: str | Plant | None = None, units: str | None = None,
 ) -> "Examination":  # fmt: skip
     """Say what the train records of a campaign tell about the parameters; `armid.examine("folder")` is enough.
 
@@ -308,6 +308,8 @@ def examine(
         How the next manoeuvre is chosen: by all parameters together, by the worst, or by the largest change.
     accuracy : {"standard", "fine"}
         Of the engine; None: as the noise of each record asks for.
+    progress : bool
+        Whether a line says what is done, in a terminal or a notebook.
     where : str
         What names x in a refusal.
 
@@ -321,7 +323,8 @@ def examine(
     there = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
     box = space or there.space()
     at = free_values(box, x, where) if isinstance(x, Mapping) else x if x is None else np.asarray(x, dtype=np.float64)
-    return run(there.campaign, there.model, box, at, noise, by, accuracy)
+    with status_line(progress) as told:
+        return run(there.campaign, there.model, box, at, noise, by, accuracy, told)
 
 
 def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array:

@@ -185,7 +185,8 @@ def identifiability_command(
     point, where = numbers(at.split(","), "--at") if at else None, "--at"
     if source is not None:
         point, where = read_point(source), f"--from {source}"
-    found = examine(campaign, None, None, point, noise, rank, accuracy_of(accuracy), where=where, **given(**problem))
+    found = examine(campaign, None, None, point, noise, rank, accuracy_of(accuracy), speaks(), where=where,
+                    **given(**problem))  # fmt: skip
     show_and_save(found, out)
 
 

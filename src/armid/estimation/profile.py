@@ -86,20 +86,26 @@ class Point:
 HeldFit = Callable[[float, Array], Point]
 
 
-def profiles(records: LeastSquaresProblem, z: Array) -> tuple[Array, tuple[Profile, ...]]:
+def profiles(
+    records: LeastSquaresProblem, z: Array, told: Callable[[str], None] = lambda _: None
+) -> tuple[Array, tuple[Profile, ...]]:
     """Return the least-squares minimum and the profile of each free parameter about it.
 
     Where a profile comes upon a lower minimum, all start again from there. records: weighted so that chi2 is that of
-    effective samples. z: a start, as shares of the range; the minimum is returned so, too.
+    effective samples. z: a start, as shares of the range; the minimum is returned so, too. told: called with
+    a sentence before each profile.
     """
-    best = fit(records, z)
+    best, names, found = fit(records, z), records.space.free_names, []
     for _ in range(MOST_RESTARTS):
-        found = tuple(profile(records, best, i) for i in range(len(best)))
+        found = []
+        for i, name in enumerate(names):
+            told(f"profile of {name}, {i + 1} of {len(names)}")
+            found.append(profile(records, best, i))
         lowest = min(found, key=lambda p: float(p.rise.min()))
         if lowest.rise.min() > -BETTER:
             break
         best = fit(records, records.shares(lowest.candidates[int(lowest.rise.argmin())]))
-    return best, found
+    return best, tuple(found)
 
 
 def profile(records: LeastSquaresProblem, z: Array, i: int) -> Profile:
