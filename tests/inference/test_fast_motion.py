@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from armid.estimation.information import start_changes
+from armid.inference import prepared
 from armid.inference.checks import holdout_residuals
-from armid.inference.infer import prepared
 from armid.inference.refit import unless_diverged
 from armid.inference.whitening import WhiteRecords, whitened
 from armid.model import EFFECTS, Model

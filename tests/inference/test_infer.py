@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armid.errors import ArmidError
-from armid.inference import infer
+from armid.inference import infer, prepared
 from armid.inference.decisions import calibration
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
@@ -31,7 +31,7 @@ def inferred(stand):
             campaign = read_campaign(stand(*COMMON, *(("--effect", *effects) if effects else ())))
             campaign = changed(replace(campaign, tolerances={}))
             candidates = {n: e for n, e in CANDIDATES.items() if n not in hidden}
-            known[key] = infer(Model(campaign.plant), campaign, candidates, **more)
+            known[key] = infer(*prepared(Model(campaign.plant), campaign, candidates, **more))
         return known[key]
 
     return run
@@ -103,7 +103,7 @@ def test_what_the_user_knows_counts(inferred):
 def test_constants_in_tolerances_widen_the_intervals_and_may_be_off(stand, inferred):
     campaign = read_campaign(stand(*COMMON))
     campaign = replace(campaign, tolerances=dict.fromkeys(("R", "C_T", "eta1"), 0.03))
-    found = infer(Model(campaign.plant), campaign, CANDIDATES)
+    found = infer(*prepared(Model(campaign.plant), campaign, CANDIDATES))
     exact = inferred()
     widths = [[f.intervals[n].high - f.intervals[n].low for n in TRUTH] for f in (exact, found)]
     assert sum(np.array(widths[1]) > np.array(widths[0])) >= 3

@@ -95,7 +95,7 @@ def profiles(
     effective samples. z: a start, as shares of the range; the minimum is returned so, too. told: called with
     a sentence before each profile.
     """
-    best, names, found = fit(records, z), records.space.free_names, []
+    best, names, found = fit(records, z), records.space.free_names, list[Profile]()
     for _ in range(MOST_RESTARTS):
         found = []
         for i, name in enumerate(names):

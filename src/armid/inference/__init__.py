@@ -18,6 +18,6 @@ carry_over    what a model predicts of what its fit has not seen: records held o
 Also here: refit (starts of fits), missing_signal (the signal that a model lacks at each port).
 """
 
-from armid.inference.infer import Inference, infer
+from armid.inference.infer import Inference, infer, prepared
 
-__all__ = ["Inference", "infer"]
+__all__ = ["Inference", "infer", "prepared"]

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from armid.engine import along
 from armid.errors import ArmidError, nearest
@@ -202,9 +201,7 @@ def listed(probabilities: Mapping[str, float]) -> dict[str, float]:
     return dict(sorted(told.items(), key=lambda pair: -pair[1]))
 
 
-# Threads of the linear algebra inside our own threads would only wait for each other.
-@threadpool_limits.wrap(limits=1, user_api="blas")  # type: ignore[untyped-decorator]
-def infer(
+def prepared(
     model: Model,
     campaign: Campaign,
     candidates: Mapping[str, Effect] | None = None,
@@ -214,11 +211,8 @@ def infer(
     threads: int = 1,
     told: Callable[[str], None] = lambda _: None,
     progress: Path | None = None,
-) -> Inference:
-    """Return how probable it is that a declared model lacks each effect of a library, from the train records.
-
-    Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
-    with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
+) -> tuple[Library, Fit]:
+    """Return the declared model with its candidates and the train records, and its fit.
 
     Parameters
     ----------
@@ -241,7 +235,8 @@ def infer(
 
     Returns
     -------
-    Inference
+    (Library, Fit)
+        What `infer` takes.
 
     Raises
     ------
@@ -249,21 +244,6 @@ def infer(
         When every candidate of the declared model diverges, for an unknown parameter, and for a prior of an unknown
         effect or outside 0 to 1.
     """
-    return inferred(*prepared(model, campaign, candidates, bounds, fixed, priors, threads, told, progress))
-
-
-def prepared(
-    model: Model,
-    campaign: Campaign,
-    candidates: Mapping[str, Effect] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    fixed: Mapping[str, float] | None = None,
-    priors: Mapping[str, float] | None = None,
-    threads: int = 1,
-    told: Callable[[str], None] = lambda _: None,
-    progress: Path | None = None,
-) -> tuple[Library, Fit]:
-    """Return the declared model with its candidates and the train records, and its fit; see `infer`."""
     candidates = {**sensor_effects(model.plant), **EFFECTS} if candidates is None else candidates
     for name, p in (priors or {}).items():
         if name not in candidates:
@@ -286,8 +266,12 @@ def prepared(
     return with_noise(*with_scales(library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)))
 
 
-def inferred(library: Library, declared: Fit) -> Inference:
-    """Return what the train records of a library say; see `infer`."""
+def infer(library: Library, declared: Fit) -> Inference:
+    """Return how probable it is that a declared model lacks each effect of a library, from the train records.
+
+    Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
+    with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
+    """
     found = explore(library, declared)
     return Inference(found, posterior(found))
 

@@ -17,7 +17,7 @@ from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WITHIN
 from armid.inference.hypothesis import Hypotheses, Hypothesis
-from armid.inference.infer import Inference, inferred, prepared
+from armid.inference.infer import Inference, infer, prepared
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.missing_signal import Missing, missing_from
 from armid.inference.model import Fit, with_standard_accuracy
@@ -117,7 +117,7 @@ def close_loop(
     # What a whole campaign has wrong needs no search.
     if any(not s.record and s.kind != "input" for s in gross):
         library = replace(library, candidates={}, bundles=())
-    found = inferred(library, declared)
+    found = infer(library, declared)
     best = found.found.fits[found.in_force]
     # One record, or an input, is accused only where the model at which the search ends does not do as well.
     implausible = bool(gross) and not all(does_as_well(best, s) for s in gross)
