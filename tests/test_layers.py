@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[1] / "src" / "armid"
 # A folder or file may import only what stands before it.
 LAYERS = [
     "errors", "units", "progress", "report", "model", "engine", "record", "problem", "identifiers", "estimation",
-    "registry", "contract", "inference", "loop", "study", "by_name", "cli", "__main__",
+    "registry", "contract", "inference", "loop", "study", "api", "cli", "__main__",
 ]  # fmt: skip
 TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))}
 

@@ -14,7 +14,7 @@ WHERE = {
         "Output", "Parameter", "Plant", "Scales", "State",
     ),
     "armid.engine": ("Schedule", "Simulation", "calibrate", "probes"),
-    "armid.by_name": ("close_loop", "examine", "identify", "simulate"),
+    "armid.api": ("close_loop", "examine", "identify", "simulate"),
     "armid.record": ("Campaign", "Record", "read_campaign", "write_campaign"),
     "armid.problem.fitness": ("FITNESS", "Fitness"),
     "armid.problem.meter": ("Meter", "MeterTermination"),

@@ -11,7 +11,7 @@ from few_candidates import CANDIDATES, COMMON, TRUTH, garbage
 import armid
 from armid.errors import ArmidError
 from armid.estimation.constants import moved_record
-from armid.estimation.mends import Suspicion
+from armid.estimation.corrections import DataIssue
 from armid.inference.decisions import calibration
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion, details_of, loop_document
@@ -365,8 +365,8 @@ def test_what_the_records_cannot_show_widens_an_interval_as_far_as_it_is_probabl
 
 
 def test_what_the_screen_suspects_is_told_where_the_loop_found_nothing_better(axis, monkeypatch):
-    seen = [Suspicion(kind, "axis.csv", f"axis.csv: {kind}.") for kind in ("late", "unjudged", "rest")]
-    monkeypatch.setattr(import_module("armid.loop.close_loop"), "screen", lambda *_: seen)
+    seen = [DataIssue(kind, "axis.csv", f"axis.csv: {kind}.") for kind in ("late", "unjudged", "rest")]
+    monkeypatch.setattr(import_module("armid.loop.close_loop"), "data_issues", lambda *_: seen)
     campaign = axis()
     explained, at_a_loss = (
         close_loop(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in names}, curve=False)
@@ -382,8 +382,8 @@ def test_what_the_screen_suspects_is_told_where_the_loop_found_nothing_better(ax
 
 
 def test_records_that_look_wrong_are_told_and_nothing_is_looked_for(axis, monkeypatch):
-    gross = Suspicion("sign", "", "The drive has the other sign.", 1e-6)
-    monkeypatch.setattr(import_module("armid.loop.close_loop"), "screen", lambda *_: [gross])
+    gross = DataIssue("sign", "", "The drive has the other sign.", 1e-6)
+    monkeypatch.setattr(import_module("armid.loop.close_loop"), "data_issues", lambda *_: [gross])
     campaign = axis()
     found = close_loop(Model(campaign.plant), campaign, {"viscous": EFFECTS["viscous"]})
     assert (found.verdict, found.effects, found.missing) == ("implausible_records", (), None)

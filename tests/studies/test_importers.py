@@ -183,7 +183,7 @@ def test_campaign_of_a_synthetic_pendulum(dfki, tmp_path):
 def test_nothing_free_is_identified_through_the_command(dfki, tmp_path, capsys):
     out = tmp_path / "out"
     assert ended("import", "dfki", dfki, "--out", out, "--holdout", "ddp") == 0
-    # the records are made with other constants than those from CAD, which the screen of records sees
+    # the records are made with other constants than those from CAD, which the data checks see
     with warnings.catch_warnings():
         warnings.simplefilter("default")
         assert ended("identify", out, "--fitness", "rmse", "--budget", "12000") == 0

@@ -53,7 +53,7 @@ def simulate_command(
     times are irregular), the states, and all outputs of the plant, SI. A parameter that is not set takes the value
     that the campaign fixes, else its nominal one.
     """
-    from armid.by_name import simulate
+    from armid.api import simulate
 
     known = given(effects, plugins)
     found = simulate(campaign, parameters=numbers(settings, "--set"), accuracy=accuracy_of(accuracy),
@@ -123,8 +123,8 @@ def identify_command(
     interval that does not hold is struck), warnings in words, and errors. Without --out nothing is written. Ctrl-C
     ends the search, judges the best so far, and exits with 130.
     """
-    from armid.by_name import FITNESS, PAPER_FITNESS
-    from armid.by_name import identify as run
+    from armid.api import FITNESS, PAPER_FITNESS
+    from armid.api import identify as run
     from armid.estimation.identify import INTERRUPTED
     from armid.problem.fitness import SIMILARITIES
 
@@ -171,7 +171,7 @@ def identifiability_command(
     Cramer-Rao intervals, parameters that move together, the profile likelihood of each parameter. Holdout records are
     not looked at.
     """
-    from armid.by_name import examine
+    from armid.api import examine
     from armid.estimation.examine import LEAST_NOISE, RANKINGS
 
     if rank not in RANKINGS:
@@ -238,7 +238,7 @@ def close_loop_command(
     """
     from numpy.random import default_rng
 
-    from armid.by_name import close_loop
+    from armid.api import close_loop
 
     named = [name for name in candidates.split(",") if name.strip()] or None
     refuse_unwritable(out, LOOP.file)

@@ -219,7 +219,7 @@ def simulated(n_threads: int) -> Any:
 
 def identification() -> tuple[bool, str]:
     """Identify the synthetic axis of `armid new campaign`."""
-    from armid.by_name import identify
+    from armid.api import identify
     from armid.cli.new import INERTIA, campaign_text, synthetic_records
     from armid.record import write_campaign
 

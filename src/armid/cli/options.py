@@ -207,7 +207,7 @@ def given(
     effects: str, plugins: Iterable[str], window: str = "", bounds: Iterable[str] = (), fix: Iterable[str] = (),
     units: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return --effects, --plugin, --window, --bounds, --fix and --units as `armid.by_name.opened` takes them."""
+    """Return --effects, --plugin, --window, --bounds, --fix and --units as `armid.api.opened` takes them."""
     return {
         "effects": [name for name in effects.split(",") if name.strip()], "plugins": tuple(plugins),
         "window": interval(window, "--window") if window else None, "bounds": intervals(bounds, "--bounds"),

@@ -10,8 +10,8 @@ from armid.contract.identifier import check_identifier
 from armid.contract.trials import ContractPoint
 from armid.engine import accuracy_against, calibrate
 from armid.errors import ArmidError
-from armid.estimation.mends import Suspicion
-from armid.estimation.screen import screen
+from armid.estimation.corrections import DataIssue
+from armid.estimation.data_checks import data_issues
 from armid.identifiers import as_identifier
 from armid.model import PLANTS, Array, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
@@ -72,7 +72,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
             measured = f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
             text = f"simulated {size} at mid-range, measured up to {measured}"
             yield ContractPoint(f"moves in {replay.record.file}", whole, text)
-        yield from plausible(screen(campaign, model, space))
+        yield from plausible(data_issues(campaign, model, space))
     except ArmidError as error:
         yield ContractPoint("model", False, str(error))
 
@@ -84,7 +84,7 @@ def ready_at(candidate: Array, record: Record, model: Model) -> ReadyRecord:
     return ReadyRecord(record, model, tuple(calibrations))
 
 
-def plausible(found: Sequence[Suspicion]) -> list[ContractPoint]:
+def plausible(found: Sequence[DataIssue]) -> list[ContractPoint]:
     alike: dict[tuple[str, str], list[str]] = {}
     for s in found:
         # what holds for several records is one sentence with their names

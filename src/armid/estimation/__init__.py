@@ -9,8 +9,8 @@ constants       constants within tolerances: what they do to the records, what t
 profile         profile likelihood
 design          what one more record would buy
 advice          which record would tell rival models apart
-screen          signs, units, clocks and manoeuvres that look wrong, before anything is identified
-mends           the mistakes that it looks for, and what undoes each
+data_checks     signs, units, clocks and manoeuvres that look wrong, before anything is identified
+corrections     the mistakes that these look for, and what undoes each
 examine         all of these for one campaign; groups of parameters that move together
 
 What is shown of the results: figures, identify_document, identifiability_document.

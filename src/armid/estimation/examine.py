@@ -139,14 +139,14 @@ def examine(
     noise: float | None = None,
     by: str = VOLUME,
     accuracy: str | None = None,
-    told: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Examination:
     """Examine the train records of a campaign; holdout records are not looked at.
 
     x: free parameters at which sensitivities are taken, SI, (n_free,); None: the least-squares estimate, that of
     `identify`. noise: rms to assume in place of what was measured. by: how offers are ranked, see `Offer`. accuracy:
-    "standard" or "fine", of the engine; None: as the noise of each record asks for. told: called with a sentence before
-    each step that takes long.
+    "standard" or "fine", of the engine; None: as the noise of each record asks for. progress: called with a
+    sentence before each step that takes long.
     """
     if not space.free.any():
         raise ArmidError("no parameter is free: at least one is expected to be examined")
@@ -174,7 +174,7 @@ def examine(
     records = as_scattered(weighted_records(train, space), levels_of(train, space, start, noise))
     if not np.isfinite(records.chi2(records.shares(start))[0]):
         raise ArmidError("the simulation diverges at the point that was given: another point is expected")
-    z, found = profiles(records, records.shares(start), told)
+    z, found = profiles(records, records.shares(start), progress)
     minimum = records.values(z)
     at = minimum if x is None else start
     information = information_at(train, space, at, levels_of(train, space, at, noise), records.weights)
@@ -187,7 +187,7 @@ def examine(
     levels = expected_levels(train, information.levels)
     motions = Motions(train, space.complete(at[np.newaxis])[0], campaign.gyro_range)
     grid = manoeuvre_grid(model, [r.record for r in train])
-    told("manoeuvres for the next record")
+    progress("manoeuvres for the next record")
     bought = offers(motions, grid, space, at, information.fisher, levels, by)
     return Examination(campaign, model, space, train, at, x is not None, minimum, information,
                        groups(information.fisher, space.free_names),

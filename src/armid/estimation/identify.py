@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError, quoted
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
+from armid.estimation.corrections import DataIssue
 from armid.estimation.information import Information, collinear, information_at
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
-from armid.estimation.mends import Suspicion
 from armid.estimation.noise_model import MISFIT, level_of
 from armid.identifiers import Identifier, run
 from armid.model import Array, Model
@@ -126,7 +126,7 @@ class Identification(Result):
 
     candidate: whole, SI, in the order of the model's parameters. information: of the free ones. train, holdout: errors
     (None without such records). trace: evaluations and best fitness at each improvement. improved: the free parameters
-    at each improvement, SI, (n_improvements, n_free). suspicions: of a screen.
+    at each improvement, SI, (n_improvements, n_free). issues: of the data checks.
     scatter: of the draws of a bootstrap, where these give the intervals; None where least squares does.
     """
 
@@ -150,7 +150,7 @@ class Identification(Result):
     seed: int
     stopped: str
     improved: Array
-    suspicions: tuple[Suspicion, ...] = ()
+    issues: tuple[DataIssue, ...] = ()
     scatter: Scatter | None = None
 
     @cached_property

@@ -217,7 +217,7 @@ def details_of(found: Identification) -> dict[str, Any]:
     return {
         "remarks": remarks(found),
         "known_first": ranked(found)[:MOST_KNOWN_FIRST],
-        "warnings": [*(s.sentence for s in found.suspicions), *convergence_remarks(found)],
+        "warnings": [*(s.sentence for s in found.issues), *convergence_remarks(found)],
         "records": records,
         "n_records": len(replays),
         "search": curve_entry(found.trace[0].astype(float), found.trace[1]),
@@ -232,7 +232,7 @@ def remarks(found: Identification) -> list[str]:
 def ranked(found: Identification) -> list[str]:
     """Return what stands against the result, the most important first."""
     information = found.information
-    said = [s.sentence for s in found.suspicions] + convergence_remarks(found)
+    said = [s.sentence for s in found.issues] + convergence_remarks(found)
     said += [bound_remark(found, int(i)) for i in np.flatnonzero(found.at_bound)]
     said += misfit_remarks(found)
     deviations = zip(information.names, information.deviation, strict=True)

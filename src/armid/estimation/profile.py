@@ -87,19 +87,19 @@ HeldFit = Callable[[float, Array], Point]
 
 
 def profiles(
-    records: LeastSquaresProblem, z: Array, told: Callable[[str], None] = lambda _: None
+    records: LeastSquaresProblem, z: Array, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[Array, tuple[Profile, ...]]:
     """Return the least-squares minimum and the profile of each free parameter about it.
 
     Where a profile comes upon a lower minimum, all start again from there. records: weighted so that chi2 is that of
-    effective samples. z: a start, as shares of the range; the minimum is returned so, too. told: called with
+    effective samples. z: a start, as shares of the range; the minimum is returned so, too. progress: called with
     a sentence before each profile.
     """
     best, names, found = fit(records, z), records.space.free_names, list[Profile]()
     for _ in range(MOST_RESTARTS):
         found = []
         for i, name in enumerate(names):
-            told(f"profile of {name}, {i + 1} of {len(names)}")
+            progress(f"profile of {name}, {i + 1} of {len(names)}")
             found.append(profile(records, best, i))
         lowest = min(found, key=lambda p: float(p.rise.min()))
         if lowest.rise.min() > -BETTER:

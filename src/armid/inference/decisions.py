@@ -1,7 +1,7 @@
 """Every number with which the loop and its inference compare to decide, in one list; and prior beliefs.
 
 Prior beliefs and temperature stand in `calibration.toml`. Numerics, layout and budgets of computing are no decisions
-and stand where they are used. `estimation/screen.py` and `mends.py` keep the numbers of the data checks.
+and stand where they are used. `estimation/data_checks.py` and `corrections.py` keep the numbers of the data checks.
 """
 
 import math

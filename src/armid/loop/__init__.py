@@ -4,7 +4,7 @@ What is missing is inferred in `armid.inference`. Here, in reading order:
 
 close_loop       the model in force, the judgement on records held out, the verdict
 advice           the record to make next
-suspects         records that differ
+record_faults    records that differ
 common_factors   which parameters the records give only together
 result           report.json
 document         what is shown; `figures`: what is drawn

@@ -9,10 +9,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from armid.estimation.constants import moved_record
+from armid.estimation.corrections import DataIssue
+from armid.estimation.data_checks import AS_GOOD, data_issues, given_twice
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import held_by_bound
-from armid.estimation.mends import Suspicion
-from armid.estimation.screen import AS_GOOD, given_twice, screen
 from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WITHIN
@@ -25,6 +25,7 @@ from armid.inference.refit import unless_diverged
 from armid.inference.search import without
 from armid.loop.advice import advice_on
 from armid.loop.common_factors import known_together
+from armid.loop.record_faults import broken_records, record_faults_of
 from armid.loop.result import (
     CARRIES_NOT,
     DISAGREES,
@@ -41,11 +42,10 @@ from armid.loop.result import (
     Withdrawn,
     estimates,
 )
-from armid.loop.suspects import broken_suspects, suspects_of
 from armid.model import Effect, Model
 from armid.record import Campaign, Record
 
-# Mistakes of the screen of records that leave nothing to search for, and what it tells whatever the loop finds.
+# Mistakes of the data checks that leave nothing to search for, and what it tells whatever the loop finds.
 GROSS = ("sign", "unit", "time", "angle", "exchanged", "input", "position")
 OF_SIZE = ("unit", "angle", "input")
 TOLD = (*GROSS, "start", "noise", "rest", "twice")
@@ -109,11 +109,11 @@ def close_loop(
     """
     library, declared = prepared(model, campaign, candidates, bounds, fixed, priors, threads, told, progress)
     space = library.space(library.declared, ())
-    screened = screen(replace(campaign, records=campaign.train), library.declared, space)
+    issues = data_issues(replace(campaign, records=campaign.train), library.declared, space)
     # A limit that holds a parameter of the declared model looks like a wrong unit.
     is_held = bool(held_by_bound(declared.records.space, declared.x).any())
-    gross = [s for s in screened if s.kind in GROSS and not (is_held and s.kind in OF_SIZE)]
-    screened = tuple(s for s in screened if s in gross or s.kind not in GROSS)
+    gross = [s for s in issues if s.kind in GROSS and not (is_held and s.kind in OF_SIZE)]
+    issues = tuple(s for s in issues if s in gross or s.kind not in GROSS)
     # What a whole campaign has wrong needs no search.
     if any(not s.record and s.kind != "input" for s in gross):
         library = replace(library, candidates={}, bundles=())
@@ -121,7 +121,7 @@ def close_loop(
     best = found.found.fits[found.in_force]
     # One record, or an input, is accused only where the model at which the search ends does not do as well.
     implausible = bool(gross) and not all(does_as_well(best, s) for s in gross)
-    screened = tuple(s for s in screened if implausible or s not in gross)
+    issues = tuple(s for s in issues if implausible or s not in gross)
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
     path = [frozenset[Hypothesis]()] if implausible else path_of(found)
@@ -136,7 +136,7 @@ def close_loop(
         steps = steps_of(found, path, judged)
     after, before = judged[kept], judged[0]
     accused = [h for h in path[kept] if found.posterior.probability(*h.public) >= MENTIONED]
-    suspects = [*suspects_of(accused, path[kept], found), *broken_suspects(campaign.records)]
+    suspects = [*record_faults_of(accused, path[kept], found), *broken_records(campaign.records)]
     verdicts = (
         (IMPLAUSIBLE, UNEXPLAINED) if implausible else verdicts_of(found, accused, after, steps[:kept], withdrawn)
     )
@@ -153,10 +153,10 @@ def close_loop(
     in_force = found.found.fits[path[kept]]
     missing = missing_of(in_force, found.found.library, told) if curve and not implausible else None
     advice = advice_on(found, campaign.gyro_range, threads, told) if TOO_ALIKE in verdicts else ()
-    # Other suspicions rest on the declared model: they are reported where nothing better was found.
+    # Other issues rest on the declared model: they are reported where nothing better was found.
     at_a_loss = not {UNEXPLAINED, CARRIES_NOT, PARTLY}.isdisjoint(verdicts) and not any(s.claimed for s in steps)
-    screened = (*screened, *given_twice(campaign.records))
-    told_first = dict.fromkeys(s.sentence for s in screened if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
+    issues = (*issues, *given_twice(campaign.records))
+    told_first = dict.fromkeys(s.sentence for s in issues if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     said = (*told_first, *missed_sentences(after.missed), *limits_of(after), *dict.fromkeys(again))
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, said,
@@ -164,14 +164,14 @@ def close_loop(
                       missing)  # fmt: skip
 
 
-def does_as_well(fit: Fit, suspicion: Suspicion) -> bool:
-    """Tell whether a model misses an accused record, or all, by no more of the signal than the mended records would."""
+def does_as_well(fit: Fit, issue: DataIssue) -> bool:
+    """Tell whether a model misses an accused record, or all, by no more of the signal than corrected ones would."""
     shares = []
     for replay, part in zip(fit.records.replays, train_residuals(fit).raw, strict=True):
-        if suspicion.record in ("", replay.record.file):
+        if issue.record in ("", replay.record.file):
             about = replay.measured - (np.mean(replay.measured) if replay.record.unit in ("rad", "m") else 0.0)
             shares.append(float(np.sum(part**2)) / max(float(np.sum(about**2)), 1e-300))
-    return bool(np.sqrt(np.mean(shares)) <= AS_GOOD * suspicion.after) if shares else False
+    return bool(np.sqrt(np.mean(shares)) <= AS_GOOD * issue.after) if shares else False
 
 
 def path_of(found: Inference) -> list[Hypotheses]:

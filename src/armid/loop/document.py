@@ -16,6 +16,7 @@ from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
 from armid.loop.figures import figures_of, record_figure
+from armid.loop.record_faults import fault_sentence
 from armid.loop.result import (
     CARRIES_NOT,
     DISAGREES,
@@ -31,7 +32,6 @@ from armid.loop.result import (
     record_entries,
     report_of,
 )
-from armid.loop.suspects import suspect_sentence
 from armid.report.document import (
     ERROR_NOTE,
     MOST_RECORDS,
@@ -326,7 +326,7 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
         "conclusion": conclusion(found),
         "shifts": shift_sentences(before, after) if found.steps else [],
         "doubts": doubt_sentences(after),
-        "suspects": [suspect_sentence(s) for s in found.suspects],
+        "suspects": [fault_sentence(s) for s in found.suspects],
         "diagnosis": diagnoses if found.steps else diagnoses | {"after": None},
         "missing": missing_sentences(found.missing) if found.missing is not None else [],
         "equations": {"before": str(before.model), "after": str(after.model)},
@@ -404,7 +404,7 @@ def judged_on(found: ClosedLoop) -> str:
 
 
 def disagreeing_sentence(found: ClosedLoop) -> str:
-    said = [suspect_sentence(s) for s in found.suspects if s.role == "train"]
+    said = [fault_sentence(s) for s in found.suspects if s.role == "train"]
     added = f"with {' + '.join(found.effects)} " if found.effects else ""
     return f"{' '.join(said)} Apart from that {added}{remains(found)}."
 

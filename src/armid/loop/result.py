@@ -18,7 +18,7 @@ from armid.inference.infer import Inference
 from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
 from armid.inference.model import Fit
-from armid.loop.suspects import Suspect
+from armid.loop.record_faults import RecordFault
 from armid.model import Array, Model
 from armid.problem.problem import Replay
 from armid.record import Campaign
@@ -171,7 +171,7 @@ class ClosedLoop(Result):
     advice: tuple[Advice, ...]
     next_steps: tuple[str, ...]
     known_together: tuple[str, ...]
-    suspects: tuple[Suspect, ...]
+    suspects: tuple[RecordFault, ...]
     error_all_records: Mapping[str, Sequence[JointErrors | None]]
     inference: Inference
     missing: Missing | None

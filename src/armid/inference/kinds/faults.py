@@ -52,7 +52,7 @@ class Fault:
         return record.with_measured(measured).with_pieces(lambda piece: self.undone_piece(piece, value, plant))
 
     def lost(self, record: Record, value: float) -> tuple[int, int]:
-        """Return how many samples at either end of a record have no measured value once its times are mended."""
+        """Return how many samples at either end of a record have no measured value once its times are corrected."""
         if self.kind not in OF_TIMES:
             return (0, 0)
         places = self.places(record, value)

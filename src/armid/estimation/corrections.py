@@ -17,13 +17,16 @@ FACTORS = {
     -1.0: ("sign", "its sign looks inverted: with the other one"),
     IN_DEGREES: (ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
     1.0 / IN_DEGREES: (ANGULAR, "57.3 times too large, as degrees under a header in radians are: in the other unit"),
-    30.0 / np.pi: (ANGULAR, "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: so"),
-    np.pi / 30.0: (ANGULAR, "9.55 times too large, as revolutions per minute under a header in rad/s are: so mended"),
-    6.0: (ANGULAR, "6 times too small, as revolutions per minute under a header in deg/s are: so mended"),
+    30.0 / np.pi: (
+        ANGULAR,
+        "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: corrected",
+    ),
+    np.pi / 30.0: (ANGULAR, "9.55 times too large, as revolutions per minute under a header in rad/s are: corrected"),
+    6.0: (ANGULAR, "6 times too small, as revolutions per minute under a header in deg/s are: corrected"),
     10.0: ("unit", "10 times too small: ten times as large"),
     0.1: ("unit", "10 times too large: a tenth as large"),
-    1000.0: ("unit", "1,000 times too small, as thousands under a plain unit are: so mended"),
-    0.001: ("unit", "1,000 times too large, as thousandths (mm, ms) under a plain unit are: so mended"),
+    1000.0: ("unit", "1,000 times too small, as thousands under a plain unit are: corrected"),
+    0.001: ("unit", "1,000 times too large, as thousandths (mm, ms) under a plain unit are: corrected"),
     2.0: ("gain", "half as large as it should be: doubled"),
     0.5: ("gain", "twice as large as it should be: halved"),
 }
@@ -41,7 +44,7 @@ TIMES = {
 
 
 @dataclass(frozen=True)
-class Suspicion:
+class DataIssue:
     """One mistake that the records seem to contain.
 
     kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "angle" (of a key), "input",
@@ -57,7 +60,7 @@ class Suspicion:
 
 
 @dataclass(frozen=True)
-class Mend:
+class Correction:
     """Undo one mistake: `undo` returns a piece as it should have been, `words` begin a sentence about it.
 
     factor: what the signal or the times are to be multiplied by, for "late" the seconds, for "zero" what is to be added
@@ -70,86 +73,88 @@ class Mend:
     undo: Callable[[Record], Record]
     other: str = ""
 
-    def suspicion(self, record: str, before: float, after: float) -> Suspicion:
+    def issue(self, record: str, before: float, after: float) -> DataIssue:
         who = record or "every train record"
         said = f"{who}: {self.words} the error falls from {before:.3g} to {after:.2g} of the signal"
-        return Suspicion(self.kind, record, f"{said}.", after)
+        return DataIssue(self.kind, record, f"{said}.", after)
 
 
-BOUNDS = Mend("bounds", np.nan, "bounds or fixed values that were given look wrong: with those that the model declares",
-              lambda record: record)  # fmt: skip
+BOUNDS = Correction("bounds", np.nan, "bounds or fixed values look wrong: with those that the model declares",
+                    lambda record: record)  # fmt: skip
 
 
-def mends(plant: Plant, record: Record, shift: int) -> Iterator[Mend]:
+def corrections(plant: Plant, record: Record, shift: int) -> Iterator[Correction]:
     """Yield what may be undone in a record; shift: by how many samples its signal may come too late."""
-    yield from mends_of_sizes(plant, record)
-    yield from mends_of_zeros(plant, record)
+    yield from corrections_of_sizes(plant, record)
+    yield from corrections_of_zeros(plant, record)
     for a, b in combinations(record.signals, 2):
         if a.unit == b.unit:
             words = f"its {a.output} and {b.output} look exchanged: the other way round"
             other_way = of_signals(plant, [a.output, b.output], lambda x, y: [y, x])
-            yield Mend("exchanged", np.nan, words, other_way)
+            yield Correction("exchanged", np.nan, words, other_way)
             for one, other in ((a, b), (b, a)):
                 words = f"{one.output} looks counted from the ground, {other.output} being in it: without"
                 less = of_signals(plant, [one.output, other.output], lambda x, y: [x - y, y])
-                yield Mend("absolute", np.nan, words, less)
-    yield from mends_of_keys(plant, record)
+                yield Correction("absolute", np.nan, words, less)
+    yield from corrections_of_keys(plant, record)
     if shift:
         seconds = shift * record.manoeuvre.interval
         words = f"its clock looks {abs(seconds):.3g} s {'late' if shift > 0 else 'early'}: moved by that"
-        yield Mend("late", seconds, words, partial(moved, seconds=seconds))
+        yield Correction("late", seconds, words, partial(moved, seconds=seconds))
 
 
-def mends_of_sizes(plant: Plant, record: Record) -> Iterator[Mend]:
+def corrections_of_sizes(plant: Plant, record: Record) -> Iterator[Correction]:
     for factor, (kind, words) in FACTORS.items():
         for one in record.signals:
             if kind != ANGULAR or one.unit.startswith("rad"):
                 signal = f"{one.output} [{one.unit}]" if record.signals[1:] else f"{one.unit} signal"
-                yield Mend("unit" if kind == ANGULAR else kind, factor, f"the measured {signal}: {words}",
+                yield Correction("unit" if kind == ANGULAR else kind, factor, f"the measured {signal}: {words}",
                            of_signals(plant, [one.output], lambda x, by=factor: [by * x], factor))  # fmt: skip
         for name in (i.name for i in plant.inputs if kind != ANGULAR):
-            yield Mend("input", factor, f"input '{name}': {words}",
+            yield Correction("input", factor, f"input '{name}': {words}",
                        of_pieces(partial(with_input, name=name, factor=factor)))  # fmt: skip
     for factor, words in TIMES.items():
-        yield Mend("time", factor, words, partial(with_interval, plant=plant, factor=factor))
+        yield Correction("time", factor, words, partial(with_interval, plant=plant, factor=factor))
 
 
-def mends_of_zeros(plant: Plant, record: Record) -> Iterator[Mend]:
+def corrections_of_zeros(plant: Plant, record: Record) -> Iterator[Correction]:
     angles = [one.output for one in record.signals if one.unit == "rad"]
     position = record.constants.get("start_position") if record.unit == "rad/s" else None
     for turn in np.deg2rad(TURNS).tolist():
         more = f"looks counted from elsewhere: with {np.rad2deg(turn):g} deg more"
         for output in angles:
-            yield Mend("zero", turn, f"{output} {more}", of_signals(plant, [output], lambda x, by=turn: [x + by]))
+            yield Correction("zero", turn, f"{output} {more}", of_signals(plant, [output], lambda x, by=turn: [x + by]))
         if position is not None:
             start = {"start_position": position + turn}
-            yield Mend("zero", turn, f"the angle {more}", of_pieces(partial(Piece.with_constants, constants=start)))
+            yield Correction(
+                "zero", turn, f"the angle {more}", of_pieces(partial(Piece.with_constants, constants=start))
+            )
 
 
-def mends_of_keys(plant: Plant, record: Record) -> Iterator[Mend]:
+def corrections_of_keys(plant: Plant, record: Record) -> Iterator[Correction]:
     defaults = {c.name: c.value for c in plant.constants}
     constants = {**defaults, **record.constants}
 
-    def mend(words: str, change: Callable[..., dict[str, float]], kind: str = "key") -> Mend:
+    def correction(words: str, change: Callable[..., dict[str, float]], kind: str = "key") -> Correction:
         def undo(piece: Piece) -> Piece:
             return piece.with_constants(change({**defaults, **piece.manoeuvre.constants}))
 
-        return Mend(kind, np.nan, words, of_pieces(undo))
+        return Correction(kind, np.nan, words, of_pieces(undo))
 
     for key in plant.keys:
         if key.boolean:
             other = "true" if constants[key.constant] == 0.0 else "false"
-            yield mend(f"{key.key} looks wrong: with {other}", lambda given, n=key.constant: {n: 1.0 - given[n]})
+            yield correction(f"{key.key} looks wrong: with {other}", lambda given, n=key.constant: {n: 1.0 - given[n]})
         elif key.unlike:
             words = f"start and end ({key.unlike} and {key.constant}) look exchanged: the other way round"
-            yield mend(words, lambda given, a=key.constant, b=key.unlike: {a: given[b], b: given[a]})
+            yield correction(words, lambda given, a=key.constant, b=key.unlike: {a: given[b], b: given[a]})
     degrees = [k for k in plant.keys if k.key.endswith("_deg") and may_be_radians(k, constants[k.constant] / k.factor)]
     for several in sorted({tuple(degrees), *((k,) for k in degrees)} - {()}, key=len):
         words = (
             f"{' and '.join(k.key for k in several)} {'look' if several[1:] else 'looks'} given in radians: in degrees"
         )
         names = [k.constant for k in several]
-        yield mend(words, lambda given, names=names: {n: IN_DEGREES * given[n] for n in names}, "angle")
+        yield correction(words, lambda given, names=names: {n: IN_DEGREES * given[n] for n in names}, "angle")
 
 
 def may_be_radians(key: ManoeuvreKey, value: float) -> bool:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
+from armid.estimation.corrections import BOUNDS, Correction, DataIssue, corrections, of_pieces, rms
 from armid.estimation.least_squares import WeightedRecords, descend
-from armid.estimation.mends import BOUNDS, Mend, Suspicion, mends, of_pieces, rms
 from armid.model import Array, Manoeuvre, Model, Plant
 from armid.problem.problem import ReadyRecord
 from armid.problem.space import Space, space_of
@@ -26,10 +26,10 @@ from armid.record.noise import FEWEST_INDEPENDENT, correlation_sum
 from armid.record.table import POSITIONS
 from armid.units import shown
 
-# An error (rms over the rms of the signal) up to this is the business of missing effects, not of this screen.
+# An error (rms over the rms of the signal) up to this is the business of missing effects, not of these checks.
 TOLERABLE = 0.1
 # Shares of the error that undoing a mistake may leave, and the ratio of errors up to which mistakes are alternatives.
-MENDED, LEFT, AS_GOOD = 0.4, 0.5, 1.5
+CORRECTED, LEFT, AS_GOOD = 0.4, 0.5, 1.5
 # What is left of the error by a factor of two, which a missing spring or friction can imitate.
 LEFT_BY_TWO = 0.2
 # An error above this, with no candidate of this cosine to the signal: the model explains nothing of it.
@@ -40,13 +40,13 @@ EXCHANGED = 0.6
 APART, AGREED = 3.0, 0.05
 # Candidates spread over the box, samples of all records together that are looked at, least of one record.
 N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
-# The mends that leave least are fitted once more, as the declared model is: how many, from how many candidates, and
-# from how many of the best.
+# The corrections that leave least are fitted once more, as the declared model is: how many, from how many candidates,
+# and from how many of the best.
 N_LIKELY, N_HARD, N_BEST = 5, 512, 8
 MOST_VALUES, MOST_APART = 2**24, 6
 # What fits nearly as well is looked for at so many candidates each within these shares of the ranges.
 N_NEAR, NEAR = 64, (0.001, 0.003, 0.01)
-# Kinds of suspicion that name both records, or that the model has against one whatever the other says.
+# Kinds of issue that name both records, or that the model has against one whatever the other says.
 SURE = ("exchanged", "unlike", "unjudged")
 # Train records up to so many are few; samples that two of them must have in common to be exchanged.
 FEW, FEWEST_COMMON = 3, 100
@@ -67,7 +67,7 @@ ALIKE, DIFFERENT = 40, 10
 RESTLESS, LARGE_MEAN = 0.02, 0.2
 
 
-def screen(campaign: Campaign, model: Model, space: Space) -> tuple[Suspicion, ...]:
+def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIssue, ...]:
     """Look for mistakes in records: what the files show alone, then against the declared model; the plainest first.
 
     The model is fitted to train records only; those held out are compared with what that fit predicts.
@@ -170,8 +170,8 @@ class Trial:
         products, sizes = signals @ problem.measured, np.linalg.norm(signals, axis=1)
         return float(np.nanmax(np.abs(products) / np.maximum(sizes, 1e-300), initial=0.0))
 
-    def mends(self, record: Record, Z: Array) -> Iterator[Mend]:
-        return mends(self.model.plant, record, self.shift(record, Z))
+    def corrections(self, record: Record, Z: Array) -> Iterator[Correction]:
+        return corrections(self.model.plant, record, self.shift(record, Z))
 
     def shift(self, record: Record, Z: Array) -> int:
         """Return by how many samples the first piece comes too late, 0 where no shift makes it more alike."""
@@ -211,26 +211,28 @@ class Trial:
         return self.fit(records, np.vstack([spread, *others]), n_best=N_BEST)
 
 
-def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Array]:
+def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Array]:
     z, before = trial.fit(train)
     if trial.errors(train, z).max() <= TOLERABLE:
         return [], z
-    # a mend begins at spread candidates, and is compared with what the declared model was there
+    # a correction begins at spread candidates, and is compared with what the declared model was there
     below = max(before, min(rms(e) for e in trial.errors(train, trial.spread(train))))
     tried = []
-    for mend in trial.mends(train[0], np.concatenate([[z], trial.spread(train[:1])])):
-        undone = tuple(map(mend.undo, train))
+    for correction in trial.corrections(train[0], np.concatenate([[z], trial.spread(train[:1])])):
+        undone = tuple(map(correction.undo, train))
         own = trial.scaled(undone)
-        tried.append((*own.fit(undone, below=below), mend, own, undone))
+        tried.append((*own.fit(undone, below=below), correction, own, undone))
     declared = space_of(trial.model)
     if not all(np.array_equal(getattr(declared, n), getattr(trial.space, n), True) for n in ("low", "high", "fixed")):
         own = Trial(trial.model, declared)
         tried.append((*own.fit(train), BOUNDS, own, tuple(train)))
-    # a poor fit of the declared model is not a mistake of the records, and of two mends the better one is named
+    # a poor fit of the declared model is not a mistake of the records, and of two corrections the better one is named
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
     starts = [z, *(t[0] for t in likely)]
     z, before = trial.fit_hard(train, starts)
-    found = chosen("", before, [(own.fit_hard(undone, starts)[1], mend) for _, _, mend, own, undone in likely])
+    found = chosen(
+        "", before, [(own.fit_hard(undone, starts)[1], correction) for _, _, correction, own, undone in likely]
+    )
     if trial.errors(train, z).max() <= TOLERABLE or any(s.after <= TOLERABLE for s in found):
         return found, z
     everywhere, found = found, of_few(trial, train, before, below)
@@ -248,47 +250,47 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[Suspicion], Ar
     return found or everywhere, z
 
 
-def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -> list[Suspicion]:
+def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -> list[DataIssue]:
     """Return the mistake in one of few records, or the exchange of two, with which the model fits all of them well.
 
-    Of two or three records no majority says which are right: each mend of each is fitted together with the others.
+    Of two or three records no majority says which are right: each correction is fitted together with the others.
     """
     if not 1 < len(train) <= FEW:
         return []
     tried = []
     for changes in changes_of_few(trial, train):
         undone = tuple(changes[r.file].undo(r) if r.file in changes else r for r in train)
-        own, (file, mend) = trial.scaled(undone), next(iter(changes.items()))
-        tried.append((*own.fit(undone, below=below), own, undone, file, mend))
+        own, (file, correction) = trial.scaled(undone), next(iter(changes.items()))
+        tried.append((*own.fit(undone, below=below), own, undone, file, correction))
     found, hidden = [], []
-    for start, _, own, undone, file, mend in sorted(tried, key=lambda t: t[1])[:N_LIKELY]:
+    for start, _, own, undone, file, correction in sorted(tried, key=lambda t: t[1])[:N_LIKELY]:
         z, error = own.fit_hard(undone, [start])
         if own.errors(undone, z).max() <= TOLERABLE:
-            found.append((error, file, mend))
-        elif mend.other and before > NOTHING and error <= EXCHANGED:
-            hidden.append((error, file, mend))
+            found.append((error, file, correction))
+        elif correction.other and before > NOTHING and error <= EXCHANGED:
+            hidden.append((error, file, correction))
     if not found:
         best = min(hidden, key=lambda f: f[0], default=None)
-        return [] if best is None else [best[2].suspicion(best[1], before, best[0])]
+        return [] if best is None else [best[2].issue(best[1], before, best[0])]
     first = min(found, key=lambda f: f[0])[1]
     told = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in found]
     return chosen(first, before, told)
 
 
-def of_two(found: Sequence[Suspicion], train: Sequence[Record]) -> list[Suspicion]:
-    """Return suspicions, where those against one of two train records say that it may as well be the other."""
+def of_two(found: Sequence[DataIssue], train: Sequence[Record]) -> list[DataIssue]:
+    """Return issues, where those against one of two train records say that it may as well be the other."""
     if len(train) != 2:
         return list(found)
     doubt = f" {train[0].file} and {train[1].file} disagree: one of the two is wrong, and no third record tells which."
     return [replace(s, sentence=f"{s.sentence}{doubt}") if s.record and s.kind not in SURE else s for s in found]
 
 
-def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Mend]]:
-    """Yield what may be undone in one record, or in two that are exchanged, file -> mend."""
+def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Correction]]:
+    """Yield what may be undone in one record, or in two that are exchanged, file -> correction."""
     for record in train:
         others = trial.fit([r for r in train if r is not record])[0]
-        for mend in trial.mends(record, others[np.newaxis]):
-            yield {record.file: mend}
+        for correction in trial.corrections(record, others[np.newaxis]):
+            yield {record.file: correction}
     for a, b in combinations([r for r in train if len(r.pieces) == 1], 2):
         ends = [r.pieces[0].window for r in (a, b)]
         if min(w.stop for w in ends) - max(w.start for w in ends) >= FEWEST_COMMON:
@@ -311,12 +313,12 @@ def typical_of(errors: Array) -> float:
     return float(np.median(np.sort(errors)[: (len(errors) + 1) // 2]))
 
 
-def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[Suspicion]:
+def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[DataIssue]:
     """Return the mistake of one record, judged at a candidate that is not fitted to it, none where it is as others."""
     before = float(trial.errors([record], z)[0, 0])
     if before <= max(TOLERABLE, APART * typical):
         return []
-    undone = [(m, m.undo(record)) for m in trial.mends(record, z[np.newaxis])]
+    undone = [(m, m.undo(record)) for m in trial.corrections(record, z[np.newaxis])]
     tried = [(float(trial.errors([r], z)[0, 0]), m) for m, r in undone]
     # a short stretch of a motion is like many: one clock is wrong among others only where that says nearly all
     return chosen(record.file, before, [(e, m) for e, m in tried if m.kind != "time" or e <= LEFT_BY_TWO])
@@ -335,33 +337,33 @@ def least_nearby(trial: Trial, train: Sequence[Record], record: Record, z: Array
     return float(np.min(trial.errors([record], near), initial=np.inf)) if len(near) else np.inf
 
 
-def chosen(record: str, before: float, tried: Iterable[tuple[float, Mend]]) -> list[Suspicion]:
-    """Return the mend that leaves least, with those that do as well; none where none takes most of the error away."""
-    most = min(MENDED * before, LEFT)
+def chosen(record: str, before: float, tried: Iterable[tuple[float, Correction]]) -> list[DataIssue]:
+    """Return the correction that leaves least, and those that do as well; none unless it takes most of the error."""
+    most = min(CORRECTED * before, LEFT)
     good = [(e, m) for e, m in tried if e <= (min(most, LEFT_BY_TWO) if m.factor in (0.5, 2.0) else most)]
     good.sort(key=lambda pair: pair[0])
     if not good:
         return []
-    first = good[0][1].suspicion(record, before, good[0][0])
+    first = good[0][1].issue(record, before, good[0][0])
     equal = [m.words for e, m in good[1:3] if e <= AS_GOOD * good[0][0]]
     also = f" As well explained by: {'; or '.join(equal)}." if equal else ""
     return [replace(first, sentence=f"{first.sentence}{also}")]
 
 
-def unlike(file: str, error: float) -> Suspicion:
+def unlike(file: str, error: float) -> DataIssue:
     said = (f"{file}: the declared model explains nothing of it, whatever its parameters (error {error:.3g} of the "
             "signal), and no other sign, unit, clock or manoeuvre that was tried does.")  # fmt: skip
-    return Suspicion("unlike", file, said)
+    return DataIssue("unlike", file, said)
 
 
-def beyond(file: str, error: float) -> Suspicion:
+def beyond(file: str, error: float) -> DataIssue:
     said = (f"{file}: the declared model misses it by {error:.3g} of its signal wherever it fits the train records "
             "best, and no mistake that was tried explains that: whether a record is wrong stays open.")  # fmt: skip
-    return Suspicion("unjudged", file, said)
+    return DataIssue("unjudged", file, said)
 
 
-def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[Suspicion]:
-    """Return the two records that each fit the manoeuvre of the other, none where no exchange mends much."""
+def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[DataIssue]:
+    """Return the two records that each fit the manoeuvre of the other, none where no exchange explains much."""
     tried = []
     for a, b in combinations(outside, 2):
         as_other = {a.file: told_as(b), b.file: told_as(a)}
@@ -371,14 +373,14 @@ def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], 
     return [] if best is None else chosen(best[2], before, [best[:2]])
 
 
-def told_as(other: Record) -> Mend:
+def told_as(other: Record) -> Correction:
     """Return what gives a record the manoeuvre of another, but for the state from which it starts."""
     manoeuvre = other.pieces[0].manoeuvre
     constants = {n: v for n, v in manoeuvre.constants.items() if not n.startswith("start_")}
     what = "inputs" if manoeuvre.inputs else "manoeuvre"
     words = f"it and {other.file} look exchanged: each with the {what} of the other"
     undo = of_pieces(partial(driven_as, constants=constants, inputs=manoeuvre.inputs))
-    return Mend("exchanged", np.nan, words, undo, other.file)
+    return Correction("exchanged", np.nan, words, undo, other.file)
 
 
 def driven_as(piece: Piece, constants: Mapping[str, float], inputs: Mapping[str, Array]) -> Piece:
@@ -424,7 +426,7 @@ def every(record: Record, step: int, plant: Plant) -> Record:
     return replace(thinner, manoeuvre=rarer(record.manoeuvre), pieces=(kept,))
 
 
-def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator[Suspicion]:
+def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator[DataIssue]:
     """Yield the angles or positions that in every record begin away from the declared start of the model."""
     plant = trial.model.plant
     away: dict[str, list[tuple[float, str]]] = {}
@@ -437,21 +439,21 @@ def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator
                 away.setdefault(one.output, []).append(shown(float(np.mean(off)), one.unit))
     for output, sizes in away.items():
         if len(sizes) == len(train):
-            yield Suspicion("start", "", f"{output or plant.outputs[0].name}: every train record begins "
+            yield DataIssue("start", "", f"{output or plant.outputs[0].name}: every train record begins "
                             f"{min(sizes)[0]:.3g} to {max(sizes)[0]:.3g} {sizes[0][1]} away from where {plant.name} "
                             "starts: another start under [constants], a plant that takes it from the record "
                             "(from_rest = False, start_position), or another zero of the sensor, is expected."
                             )  # fmt: skip
 
 
-def noise_or_rest(record: Record) -> Iterator[Suspicion]:
+def noise_or_rest(record: Record) -> Iterator[DataIssue]:
     """Yield what the speed of one file shows alone: no motion but noise, or motion where there should be rest."""
     x = record.seen
     n, deviations = len(x), x - np.mean(x)
     lags = range(1, min(20, n // 2))
     correlation = [float(deviations[k:] @ deviations[:-k]) / float(deviations @ deviations) for k in lags]
     if np.max(np.abs(correlation)) < 4.0 / np.sqrt(n):
-        yield Suspicion("noise", record.file, f"{record.file}: the measured {record.output or 'speed'} is noise, no "
+        yield DataIssue("noise", record.file, f"{record.file}: the measured {record.output or 'speed'} is noise, no "
                         "sample of it is related to the next: a recorded motion is expected.")  # fmt: skip
         return
     rest = record.rest
@@ -460,12 +462,12 @@ def noise_or_rest(record: Record) -> Iterator[Suspicion]:
     scatter, mean = float(np.std(rest)) / rms(x), abs(float(np.mean(rest))) / rms(x)
     independent = rest.size / (1.0 + 2.0 * correlation_sum(rest - np.mean(rest)))
     if mean > LARGE_MEAN or (scatter > RESTLESS and independent < FEWEST_INDEPENDENT):
-        yield Suspicion("rest", record.file, f"{record.file}: the machine is not at rest before t = 0, its speed has a "
+        yield DataIssue("rest", record.file, f"{record.file}: the machine is not at rest before t = 0, its speed has a "
                         f"mean of {mean:.2g} and scatters by {scatter:.2g} of the motion's rms there: samples at rest, "
                         "or a clock that begins with the motion, are expected.")  # fmt: skip
 
 
-def of_position(record: Record) -> Iterator[Suspicion]:
+def of_position(record: Record) -> Iterator[DataIssue]:
     """Yield a position column that is not the integral of the speed: another sign, unit or clock."""
     for header, (unit, factor) in POSITIONS.items():
         if unit != record.unit or header not in record.columns:
@@ -478,18 +480,18 @@ def of_position(record: Record) -> Iterator[Suspicion]:
         if alike > 0.9 and not 0.6 < size < 1.6:
             said = f"{record.file}: {header} moves {size:.3g} times as far as the speed says"
             wrong = f"{said}: the sign or unit of one of them, or time_s, looks wrong."
-            yield Suspicion("position", record.file, wrong)
+            yield DataIssue("position", record.file, wrong)
 
 
-def of_times(record: Record) -> Iterator[Suspicion]:
+def of_times(record: Record) -> Iterator[DataIssue]:
     """Yield times that are those of no motor-driven machine, whatever the declared model makes of them."""
     interval = record.manoeuvre.interval
     if interval >= LONGEST_INTERVAL:
-        yield Suspicion("time", record.file, f"{record.file}: its samples are {interval:.3g} s apart, which looks like "
+        yield DataIssue("time", record.file, f"{record.file}: its samples are {interval:.3g} s apart, which looks like "
                         "times in ms: seconds are expected in time_s.")  # fmt: skip
 
 
-def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
+def given_twice(records: Sequence[Record]) -> Iterator[DataIssue]:
     """Yield the pairs of records, no repeats of each other, that hold the same samples: one recording given twice.
 
     Compared are fingerprints of `ALIKE` successive samples; simulations without noise may well agree.
@@ -507,7 +509,7 @@ def given_twice(records: Sequence[Record]) -> Iterator[Suspicion]:
         a, b = records[i], records[j]
         if a.manoeuvre_file == b.manoeuvre_file:
             continue
-        yield Suspicion("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE - 1} samples: one recording "
+        yield DataIssue("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE - 1} samples: one recording "
                         "is given twice, records that do not overlap are expected.")  # fmt: skip
 
 

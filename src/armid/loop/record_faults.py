@@ -21,7 +21,7 @@ FREED, LEFT_OUT = "freed", "left_out"
 
 
 @dataclass(frozen=True)
-class Suspect:
+class RecordFault:
     """Say how one record differs.
 
     kind: "late", "clock" (fast by a share), "offset", "drift", "gain", "start", "label" (another load or key than
@@ -46,26 +46,28 @@ class Suspect:
     parameter: str = ""
 
 
-def suspects_of(accused: Sequence[Hypothesis], model: Hypotheses, found: Inference) -> list[Suspect]:
+def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, found: Inference) -> list[RecordFault]:
     """Return the faults of records, and the drifts, among some hypotheses of a model."""
     fit = found.found.fits[model]
     return [fault_of(h.means, h.name, fit, found) if h.kind == "record" else drift_of(h.means, h.name, fit, found)
             for h in sorted(accused) if h.kind in ("record", "drift")]  # fmt: skip
 
 
-def fault_of(what: OfRecord, name: str, fit: Fit, found: Inference) -> Suspect:
+def fault_of(what: OfRecord, name: str, fit: Fit, found: Inference) -> RecordFault:
     record, fault, plant = fit.records.data.each[what.index], what.fault, found.found.library.declared.plant
     if fault.kind == "label":
         told = record.constants[fault.constant]
-        return Suspect(record.file, record.role, "label", FREED, 1.0 - told, fault.unit(record, plant))
+        return RecordFault(record.file, record.role, "label", FREED, 1.0 - told, fault.unit(record, plant))
     value, half = size_of(name, fit, found)
     output = record.output if fault.kind in OF_SENSOR and len(plant.outputs) > 1 else ""
     low, high = what.largest * (value - half), what.largest * (value + half)
     unit = fault.unit(record, plant)
-    return Suspect(record.file, record.role, fault.kind, FREED, what.largest * value, unit, low, high, output=output)
+    return RecordFault(
+        record.file, record.role, fault.kind, FREED, what.largest * value, unit, low, high, output=output
+    )
 
 
-def drift_of(what: OfParameter, name: str, fit: Fit, found: Inference) -> Suspect:
+def drift_of(what: OfParameter, name: str, fit: Fit, found: Inference) -> RecordFault:
     value, half = size_of(f"drift of {name}", fit, found)
     last, factor, unit = fit.records.data.records[-1], LARGEST, "1"
     if what.product is None:
@@ -73,7 +75,7 @@ def drift_of(what: OfParameter, name: str, fit: Fit, found: Inference) -> Suspec
         factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit
     low, high = factor * (value - half), factor * (value + half)
     others = [n for n, p in found.posterior.of_kind("drift").items() if n != name and p >= AS_WELL]
-    return Suspect(
+    return RecordFault(
         last.file, last.role, "trend", FREED, factor * value, unit, low, high, parameter=", ".join([name, *others])
     )
 
@@ -86,15 +88,15 @@ def size_of(name: str, fit: Fit, found: Inference) -> tuple[float, float]:
     return fit.others[place].value, NORMAL_95 * float(np.sqrt(covariance[at, at]))
 
 
-def broken_suspects(records: Sequence[Record]) -> list[Suspect]:
+def broken_records(records: Sequence[Record]) -> list[RecordFault]:
     """Return the samples that are no data, which were left out."""
     return [
-        Suspect(record.file, record.role, b.kind, LEFT_OUT, float(b.count), "samples", None, None, b.from_s, b.to_s)
+        RecordFault(record.file, record.role, b.kind, LEFT_OUT, float(b.count), "samples", None, None, b.from_s, b.to_s)
         for record in records for signal in record.signals for b in signal.broken
     ]  # fmt: skip
 
 
-def suspect_sentence(s: Suspect) -> str:
+def fault_sentence(s: RecordFault) -> str:
     factor, name = shown(1.0, s.unit)
     unit = "" if name == "1" else f" {name}"
     if s.kind in ("gap", "clipped", "stuck", "spikes"):

@@ -14,8 +14,8 @@ from made_machines import motion
 from armid.contract.check import check_campaign
 from armid.engine.simulate import Prepared
 from armid.errors import ArmidError
-from armid.estimation.mends import Mend, moved
-from armid.estimation.screen import Trial, chosen, screen, shortened
+from armid.estimation.corrections import Correction, moved
+from armid.estimation.data_checks import Trial, chosen, data_issues, shortened
 from armid.model import EFFECTS, Model
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
@@ -261,7 +261,7 @@ def said_of(folder: Path) -> list[str]:
         except ArmidError as error:
             return [str(error)]
     model = read.model()
-    found = screen(read, model, space_of(model, read.parameters))
+    found = data_issues(read, model, space_of(model, read.parameters))
     return [str(w.message) for w in caught] + [s.sentence for s in found]
 
 
@@ -349,7 +349,7 @@ def test_times_in_ms_are_noticed_whatever_the_model_makes_of_them(write_axis, tm
     split = [row.partition(",") for row in rows[1:]]
     (folder / "move.csv").write_text("\n".join([rows[0], *(f"{1e3 * float(t)!r},{rest}" for t, _, rest in split), ""]))
     read = read_campaign(folder)
-    (found,) = (s for s in screen(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "time")
+    (found,) = (s for s in data_issues(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "time")
     # A rough fit that happens to follow the motion tells it of all records, with the errors on either side.
     assert re.match(r"(move\.csv: its samples are 5 s apart, which looks like times in ms: seconds"
                     r"|every train record: time_s looks like milliseconds: in seconds the error falls )",
@@ -357,7 +357,7 @@ def test_times_in_ms_are_noticed_whatever_the_model_makes_of_them(write_axis, tm
 
 
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
-    """Most of its motion comes after the samples that a screen begins with, and it is seen all the same."""
+    """Most of its motion comes after the samples that the checks begin with, and it is seen all the same."""
     folder, n, steps = campaign("one"), 200_000, []
     columns = dict(read_table(folder / "lower.csv", "lower.csv").columns)
     often = np.linspace(0.0, 0.7, n)
@@ -415,7 +415,7 @@ def test_check_and_identify_say_it(campaign, run):
 
 def test_a_factor_of_two_has_to_leave_little():
     """A missing spring looks like an input that is told twice as large; so does no inverted sign."""
-    halved = Mend("input", 0.5, "halved", lambda record: record)
+    halved = Correction("input", 0.5, "halved", lambda record: record)
     assert chosen("", 1.1, [(0.32, halved)]) == []
     assert [s.kind for s in chosen("", 1.1, [(0.15, halved)])] == ["input"]
     assert [s.kind for s in chosen("", 1.1, [(0.32, replace(halved, kind="sign", factor=-1.0))])] == ["sign"]

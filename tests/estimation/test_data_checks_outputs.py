@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 from made_machines import write_arm, write_axis, write_link
-from test_screen import accusations, change, header, pendulum, rewritten, said_of
+from test_data_checks import accusations, change, header, pendulum, rewritten, said_of
 
-from armid.estimation.screen import screen
+from armid.estimation.data_checks import data_issues
 from armid.model import PLANTS, Model
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
@@ -148,7 +148,7 @@ def test_records_that_all_begin_elsewhere_than_the_model_are_told(tmp_path, begi
     starts = tuple(replace(c, value=begins) if c.name == "start_angle" else c for c in PLANTS["rotary_arm"].constants)
     plant = replace(PLANTS["rotary_arm"], constants=starts, from_rest=True)
     read = read_campaign(folder, {"rotary_arm": plant})
-    said = [s.sentence for s in screen(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "start"]
+    said = [s.sentence for s in data_issues(read, Model(read.plant), space_of(Model(read.plant))) if s.kind == "start"]
     if begins == 0.1:
         assert said == []
     else:

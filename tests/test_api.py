@@ -14,7 +14,7 @@ from pymoo.core.algorithm import Algorithm
 from rich.console import Console
 
 import armid
-from armid.by_name import campaign_of
+from armid.api import campaign_of
 from armid.cli.new import INERTIA
 from armid.contract.check import check_thing
 from armid.errors import ArmidError

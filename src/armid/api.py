@@ -186,7 +186,7 @@ def identify(
 ) -> "Identification":  # fmt: skip
     """Identify parameters from the train records of a campaign; `armid.identify("folder")` is enough.
 
-    The records are screened first: a sign, unit, clock or manoeuvre that looks wrong gives a warning.
+    The records are checked first: a sign, unit, clock or manoeuvre that looks wrong gives a warning.
 
     Parameters
     ----------
@@ -244,8 +244,8 @@ def identify(
     ArmidError
         For all else that cannot be used: an identifier, its options, a fitness, a budget.
     """
+    from armid.estimation.data_checks import data_issues
     from armid.estimation.identify import identify as run
-    from armid.estimation.screen import screen
     from armid.problem.fitness import as_fitness, fitness_of_name
 
     if not isinstance(options or {}, Mapping):
@@ -261,16 +261,16 @@ def identify(
         budget = PAPER_BUDGET if paper or identifier is not None else BUDGET
     space = space or there.space()
     with angles_in(there.campaign.angle):
-        suspicions = screen(there.campaign, there.model, space)
+        issues = data_issues(there.campaign, there.model, space)
     with warned_once(UserWarning):
-        for suspicion in suspicions:
-            warnings.warn(suspicion.sentence, stacklevel=2)
+        for issue in issues:
+            warnings.warn(issue.sentence, stacklevel=2)
     with search_bar(progress is True) as shown:
         followed = progress if callable(progress) else shown
         found = run(
             there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, followed, interval
         )
-    return replace(found, suspicions=suspicions)
+    return replace(found, issues=issues)
 
 
 def identifier_of(given: Any, registry: Registry) -> Any:
