@@ -21,6 +21,7 @@ from armid.inference.checks import train_residuals
 from armid.inference.decisions import LISTED, MENTIONED, calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
+from armid.inference.kinds import effects
 from armid.inference.library import Library, library_of
 from armid.inference.model import Fit, fit_from
 from armid.inference.posterior import CONSTANTS, Posterior, posterior
@@ -263,7 +264,9 @@ def prepared(
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
     library = replace(library, reach=REACH, priors=chances, known=known)
     posed = library.problem(())
-    return with_noise(*with_scales(library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)))
+    library = library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
+    library, declared = with_noise(*with_scales(library))
+    return replace(library, doubles=effects.doubles(declared, library)), declared
 
 
 def infer(library: Library, declared: Fit) -> Inference:

@@ -50,7 +50,8 @@ class Library:
     the best model so far in units of the noise, at least 1. say: called with a sentence before something that takes
     long. priors: probabilities of effects before the records. known: mean and deviation of parameters, SI, likewise.
     reach: by which factor strengths that scale with the machine may exceed their declared range. widened: ranges of
-    strengths of the declared model that were too narrow.
+    strengths of the declared model that were too narrow. doubles: effects that do what a free parameter of the declared
+    model does, and its name; they are not tried.
     """
 
     declared: Model
@@ -68,12 +69,14 @@ class Library:
     known: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     reach: float = 1.0
     widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    doubles: Mapping[EffectKey, str] = field(default_factory=dict)
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
     _schedules: dict[EffectKey, "Schedules"] = field(default_factory=dict)
 
     def joinable(self, active: Active) -> list[EffectKey]:
-        return [k for k in self.candidates if k.public not in {other.public for other in active}]
+        there = {other.public for other in active}
+        return [k for k in self.candidates if k.public not in there and k not in self.doubles]
 
     def owner(self, parameter: str) -> EffectKey | None:
         """Return the candidate to which a parameter of a compiled model belongs, None for the declared model's own."""

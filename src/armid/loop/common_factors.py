@@ -17,8 +17,10 @@ from armid.problem.problem import with_each
 def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
     """Return in words which parameters of the declared model and constants the records give only together.
 
-    What the free strengths of effects make up for counts as unseen.
+    What the free strengths of effects make up for counts as unseen. An effect that a parameter is already comes last.
     """
+    doubles = [f"{key.public} would do what {name} does already, and was not looked for"
+               for key, name in library.doubles.items()]  # fmt: skip
     own, strengths = {}, [np.zeros(len(fit.residual))]
     for name, value in fit.values.items():
         owner = library.owner(name)
@@ -36,10 +38,10 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
                 r, record=replace(r.record, pieces=pieces[r.record.file]))))  # fmt: skip
             own[key.name.removeprefix(ERROR_OF)] = slope(fit, there, f"{key.compiled}.error", 1.0)
     if not own:
-        return ()
+        return tuple(doubles)
     basis, _ = decomposed(np.column_stack(strengths))
     found = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
-    return common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), found)
+    return (*common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), found), *doubles)
 
 
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:

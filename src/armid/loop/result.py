@@ -302,7 +302,7 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
 
 def among(library: Library) -> list[int]:
     """Return how many effects may be named, and how many share the prior probability."""
-    return [len({key.public for key in library.candidates}), len(library.known_names)]
+    return [len({key.public for key in library.joinable(())}), len(library.known_names)]
 
 
 def step_entry(step: Step) -> dict[str, Any]:

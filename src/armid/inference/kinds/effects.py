@@ -12,7 +12,7 @@ from armid.inference.evidence import SCALES, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library, activation_grid
 from armid.inference.model import ROUGHLY, Fit, fit_from
-from armid.inference.refit import free_values, responses, unless_diverged
+from armid.inference.refit import candidate_at, free_values, responses, unless_diverged
 from armid.inference.unknowns import freed, moved, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
@@ -24,6 +24,8 @@ SHARES = (SLOPE, 0.05, 0.4)
 N_STARTS = 4
 # First steps of a fit, after which it shows how far it may lead.
 N_STEPS = 2
+# Share of a squared response that steps of a simulation, and second differences, leave of what is the same.
+ROUNDING = 1e-7
 
 
 def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
@@ -87,6 +89,38 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
     return Proposal(
         hypothesis, moved[good], SCALES, variants, partial(refit, key, library), one_sided=True, grid=chosen
     )
+
+
+def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
+    """Return the effects that do what a free parameter of the declared model does, and nothing else, with its name.
+
+    Viscous friction is the damping of a machine that has one: records cannot tell two shares of one quantity, and its
+    interval would reach from none of it to all. Effect and parameter are moved side by side.
+    """
+    found = library.each(lambda key: double(fit, key, library), library.joinable(()))
+    return {key: name for key, name in zip(library.joinable(()), found, strict=True) if name}
+
+
+def double(fit: Fit, key: EffectKey, library: Library) -> str:
+    """Return the parameter of the declared model that does what an effect does, "" for none."""
+    records = beside(fit, (key,), library)
+    mine = [n for n in records.space.free_names if key.owns(n)]
+    if len(mine) != 1 or records.model.parameters[mine[0]].null is None or not fit.n_free:
+        return ""
+    grid, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
+    response = SLOPE * responses(fit, records, [replace(grid[0], share=SLOPE)])[0]
+    size = float(response @ response)
+    if not 0.0 < size < np.inf:
+        return ""
+    slopes, squares = fit.jacobian, np.sum(fit.jacobian**2, axis=0)
+    along = slopes.T @ response / np.maximum(squares, 1e-300)
+    best = int(np.argmax(along**2 * squares))
+    name = list(fit.values)[best]
+    moved = dict(zip(fit.values, fit.records.values(fit.z + along * (np.arange(fit.n_free) == best)), strict=True))
+    there, here = records.whole_signals(np.array([candidate_at(records, v) for v in (moved, fit.values)]))
+    apart = response - (there - here)
+    apart = apart - slopes[:, best] * float(slopes[:, best] @ apart) / max(squares[best], 1e-300)
+    return name if float(apart @ apart) < ROUNDING * size else ""
 
 
 def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
