@@ -6,7 +6,9 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import llvmlite.binding as llvm
 import numba
@@ -15,6 +17,7 @@ import pytest
 from numba.core import codegen
 
 from armid.engine import cache_folder, compile_model, simulate
+from armid.engine import compile as compiler
 from armid.engine.cache import keep, read_whole, unusable, write_whole
 from armid.engine.compile import load_module, module_name
 from armid.engine.generate import kernel_parts
@@ -238,3 +241,12 @@ def test_a_linked_function_is_part_of_those_that_call_it_and_has_no_code_of_its_
         (compiled,) = function.overloads.values()
         assert isinstance(compiled.library, LinkedLibrary)
         assert not compiled.library.codegen._engine.is_symbol_defined(compiled.fndesc.mangled_name)
+
+
+def test_one_of_two_threads_that_wait_for_the_same_kernel_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(compiler, "announced", lambda sentence: nullcontext(said.append(sentence)))
+    model, kernel = Model(PLANTS["rotary_arm"]), SimpleNamespace(signatures=[])
+    with compiler.compiling(model, kernel), compiler.compiling(model, kernel):
+        pass
+    assert [s.partition(";")[0] for s in said] == ["compiling rotary_arm"]

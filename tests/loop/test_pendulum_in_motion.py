@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
 from armid.estimation.least_squares import with_fitted_starts
-from armid.loop import close_loop
+from armid.loop import close_loop, report_of
 from armid.model import EFFECTS, Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
@@ -29,7 +29,7 @@ def swing(torque, friction, start):
     return np.array(states).T
 
 
-def swinging(folder, friction, rho=0.35, n_records=4, seed=3):
+def swinging(folder, friction, rho=0.35, n_records=4, seed=3, toml=TOML):
     """Write a campaign of swings, the last one held out; return it with the true starts."""
     rng, tables, starts = np.random.default_rng(seed), {}, []
     times = STEP_S * np.arange(500)
@@ -43,7 +43,7 @@ def swinging(folder, friction, rho=0.35, n_records=4, seed=3):
                                "angle_rad": angle + 1e-4 * rng.standard_normal(len(times))}  # fmt: skip
     roles = ["train"] * (n_records - 1) + ["holdout"]
     entries = [RECORD.format(file=file, role=role) for file, role in zip(tables, roles, strict=True)]
-    return read_campaign(write_campaign(folder, TOML + "".join(entries), tables)), starts
+    return read_campaign(write_campaign(folder, toml + "".join(entries), tables)), starts
 
 
 def test_the_start_of_an_axis_is_fitted(tmp_path):
@@ -60,6 +60,19 @@ def test_the_start_of_an_axis_is_fitted(tmp_path):
         residual = replay.measured - replay.signal(np.array([[INERTIA]]))[0]
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(NOISE, rel=0.1)
     assert not campaign.holdout[0].pieces[0].shown_start
+
+
+@pytest.mark.slow
+def test_friction_that_is_a_parameter_of_the_plant_is_not_looked_for(tmp_path):
+    """No record can tell two shares of one damping: an interval from none to all of it would help nobody."""
+    campaign, _ = swinging(tmp_path / "c", 0.01, toml='name = "swinging"\nplant = "rotary_arm"\nhold = "zero"\n')
+    candidates = {name: EFFECTS[name] for name in ("coulomb", "viscous", "quadratic_drag")}
+    found = close_loop(Model(campaign.plant), campaign, candidates)
+    assert (found.verdict, found.steps) == ("no_discrepancy", ())
+    assert report_of(found)["probabilities"]["among"][0] == 2
+    assert "viscous would do what damping does already, and was not looked for" in found.known_together
+    damping = next(e for e in found.before.estimates if e.name == "damping")
+    assert damping.low < 0.01 < damping.high < 0.015
 
 
 @pytest.mark.slow

@@ -31,6 +31,8 @@ MADE_FROM = [*generate.TEMPLATES, *(Path(str(module.__file__)) for module in (ge
 KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
 # Threads that ask for the same model at once share one kernel, which numba then compiles once.
 LOCK = RLock()
+# Kernels, by `id`, that are being compiled.
+COMPILING: set[int] = set()
 MOST_NAMED = 3
 
 
@@ -48,10 +50,12 @@ def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
     """Stand around the first call of a kernel, which compiles it, and announce that.
 
     Python's garbage collector is kept still meanwhile: the compiler makes millions of objects that live to its end.
+    Another thread that calls it meanwhile waits, and says nothing.
     """
-    if getattr(kernel, "signatures", True):
+    if getattr(kernel, "signatures", True) or id(kernel) in COMPILING:
         yield
         return
+    COMPILING.add(id(kernel))
     name = " + ".join([model.plant.name, *(e.name for e in model.effects[:MOST_NAMED])])
     more = f" and {len(model.effects) - MOST_NAMED} effects more" if len(model.effects) > MOST_NAMED else ""
     kept = "; it is kept for the next time" if kept_in() else ""
@@ -61,6 +65,7 @@ def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
         with announced(f"compiling {name}{more}{kept}"):
             yield
     finally:
+        COMPILING.discard(id(kernel))
         if collecting:
             gc.enable()
 

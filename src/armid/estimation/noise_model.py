@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
+from typing import TypeVar
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular, toeplitz
@@ -19,9 +20,10 @@ from armid.model import Array, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Noise, Record
-from armid.record.noise import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, new_share
+from armid.record.noise import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, memory_of, new_share
 from armid.record.record import NOISE_FREE
 
+T = TypeVar("T")
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
 HIDES_ENGINE = 5e-5
 MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS = 8, 50, 500
@@ -97,9 +99,9 @@ def sensor_of(record: Record) -> tuple[str, float]:
     return record.output, record.manoeuvre.interval
 
 
-def by_sensor(records: Sequence[Record], values: Sequence[float]) -> dict[tuple[str, float], list[float]]:
+def by_sensor(records: Sequence[Record], values: Sequence[T]) -> dict[tuple[str, float], list[T]]:
     """Return the values of the records of each sensor."""
-    found: dict[tuple[str, float], list[float]] = {}
+    found: dict[tuple[str, float], list[T]] = {}
     for record, value in zip(records, values, strict=True):
         found.setdefault(sensor_of(record), []).append(value)
     return found
@@ -116,19 +118,25 @@ def levels_left(
 ) -> tuple[NoiseModel, ...]:  # fmt: skip
     """Return the noise of each record where no rest tells it: that in what a model leaves, where this is less.
 
-    Of a fast motion with few samples the differences hold the motion too; what a model leaves holds less of it.
-    left: of each record, its unit, not whitened.
+    Of a fast motion with few samples the differences hold the motion too; what a model leaves holds less of it, and
+    shows how long the noise of a filtered sensor remembers. left: of each record, its unit, not whitened.
     """
-    least = []
+    records, parts = [r.record for r in replays], []
     for replay, part in zip(replays, left, strict=True):
-        step, moved = replay.record.signals[0].sensor.step / np.sqrt(12.0), changing(replay.measured)
-        sampled = part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part
-        least.append(max(difference_rms(sampled), step))
-    each, found = by_sensor([r.record for r in replays], least), []
+        moved = changing(replay.measured)
+        parts.append(part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part)
+    memories = {sensor: memory_of(several) for sensor, several in by_sensor(records, parts).items()}
+    least = []
+    for record, part in zip(records, parts, strict=True):
+        memory = memories[sensor_of(record)]
+        new = difference_rms(part[1:] - memory * part[:-1])
+        least.append(max(new / np.sqrt(1.0 - memory**2), record.signals[0].sensor.step / np.sqrt(12.0)))
+    each, found = by_sensor(records, least), []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
         rms = max(float(np.median(each[sensor])), noise_floor(sensor, replay.model.plant))
-        found.append(level if level.known or level.rms <= rms else white_level(rms, 0))
+        is_told = level.known or (level.rms <= rms and not memories[sensor])
+        found.append(level if is_told else remembering_level(rms, memories[sensor]))
     return tuple(found)
 
 
@@ -145,6 +153,13 @@ def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:
 
 def white_level(rms: float, n_samples: int) -> NoiseModel:
     return NoiseModel(float(rms), np.empty(0), float(rms), np.empty((0, 0)), n_samples, n_samples, n_samples)
+
+
+def remembering_level(rms: float, memory: float) -> NoiseModel:
+    """Return noise whose correlation is memory^k at lag k, known from no rest."""
+    if not memory:
+        return white_level(rms, 0)
+    return NoiseModel(rms, np.array([memory]), rms * float(np.sqrt(1.0 - memory**2)), np.array([[1.0 / rms]]), 0, 0, 0)
 
 
 def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseModel:

@@ -98,7 +98,7 @@ class Residuals:
         if self.fitted is not None:
             return self.fitted.memory
         parts, places = self.data.by_record(self.residual), [r.place for r in self.replays]
-        if self.data.known or not all(level.is_white for level in self.data.levels):
+        if self.data.known or self.data.rests_have_colour:
             return dict.fromkeys(places, 0.0)
         return {p: memory_of([x for x, of in zip(parts, places, strict=True) if of == p]) for p in places}
 
@@ -330,7 +330,7 @@ def time_tests(seen: Residuals) -> Iterator[Finding]:
     Only where the noise is white: what an imperfect filter leaves of coloured noise would be taken for a discrepancy;
     there the spectra of residual and rest are compared (`band_tests`). Hum that the rests show is taken out before.
     """
-    if not all(level.is_white for level in seen.data.levels):
+    if seen.data.rests_have_colour:
         return
     parts, hum = seen.renewed, [sum(ends) / 2.0 for ends in mains_hum(seen)]
     if hum:
@@ -402,7 +402,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     rest itself shows the spectrum.
     Where the rest hums, frequencies near by are left out: a line does not scatter as noise does.
     """
-    coloured = not seen.doubted and not all(level.is_white for level in seen.data.levels)
+    coloured = not seen.doubted and seen.data.rests_have_colour
     hum = mains_hum(seen)
     white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
     raw = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else white

@@ -318,7 +318,7 @@ def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
     levels = levels_left(library.data.levels, seen.replays, seen.raw)
     if levels == library.data.levels:
         return library, declared
-    library = replace(library, data=replace(library.data, levels=levels), _problems={})
+    library = replace(library, data=library.data.with_levels(levels), _problems={})
     return library, accurate(fit_from(library.problem(()), (), [declared.z]), library)
 
 

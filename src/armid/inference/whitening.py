@@ -97,9 +97,18 @@ class WhitenedData:
         """Where the records begin in a vector of all samples, and its end, (n_records + 1,)."""
         return np.cumsum([0, *(sum(n) for n in self.lengths)])
 
+    def with_levels(self, levels: tuple[NoiseModel, ...]) -> "WhitenedData":
+        """Return the records with another noise."""
+        return replace(self, levels=levels, sound=soundness_of(self.each, levels))
+
     @property
     def known(self) -> bool:
         return all(level.known for level in self.levels)
+
+    @property
+    def rests_have_colour(self) -> bool:
+        """Whether a rest tells a colour of the noise, hence its spectrum too."""
+        return any(level.known and not level.is_white for level in self.levels)
 
     def n_noise(self, otherwise: float) -> float:
         """Return from how many independent samples the noise of slow signals is known; `otherwise` where from none."""
@@ -152,8 +161,11 @@ def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | No
         theirs = dict(zip(map(sensor_of, more), trained.levels, strict=True))
         levels = tuple(level if level.known else theirs.get(sensor_of(r), level)
                        for r, level in zip(each, levels, strict=True))  # fmt: skip
-    sound = np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
-    return WhitenedData(tuple(records), levels, sound)
+    return WhitenedData(tuple(records), levels, soundness_of(each, levels))
+
+
+def soundness_of(each: Sequence[Record], levels: Sequence[NoiseModel]) -> Array:
+    return np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
 
 
 def soundness(record: Record, reach: int) -> Array:

@@ -31,6 +31,8 @@ IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAI
 )  # fmt: skip
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
+# A shape that armid sets free by itself, such as the width of a sign: nobody needs to widen its range.
+SEARCHED = "it lies at the end of the range that was searched"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
 # Listed causes of the width of an interval, and listed models.
 MOST_CAUSES, MOST_LISTED = 2, 30
@@ -234,7 +236,8 @@ def estimates(
         doubts = [REMAINS] if discrepancy and (model != found.in_force or is_unknown) else []
         if owner is not None and found.posterior.probability("effect", owner.public) < CLAIMED:
             doubts.append(f"{owner.public} is not certain")
-        doubts += [HELD] if held[space.free_names.index(name)] else []
+        if held[space.free_names.index(name)]:
+            doubts.append(SEARCHED if owner is not None and name in library.fixed_shapes(owner) else HELD)
         if not max(value - low, high - value) <= within * abs(value):
             wide = f"its interval reaches further than {within:.0%} from the value"
             doubts.append(f"{wide} ({'; '.join(causes)})" if causes else wide)
