@@ -121,8 +121,8 @@ def refuse_others(effects: Any, plugins: Any, window: Any, bounds: Any, fix: Any
 
 
 def are_numbers(values: Iterable[Any], n: int | None = None) -> bool:
-    found = list(values)
-    return (n is None or len(found) == n) and all(isinstance(v, int | float | np.number) for v in found)
+    items = list(values)
+    return (n is None or len(items) == n) and all(isinstance(v, int | float | np.number) for v in items)
 
 
 def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
@@ -267,10 +267,10 @@ def identify(
             warnings.warn(issue.sentence, stacklevel=2)
     with search_bar(progress is True) as shown:
         followed = progress if callable(progress) else shown
-        found = run(
+        identification = run(
             there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, followed, interval
         )
-    return replace(found, issues=issues)
+    return replace(identification, issues=issues)
 
 
 def identifier_of(given: Any, registry: Registry) -> Any:
@@ -406,9 +406,9 @@ def close_loop(
     share = {} if within is None else {"within": positive(within, "within")}
     file = progress if isinstance(progress, Path) else None
     with status_line(progress is True) as shown, angles_in(known_too.angle):
-        found: ClosedLoop = run(there.model, known_too, kept, rng, there.bounds, values, threads, told or shown, curve,
-                                file, chances, **share)  # fmt: skip
-    return found
+        loop: ClosedLoop = run(there.model, known_too, kept, rng, there.bounds, values, threads, told or shown, curve,
+                               file, chances, **share)  # fmt: skip
+    return loop
 
 
 def with_known(campaign: Campaign, given: Mapping[str, Sequence[float]]) -> Campaign:
@@ -435,8 +435,8 @@ def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[s
     """Return name -> Effect of names or Effects, None: all that are known; where: named in a refusal."""
     if given is None:
         return known
-    found = (e if isinstance(e, Effect) else chosen(e.strip(), known, f"{where}: effect") for e in each_of(given))
-    return {effect.name: effect for effect in found}
+    effects = (e if isinstance(e, Effect) else chosen(e.strip(), known, f"{where}: effect") for e in each_of(given))
+    return {effect.name: effect for effect in effects}
 
 
 def simulate(

@@ -105,18 +105,18 @@ def plain_text(name: str, thing: Any, registry: Registry, is_long: bool) -> str:
 
 
 def entry(thing: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {"note": getattr(thing, "note", "") or (getattr(thing, "__doc__", "") or "").strip()}
+    fields: dict[str, Any] = {"note": getattr(thing, "note", "") or (getattr(thing, "__doc__", "") or "").strip()}
     if isinstance(thing, Plant | Effect):
         keys = ("unit", "low", "high", "null", "fixed", "note")
-        found["parameters"] = {p.name: {key: getattr(p, key) for key in keys} for p in thing.parameters}
+        fields["parameters"] = {p.name: {key: getattr(p, key) for key in keys} for p in thing.parameters}
         ports = thing.ports if isinstance(thing, Plant) else {port: returned_text(f) for port, f in thing.adds.items()}
-        found["ports"] = dict(ports)
+        fields["ports"] = dict(ports)
     if hasattr(thing, "build"):
         from armid.identifiers import options_of
 
         flags = ("is_global", "uses_gradient", "is_stochastic", "needs_residuals")
-        found |= {flag: getattr(thing, flag) for flag in flags} | {"options": options_of(thing)}
-    return found | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
+        fields |= {flag: getattr(thing, flag) for flag in flags} | {"options": options_of(thing)}
+    return fields | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
 
 
 def identifier_text(name: str, identifier: Any, registry: Registry, is_long: bool) -> str:

@@ -161,15 +161,15 @@ def check_new_name(kind: str, name: str, taken: Collection[str], template: str) 
 
 
 def names_in(text: str) -> set[str]:
-    found = set()
+    names = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Name):
-            found.add(node.id)
+            names.add(node.id)
         elif isinstance(node, ast.FunctionDef | ast.alias):
-            found.add(getattr(node, "asname", None) or node.name)
+            names.add(getattr(node, "asname", None) or node.name)
         elif isinstance(node, ast.arg):
-            found.add(node.arg)
-    return found
+            names.add(node.arg)
+    return names
 
 
 def campaign_text(name: str) -> str:

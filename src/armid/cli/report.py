@@ -25,14 +25,14 @@ from armid.report.result import (
 )
 
 
-def show_and_save(found: Result, out: Path | None) -> None:
+def show_and_save(result: Result, out: Path | None) -> None:
     """Print the answer and the main tables of a result, then with a folder write its files, all or none."""
-    document = found.document()
+    document = result.document()
     present(document)
-    files = [] if out is None else found.save(out, made_by())
+    files = [] if out is None else result.save(out, made_by())
     if files:
         say(f"wrote {', '.join(files)} to {out}")
-    give(**found.to_dict(), answer=document.said, files=files)
+    give(**result.to_dict(), answer=document.said, files=files)
 
 
 def made_by() -> dict[str, Any]:

@@ -84,9 +84,9 @@ def ready_at(candidate: Array, record: Record, model: Model) -> ReadyRecord:
     return ReadyRecord(record, model, tuple(calibrations))
 
 
-def plausible(found: Sequence[DataIssue]) -> list[ContractPoint]:
+def plausible(issues: Sequence[DataIssue]) -> list[ContractPoint]:
     alike: dict[tuple[str, str], list[str]] = {}
-    for s in found:
+    for s in issues:
         # what holds for several records is one sentence with their names
         of_record, said = s.sentence.startswith(f"{s.record}: "), s.sentence.removeprefix(f"{s.record}: ")
         alike.setdefault((s.kind, said), []).extend([s.record] if of_record else [])

@@ -158,8 +158,8 @@ def strengths_of(model: Model) -> dict[str, dict[str, float]]:
     """Return effect -> {key of a strength: its null} of the effects that may be inactive, none in a small model."""
     if len(model.effects) < FEWEST:
         return {}
-    found = {e.name: {f"{e.name}__{p.name}": p.null for p in e.parameters if p.null is not None} for e in model.effects}
-    return {name: strengths for name, strengths in found.items() if strengths}
+    nulls = {e.name: {f"{e.name}__{p.name}": p.null for p in e.parameters if p.null is not None} for e in model.effects}
+    return {name: strengths for name, strengths in nulls.items() if strengths}
 
 
 def use_lines(effect: str, nulls: Mapping[str, float]) -> list[str]:
@@ -259,11 +259,11 @@ class Emitter:
         users = Counter(key for node in nodes for key in node.needs)
         terms = (key for n in nodes if n.kind == "port" for key in n.terms)
         spared = {key for key in terms if self.is_optional(key) and users[key] == 1}
-        found: list[str] = []
+        lines: list[str] = []
         for n in nodes:
             if n.key not in spared:
-                found += self.sum_lines(n, spared) if spared.intersection(n.terms) else [self.line(n.key, static)]
-        return found
+                lines += self.sum_lines(n, spared) if spared.intersection(n.terms) else [self.line(n.key, static)]
+        return lines
 
     def is_optional(self, key: str) -> bool:
         """Tell whether a term moves and belongs to an effect that may be inactive."""

@@ -155,7 +155,7 @@ class Identification(Result):
 
     @cached_property
     def parameters(self) -> dict[str, ParameterEstimate]:
-        """Name -> value, 95 % interval and what stands against it, SI: `found.parameters["p0"].low`."""
+        """Name -> value, 95 % interval and what stands against it, SI: `identification.parameters["p0"].low`."""
         return {name: self._estimate(i) for i, name in enumerate(self.space.names)}
 
     def _estimate(self, i: int) -> ParameterEstimate:
@@ -204,19 +204,22 @@ class Identification(Result):
     @property
     def table(self) -> "DataFrame":
         """Parameters as people read them; `low` and `high` are numbers in the unit of the value."""
-        found = self.parameters.values()
+        parameters = self.parameters.values()
         with angles_in(self.campaign.angle):
-            scales = [scale_of(p.unit, p.value)[1] for p in found]
+            scales = [scale_of(p.unit, p.value)[1] for p in parameters]
         # None becomes NaN
-        ends = {"low": np.array([p.low for p in found], float), "high": np.array([p.high for p in found], float)}
+        ends = {
+            "low": np.array([p.low for p in parameters], float),
+            "high": np.array([p.high for p in parameters], float),
+        }
         return super().table.assign(**{end: values * scales for end, values in ends.items()})
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
         """Which of all parameters are free and sit on a bound."""
-        found = self.space.free.copy()
-        found[found] = held_by_bound(self.space, self.candidate[self.space.free])
-        return found
+        mask = self.space.free.copy()
+        mask[mask] = held_by_bound(self.space, self.candidate[self.space.free])
+        return mask
 
 
 def identify(
@@ -428,8 +431,8 @@ def outputs_entry(replays: Sequence[Replay]) -> dict[str, dict[str, Any]]:
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:
     files = dict.fromkeys(r.record.file for r in replays)
-    found = {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
-    return {file: errors for file, errors in found.items() if errors is not None}
+    by_file = {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
+    return {file: errors for file, errors in by_file.items() if errors is not None}
 
 
 @contextmanager

@@ -99,10 +99,10 @@ def sensor_of(record: Record) -> tuple[str, float]:
 
 def by_sensor(records: Sequence[Record], values: Sequence[float]) -> dict[tuple[str, float], list[float]]:
     """Return the values of the records of each sensor."""
-    found: dict[tuple[str, float], list[float]] = {}
+    groups: dict[tuple[str, float], list[float]] = {}
     for record, value in zip(records, values, strict=True):
-        found.setdefault(sensor_of(record), []).append(value)
-    return found
+        groups.setdefault(sensor_of(record), []).append(value)
+    return groups
 
 
 def noise_floor(sensor: tuple[str, float], plant: Plant) -> float:
@@ -124,12 +124,12 @@ def levels_left(
         step, moved = replay.record.signals[0].sensor.step / np.sqrt(12.0), changing(replay.measured)
         sampled = part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part
         least.append(max(difference_rms(sampled), step))
-    each, found = by_sensor([r.record for r in replays], least), []
+    each, noises = by_sensor([r.record for r in replays], least), []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
         rms = max(float(np.median(each[sensor])), noise_floor(sensor, replay.model.plant))
-        found.append(level if level.known or level.rms <= rms else white_level(rms, 0))
-    return tuple(found)
+        noises.append(level if level.known or level.rms <= rms else white_level(rms, 0))
+    return tuple(noises)
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:
@@ -249,13 +249,13 @@ def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | 
         if len({r.place for r in replays}) > 1:
             raise ArmidError(f"a noise of {noise:g} was given, but records hold several outputs: none is expected")
         return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
-    found = []
+    levels = []
     for replay in replays:
         level = level_of(replay, space, x)
         if replay.record.is_noise_free and level.rms <= NOISE_FREE * float(np.max(np.abs(replay.measured))):
             level = Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
-        found.append(level)
-    return tuple(found)
+        levels.append(level)
+    return tuple(levels)
 
 
 def level_weights(levels: Sequence[Level]) -> tuple[float, ...]:

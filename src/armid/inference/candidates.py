@@ -99,16 +99,16 @@ def grouped(
     whole = joined(begun[0], *(effect for _, effect in each))
     if whole is not None:
         return [(whole, (*begun[1], *(key for key, _ in each)))]
-    found: list[tuple[Model, Active]] = []
+    models: list[tuple[Model, Active]] = []
     for key, effect in each:
-        for i, (model, held) in enumerate(found or [begun]):
+        for i, (model, held) in enumerate(models or [begun]):
             extended = joined(model, effect)
             if extended is not None:
-                found[i : i + 1] = [(extended, (*held, key))]
+                models[i : i + 1] = [(extended, (*held, key))]
                 break
         else:
-            found.append((declared + effect, (key,)))
-    return found
+            models.append((declared + effect, (key,)))
+    return models
 
 
 def joined(model: Model, *effects: Effect) -> Model | None:

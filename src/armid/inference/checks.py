@@ -81,13 +81,13 @@ class Residuals:
     @property
     def noise_of(self) -> dict[str, float]:
         """Noise of all samples of each output that is recorded, by its name, [its unit]."""
-        found: dict[str, float] = {}
+        noise: dict[str, float] = {}
         for place in sorted({r.place for r in self.replays}):
             of = [(level.rms, len(r.measured)) for level, r in zip(self.data.levels, self.replays, strict=True)
                   if r.place == place]  # fmt: skip
             square = sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)
-            found[self.model.plant.outputs[place].name] = float(np.sqrt(square))
-        return found
+            noise[self.model.plant.outputs[place].name] = float(np.sqrt(square))
+        return noise
 
     @cached_property
     def memory(self) -> dict[int, float]:
@@ -131,22 +131,22 @@ class Residuals:
         for replay in self.replays:
             triples = zip(replay.pieces, replay.calibrations, replay.record.samples, strict=True)
             for piece, calibration, samples in triples:
-                found = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
+                motion = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
                 for n in names:
-                    parts[n].append(found[n][samples])
+                    parts[n].append(motion[n][samples])
         return {n: np.concatenate(p) for n, p in parts.items()}
 
     @cached_property
     def stages(self) -> dict[str, NDArray[np.bool_]]:
         """Samples before and after each one-way switch of the plant, name -> (n_samples,); empty without a switch."""
-        found: dict[str, NDArray[np.bool_]] = {}
+        stages: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
             runs = (zip(r.pieces, r.record.samples, r.ready.runs(self.candidate[np.newaxis]), strict=True)
                     for r in self.replays)  # fmt: skip
             after = np.concatenate([piece.manoeuvre.times()[samples] >= run.switch_times[name][0]
                                     for piece, samples, run in chain.from_iterable(runs)])  # fmt: skip
-            found |= {f"before '{name}'": ~after, f"after '{name}'": after}
-        return {n: samples for n, samples in found.items() if samples.any()}
+            stages |= {f"before '{name}'": ~after, f"after '{name}'": after}
+        return {n: samples for n, samples in stages.items() if samples.any()}
 
     @cached_property
     def phases(self) -> dict[str, NDArray[np.bool_]]:
@@ -461,7 +461,7 @@ def spectra(
 
     without: stretches of frequency, (low, high) [Hz], that are left out.
     """
-    found: dict[int, list[float]] = {}
+    ordinates: dict[int, list[float]] = {}
     for record, level, signal in zip(seen.data.each, seen.data.levels, signals, strict=True):
         if not len(signal):  # the rest of a record in motion
             continue
@@ -471,5 +471,5 @@ def spectra(
         kept = ~np.any([(low < frequency) & (frequency < high) for low, high in without] or [frequency < 0.0], axis=0)
         bands = np.searchsorted(BANDS_HZ, frequency[kept], side="right") - 1
         for band, value in zip(bands, power[kept], strict=True):
-            found.setdefault(int(band), []).append(float(value))
-    return found
+            ordinates.setdefault(int(band), []).append(float(value))
+    return ordinates

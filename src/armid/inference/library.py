@@ -392,9 +392,9 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
         for share in SHARES:
             tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))
             run = simulate(model, manoeuvre, spread, tried)
-            found = judged(run, runs[2 * n])
-            if found[2] and run.n_steps < n:
-                schedule, (error, is_hidden, _) = tried, found
+            judgement = judged(run, runs[2 * n])
+            if judgement[2] and run.n_steps < n:
+                schedule, (error, is_hidden, _) = tried, judgement
                 break
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
@@ -433,13 +433,13 @@ def activation_grid(
     along = [points_within(*bound[n], count) for n, count in zip(shapes, shape_counts(len(shapes)), strict=True)]
     points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*along)]
     chosen = [(n,) for n in null] + ([tuple(null)] if len(null) > 1 else [])
-    found = []
+    activations = []
     for names, side, shape in product(chosen, (1, 0), points):
         full = {n: float(bound[n][side]) if n in names else null[n] for n in null}
         if all(full[n] != null[n] for n in names):
             shares = STRENGTHS_OF_SHAPES if shapes else STRENGTHS
-            found += [Activation(shape | full, null, share) for share in shares]
-    return found, len(points)
+            activations += [Activation(shape | full, null, share) for share in shares]
+    return activations, len(points)
 
 
 def shape_counts(n_shapes: int) -> tuple[int, ...]:

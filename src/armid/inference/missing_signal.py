@@ -302,13 +302,13 @@ def knows(model: Model, name: str) -> bool:
 
 def factors(values: dict[str, Array], model: Model) -> dict[str, Array]:
     """Return what a curve may be multiplied by, at the knots."""
-    found = {"1": np.ones(len(next(iter(values.values()))))}
+    factors = {"1": np.ones(len(next(iter(values.values()))))}
     speed = values.get(model.plant.aliases.get("omega", "omega"), values.get("omega"))
     if speed is not None:
-        found["direction"] = speed / np.hypot(speed, 0.005 * model.plant.scales.speed)
+        factors["direction"] = speed / np.hypot(speed, 0.005 * model.plant.scales.speed)
     if "drive_effort" in values:
-        found["drive_effort"] = values["drive_effort"]
-    return found
+        factors["drive_effort"] = values["drive_effort"]
+    return factors
 
 
 N_HEIGHTS, N_BLOCKS = 8, 4
@@ -318,8 +318,8 @@ RIDGE, STRAIGHT = 1e-9, 1e-4
 
 def dependences(whole: Sequence[Segment]) -> list[Dependence]:
     pairs = [(v, f) for v in whole[0].variables for f in whole[0].factors if v != f]
-    found = [dependence(whole, port, variable, factor) for port in whole[0].gains for variable, factor in pairs]
-    return sorted(found, key=lambda d: -d.removed)
+    dependences = [dependence(whole, port, variable, factor) for port in whole[0].gains for variable, factor in pairs]
+    return sorted(dependences, key=lambda d: -d.removed)
 
 
 def dependence(segments: Sequence[Segment], port: str, variable: str, factor: str) -> Dependence:

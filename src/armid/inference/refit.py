@@ -64,7 +64,7 @@ def continued(fit: Fit, shapes: Set[str]) -> list[Array]:
     for place in np.flatnonzero(is_shape):
         if records.model.parameters[names[place]].unit == "s":
             continue
-        z, found = fit.z.copy(), []
+        z, estimates = fit.z.copy(), []
         low, high = space.low[space.free][place], space.high[space.free][place]
         for value in points_within(low, high, N_HELD)[::-1]:
             z[place] = (value - low) / (high - low)
@@ -73,8 +73,8 @@ def continued(fit: Fit, shapes: Set[str]) -> list[Array]:
             posed = replace(records, space=held)
             if np.isfinite(posed.chi2(z[~is_shape])[0]):
                 z[~is_shape] = descend(posed, [z[~is_shape]], LEADING)
-            found.append((float(posed.chi2(z[~is_shape])[0]), z.copy()))
-        starts.append(min(found, key=lambda one: one[0])[1])
+            estimates.append((float(posed.chi2(z[~is_shape])[0]), z.copy()))
+        starts.append(min(estimates, key=lambda one: one[0])[1])
     return starts
 
 

@@ -212,8 +212,8 @@ def polished(fit: Fit, weight: float) -> Fit:
     low, high = np.repeat([0.0, -np.inf], [n, len(unknowns)]), np.repeat([1.0, np.inf], [n, len(unknowns)])
 
     def residuals(X: Array) -> Array:
-        found = residuals_at(base, unknowns, X[:, n:], X[:, :n])
-        return np.asarray(np.hstack([np.sqrt(weight) * found, X[:, n:]]))
+        whitened = residuals_at(base, unknowns, X[:, n:], X[:, :n])
+        return np.asarray(np.hstack([np.sqrt(weight) * whitened, X[:, n:]]))
 
     def slopes(x: Array) -> Array:
         centre = np.clip(x, low + steps, high - steps)
@@ -223,9 +223,9 @@ def polished(fit: Fit, weight: float) -> Fit:
     def residual(x: Array) -> Array:
         return np.asarray(residuals(x[np.newaxis])[0])
 
-    found = least_squares(residual, here, slopes, (low, high), x_scale="jac",
-                          ftol=ARRIVED, xtol=ARRIVED, gtol=ARRIVED, max_nfev=MOST_STEPS)  # fmt: skip
-    z, values = found.x[:n], found.x[n:]
+    solution = least_squares(residual, here, slopes, (low, high), x_scale="jac",
+                             ftol=ARRIVED, xtol=ARRIVED, gtol=ARRIVED, max_nfev=MOST_STEPS)  # fmt: skip
+    z, values = solution.x[:n], solution.x[n:]
     # what came to the edge of the inside is on the bound
     z = np.clip(z + INSIDE * (2.0 * z - 1.0), 0.0, 1.0)
     V, Z = np.array([[f.value for f in fit.others], values]), np.array([fit.z, z])
@@ -292,11 +292,11 @@ def residuals_at(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: A
         forms.append((moved(base, rest, values), np.flatnonzero((V[:, free] == values).all(axis=1))))
     shares = {u.product.names[0]: V[:, i] * u.product.tolerance for i, u in enumerate(unknowns) if u.product}
     signals = signals_of_each([(records.replays, rows) for records, rows in forms], base.whole(Z), shares)
-    found: dict[int, Array] = {}
+    residuals: dict[int, Array] = {}
     for (records, rows), own in zip(forms, signals, strict=True):
         white = records.with_known(records.data.white(own), Z[rows])
-        found |= dict(zip(rows.tolist(), records.measured - white, strict=True))
-    return np.array([found[row] for row in range(len(V))])
+        residuals |= dict(zip(rows.tolist(), records.measured - white, strict=True))
+    return np.array([residuals[row] for row in range(len(V))])
 
 
 def columns_about(
@@ -319,5 +319,5 @@ def columns_about(
         rest = moved(base, [u for u in unknowns if u is not unknown], np.delete(values, i))
         return unknown.column(rest, z, float(values[i]))
 
-    found = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), residuals.shape[1])
-    return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, 0.0).T
+    columns = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), residuals.shape[1])
+    return np.where(np.isfinite(columns).all(axis=1, keepdims=True), columns, 0.0).T

@@ -38,8 +38,8 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
     if not own:
         return ()
     basis, _ = decomposed(np.column_stack(strengths))
-    found = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
-    return common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), found)
+    products = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
+    return common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), products)
 
 
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:

@@ -121,8 +121,8 @@ def simulated_piece(
 ) -> dict[str, Array]:
     wanted = accuracy or accuracy_against(record.noises, model)
     calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted, spans=False)
-    found = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
-    if found.failed[0]:
+    simulation = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
+    if simulation.failed[0]:
         raise ModelError(f"record '{record.file}': the simulation diverges with these parameters")
     if not calibration.reached:
         off = f"the engine is off by up to {calibration.error:.2g} {model.plant.output_unit} even at its finest steps"
@@ -134,16 +134,16 @@ def simulated_piece(
     speed = model.plant.aliases.get("omega", "omega")
     columns = {"time_s": piece.manoeuvre.times()}
     recorded = {
-        si_header(o)[0]: y[0] / si_header(o)[1] for o, y in zip(model.plant.outputs, found.outputs, strict=True)
+        si_header(o)[0]: y[0] / si_header(o)[1] for o, y in zip(model.plant.outputs, simulation.outputs, strict=True)
     }
     for name, state in model.states.items():
         if name == speed and model.plant.records_one_speed:
             columns |= recorded
         elif state.column:
-            columns[state.column] = found.states[name][0]
+            columns[state.column] = simulation.states[name][0]
     columns |= recorded
     if speed in model.states and any("output" in e.adds for e in model.effects):
-        columns[model.states[speed].column or f"{speed}_state"] = found.states[speed][0]
+        columns[model.states[speed].column or f"{speed}_state"] = simulation.states[speed][0]
     return columns
 
 

@@ -142,8 +142,8 @@ class Start:
         """Return signals and d signal / d constant about one start, all in one population, by central differences."""
         n, moves = len(constants), MOVE * self.size * np.eye(len(constants))
         starts = np.concatenate([constants[np.newaxis], constants + moves, constants - moves])
-        found = self.signals(np.repeat(starts, len(population), axis=0), np.tile(population, (len(starts), 1)))
-        each = found.reshape(len(found), len(starts), len(population), -1).swapaxes(0, 1)
+        signals = self.signals(np.repeat(starts, len(population), axis=0), np.tile(population, (len(starts), 1)))
+        each = signals.reshape(len(signals), len(starts), len(population), -1).swapaxes(0, 1)
         return each[0], (each[1 : 1 + n] - each[1 + n :]) / (2.0 * MOVE * self.size)
 
     @cached_property

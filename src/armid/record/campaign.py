@@ -383,11 +383,11 @@ def tolerances_of(
     for name in told:
         if name not in declared and name != DEFAULT:
             raise unknown_name("constant", name, [*declared, DEFAULT], f"{where}, tolerances")
-    of_records, found = set_by_records(plant), {}
+    of_records, tolerances = set_by_records(plant), {}
     for name, usual in declared.items():
         otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT, usual or 0.0)
-        found[name] = told.get(name, otherwise)
-    return {name: tolerance for name, tolerance in found.items() if tolerance > 0.0}
+        tolerances[name] = told.get(name, otherwise)
+    return {name: tolerance for name, tolerance in tolerances.items() if tolerance > 0.0}
 
 
 def priors_of(

@@ -77,10 +77,10 @@ class StartCorrection:
         seen = np.concatenate([outputs[place][:, samples] for place, samples in pairs], axis=1)
         # no matrix product: its rounding of one candidate may depend on how many others there are
         lacking = np.einsum("cn,sn->cs", self.measured - seen, self.gain) + self.offset
-        found = outputs.copy()
+        signals = outputs.copy()
         for place, slopes in zip(self.places, self.slopes.swapaxes(0, 1), strict=True):
-            found[place] += np.einsum("cs,sn->cn", lacking, slopes[:, : outputs.shape[2]])
-        return found
+            signals[place] += np.einsum("cs,sn->cn", lacking, slopes[:, : outputs.shape[2]])
+        return signals
 
 
 @dataclass(frozen=True, eq=False)

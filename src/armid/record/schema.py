@@ -77,9 +77,9 @@ def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
     """Return a kind of fewer values; schema: how JSON Schema says the test, nothing where it cannot."""
 
     def both(value: object) -> Any:
-        found = kind(value)
-        if test(found):
-            return found
+        accepted = kind(value)
+        if test(accepted):
+            return accepted
         raise KindError(value)
 
     return Kind(both, {**kind.schema, **schema})

@@ -260,16 +260,17 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
     try:
         # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
         is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        found = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
+        numbers = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
     except sqlite3.DatabaseError as error:
         if error.sqlite_errorname != "SQLITE_NOTADB":
             raise
         raise ArmidError(f"{path} is not a store of a study: another file has its name") from error
-    if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
+    if numbers == [APPLICATION, FORMAT] or (may_be_new and is_empty):
         return
-    if found[0] != APPLICATION:
+    if numbers[0] != APPLICATION:
         raise ArmidError(f"{path} is not a store of a study: another program's data, or nothing, is in it")
-    raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
+    raise ArmidError(f"{path} is a store of format {numbers[1]}, {FORMAT} is expected: another version of armid "
+                     "wrote it")  # fmt: skip
 
 
 @contextmanager

@@ -188,14 +188,14 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
 
     From the simulated slope: that of the measured signal is mostly noise.
     """
-    found = []
+    changes = []
     for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
         replay, record = base.replays[i], base.data.each[i]
         step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
                                   for p, own in zip(replay.pieces, replay.record.samples, strict=True)])  # fmt: skip
-        found.append(-np.gradient(simulated[0], record.spacing) * (1.0 if fault.kind == "late" else step * samples))
-    return found
+        changes.append(-np.gradient(simulated[0], record.spacing) * (1.0 if fault.kind == "late" else step * samples))
+    return changes
 
 
 def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: float) -> Array:

@@ -50,14 +50,16 @@ def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
     """Return what may be wrong in one of several records; a single record has nothing to compare it with."""
     if len(records.data.records) < 2:
         return []
-    found = []
+    faults = []
     for index, record in enumerate(records.data.each):
         for fault in faults_of(records, index):
             largest = 1.0 if fault.kind == "label" else fault.largest(record)
             place = f"{record.file}:{record.output}" if fault.kind in ("offset", "drift", "gain") else record.file
             name = f"{fault.kind}{'_' if fault.constant else ''}{fault.constant}@{place}"
-            found.append((name, OfRecord(index, fault, largest)))
-    return [Hypothesis("record", name, "", calibration().log_odds("record", len(found)), what) for name, what in found]
+            faults.append((name, OfRecord(index, fault, largest)))
+    return [
+        Hypothesis("record", name, "", calibration().log_odds("record", len(faults)), what) for name, what in faults
+    ]
 
 
 def propose(fit: Fit, known: list[Hypothesis], library: Library) -> list[Proposal]:

@@ -53,19 +53,19 @@ def signals_without_form(fit: Fit, library: Library) -> Signals:
         parts = records.data.by_record((placed * level[:, np.newaxis]).T)
         return replace(records.data, cover=None).white(parts).T
 
-    found: dict[tuple[str, str], Array] = {}
+    columns: dict[tuple[str, str], Array] = {}
     duration = float(np.median([s.knots[-1] - s.knots[0] for s in whole]))
     for port in whole[0].gains:
         for share in LENGTHS:
-            found[port, f"{TIME} ({share:g} of a record)"] = white(block_diag(*(
+            columns[port, f"{TIME} ({share:g} of a record)"] = white(block_diag(*(
                 s.gains[port] @ process(s.knots, share * duration, MOST_IN_TIME) for s in whole)))  # fmt: skip
         for variable in whole[0].variables:
             for factor in whole[0].factors:
                 if variable not in (factor, TIME):
                     name = variable if factor == "1" else f"{variable} x {factor}"
-                    found[port, name] = white(over_variable(whole, port, variable, factor))
-    sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in found.items()}
-    return Signals({key: column / sizes[key] for key, column in found.items()
+                    columns[port, name] = white(over_variable(whole, port, variable, factor))
+    sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in columns.items()}
+    return Signals({key: column / sizes[key] for key, column in columns.items()
                     if np.isfinite(sizes[key]) and sizes[key] > 0.0})  # fmt: skip
 
 
@@ -73,12 +73,12 @@ def places_of(whole: list[Segment], fit: Fit) -> Array:
     """Return where the samples of the segments, outputs of a piece one behind the other, stand in the residual."""
     data = fit.records.data
     start = {replay: int(edge) for replay, edge in zip(fit.records.replays, data.edges, strict=False)}
-    found = []
+    places = []
     for segment in whole:
         for replay in segment.replays:
             first = start[replay] + sum(replay.record.lengths[: segment.index])
-            found.append(first + np.arange(replay.record.lengths[segment.index]))
-    return np.concatenate(found)
+            places.append(first + np.arange(replay.record.lengths[segment.index]))
+    return np.concatenate(places)
 
 
 def process(times: Array, length: float, most: int) -> Array:

@@ -60,8 +60,8 @@ def histories(
     # ends at the best fitness that any of them found with the same seed, that is on the same noise, or at the truth's
     problem = ["case", "setting", "fitness"]
     starts = runs.assign(first=firsts).groupby(problem)["first"].transform("median").to_numpy()
-    found = runs.groupby([*problem, "seed"])["value"].transform("min")
-    bests = runs["case"].map(floors).astype(float).fillna(found).to_numpy()
+    minima = runs.groupby([*problem, "seed"])["value"].transform("min")
+    bests = runs["case"].map(floors).astype(float).fillna(minima).to_numpy()
     cases = runs["case"].to_numpy()
     kept = Histories(grid, *(np.full((len(place), n), np.inf, np.float32)
                              for n in (TARGETS.size, TARGETS.size, grid.size, grid.size)))  # fmt: skip
@@ -266,8 +266,8 @@ class Evidence:
         """Return what a function makes of the runs at a setting; section and answer share it."""
         if (make, setting) not in self._made:
             self._made[make, setting] = make(self, setting)
-        found: T = self._made[make, setting]
-        return found
+        outcome: T = self._made[make, setting]
+        return outcome
 
 
 def is_swarm(variant: str) -> bool:

@@ -168,8 +168,8 @@ def friedman(blocks: Array) -> tuple[float, float]:
     n_cases, n_variants = blocks.shape
     if n_variants < 3 or n_cases < 2 or (blocks == blocks[:, :1]).all():
         return np.nan, np.nan
-    found = friedmanchisquare(*blocks.T)
-    return float(found.statistic), float(found.pvalue)
+    test = friedmanchisquare(*blocks.T)
+    return float(test.statistic), float(test.pvalue)
 
 
 def pair_tests(blocks: DataFrame, runs: DataFrame) -> DataFrame:
