@@ -61,13 +61,13 @@ def tell_points(title: str, points: "Iterator[ContractPoint]", **about: str) -> 
     # what cannot be tried at all is refused before anything is printed
     first = next(points)
     say(title)
-    told = []
+    entries = []
     for point in chain([first], points):
-        told.append({"name": point.name, "passed": point.passed, "sentence": point.sentence})
+        entries.append({"name": point.name, "passed": point.passed, "sentence": point.sentence})
         say(f"  {'ok  ' if point.passed else 'FAIL'} {point.name}: {point.sentence}")
-    failed = sum(not point["passed"] for point in told)
-    say(f"{len(told) - failed} of {len(told)} points hold")
-    give(**about, passed=not failed, points=told)
+    failed = sum(not point["passed"] for point in entries)
+    say(f"{len(entries) - failed} of {len(entries)} points hold")
+    give(**about, passed=not failed, points=entries)
     if failed:
         sys.exit(1)
 

@@ -177,7 +177,7 @@ def campaign_text(name: str) -> str:
 
 
 def synthetic_records() -> dict[str, dict[str, Array]]:
-    return {file: record(*told) for file, told in RECORDS.items()}
+    return {file: record(*arguments) for file, arguments in RECORDS.items()}
 
 
 def record(size: float, frequency: float, seed: int) -> dict[str, Array]:

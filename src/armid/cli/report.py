@@ -120,13 +120,13 @@ def kind_in(folder: Path) -> Kind | None:
     """Return the kind of result that a folder holds, None for a study, whose store may be named itself."""
     if folder.name == STUDY or (folder / STUDY).is_file():
         return None
-    there = [kind for kind in (LOOP, IDENTIFICATION) if (folder / kind.file).is_file()]
-    if len(there) > 1:
-        names = " and ".join(kind.file for kind in there)
+    kinds = [kind for kind in (LOOP, IDENTIFICATION) if (folder / kind.file).is_file()]
+    if len(kinds) > 1:
+        names = " and ".join(kind.file for kind in kinds)
         raise ArmidError(f"{folder} holds {names}, which two commands wrote: one of them is expected")
-    if not there and (folder / IDENTIFIABILITY.file).is_file():
+    if not kinds and (folder / IDENTIFIABILITY.file).is_file():
         return IDENTIFIABILITY
-    if there:
-        return there[0]
+    if kinds:
+        return kinds[0]
     names = f"{STUDY} of `armid study`, {LOOP.file} of `{LOOP.command}` or {IDENTIFICATION.file}"
     raise ArmidError(f"{folder} holds no result: {names} of `{IDENTIFICATION.command}` is expected")

@@ -139,8 +139,8 @@ def tune_command(
         say(f"wrote tuned.toml to {folder}")
         answer = document.said
     say(*words(ending))
-    give(study=known.name, folder=folder, answer=answer, tuned={each.label: each.options for each in tunings},
-         areas={each.label: {"default": each.default, "tuned": each.tuned} for each in tunings},
+    give(study=known.name, folder=folder, answer=answer, tuned={tuning.label: tuning.options for tuning in tunings},
+         areas={tuning.label: {"default": tuning.default, "tuned": tuning.tuned} for tuning in tunings},
          interrupted=ending.interrupted)  # fmt: skip
     if ending.interrupted:
         sys.exit(130)

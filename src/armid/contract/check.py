@@ -67,11 +67,11 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         middle = space.complete(0.5 * (space.low + space.high)[np.newaxis, space.free])
         for replay in (one for record in campaign.records for one in ready_at(middle, record, model).each):
             signal = replay.signal(middle)[0]
-            whole = bool(np.isfinite(signal).all())
-            size = f"up to {np.max(np.abs(signal)):.3g}" if whole else "diverges"
+            is_finite = bool(np.isfinite(signal).all())
+            size = f"up to {np.max(np.abs(signal)):.3g}" if is_finite else "diverges"
             measured = f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
             text = f"simulated {size} at mid-range, measured up to {measured}"
-            yield ContractPoint(f"moves in {replay.record.file}", whole, text)
+            yield ContractPoint(f"moves in {replay.record.file}", is_finite, text)
         yield from plausible(data_issues(campaign, model, space))
     except ArmidError as error:
         yield ContractPoint("model", False, str(error))

@@ -100,7 +100,7 @@ class KernelParts:
         guards = [*self.latch_guards, *self.kinks]
         times = [f"time_of_{k}" for k in self.latches]
         carried = [*self.latches, *times, *self.states, *(f"ga_{g}" for g in guards)]
-        late_inputs, late_states = ([one.name for one in several] for several in (self.late_inputs, self.late_states))
+        late_inputs, late_states = ([one.name for one in late] for late in (self.late_inputs, self.late_states))
         driven = [*self.inputs, *late_inputs]
         prefixed = ((self.states, OF_STATES), (driven, OF_INPUTS), (self.outputs, OF_OUTPUTS), (guards, OF_GUARDS),
                     (carried, OF_CARRIED), (late_states, OF_LATE_STATES))  # fmt: skip
@@ -237,7 +237,7 @@ class Emitter:
             for n in late if n.kind == kind
         ] for kind, known in (("late_input", inputs), ("late_state", states))}  # fmt: skip
         n_moving = len({n.by for n in late if n.key in seen})
-        delays = [" + ".join(map(variable, several)) for several in by]
+        delays = [" + ".join(map(variable, terms)) for terms in by]
         return delays, n_moving, made["late_input"], made["late_state"]
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:

@@ -119,10 +119,10 @@ def advise(
     promising = sorted(possible, key=lambda f: rank(mean_of(powers[f], 0), powers[f]), reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
     outcomes = side_by_side(lambda f: simulated(rivals, f, white, draws), promising, threads)
-    each = [(f, *one) for f, one in zip(promising, outcomes, strict=True)]
+    ranking = [(f, *one) for f, one in zip(promising, outcomes, strict=True)]
     now = max(float(entropy(probabilities(rivals))), 1e-9)
-    each.sort(key=lambda e: rank(e[1] / now, e[2]), reverse=True)
-    return tuple(advice_of(rivals, *one) for one in each)
+    ranking.sort(key=lambda e: rank(e[1] / now, e[2]), reverse=True)
+    return tuple(advice_of(rivals, *one) for one in ranking)
 
 
 def rank(merit: float, powers: Powers) -> tuple[float, float]:

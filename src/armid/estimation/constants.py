@@ -111,11 +111,11 @@ def common_factors(names: Sequence[str], slopes: Array, products: Sequence[Produ
     """
     if len(names) + len(products) < 2:
         return ()
-    every = np.column_stack([slopes, *(p.slope for p in products)])
-    lengths = np.linalg.norm(every, axis=0)
+    columns = np.column_stack([slopes, *(p.slope for p in products)])
+    lengths = np.linalg.norm(columns, axis=0)
     labels = [*names, *(p.public.removeprefix(NAMED) for p in products)]
     seen = [i for i, length in enumerate(lengths) if length > NOTHING * lengths.max()]
-    small: Array = np.asarray(np.linalg.qr(every[:, seen] / lengths[seen], mode="r"))
+    small: Array = np.asarray(np.linalg.qr(columns[:, seen] / lengths[seen], mode="r"))
     said: dict[frozenset[str], str] = {}
     for place, i in enumerate(seen):
         others = [k for k in range(len(seen)) if k != place]

@@ -94,8 +94,8 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
         if not issues and LEFT < errors[worst] < np.inf:
             issues = [beyond(train[worst].file, float(errors[worst]))]
     issues += () if issues else begun_elsewhere(trial, train, z)
-    told = {s.record for s in issues if s.kind == "time"}
-    return (*seen, *(s for s in times if not told & {"", s.record}), *issues)
+    files = {s.record for s in issues if s.kind == "time"}
+    return (*seen, *(s for s in times if not files & {"", s.record}), *issues)
 
 
 def filled(record: Record) -> Record:
@@ -114,8 +114,8 @@ class Trial:
 
     def problem(self, records: Sequence[Record]) -> WeightedRecords:
         rough = Calibration(Schedule(SUBSTEPS), np.nan, True)
-        whole = [ReadyRecord(r, self.model, (rough,) * len(r.pieces)) for r in records]
-        ready = tuple(one for each in whole for one in each.each)
+        prepared = [ReadyRecord(r, self.model, (rough,) * len(r.pieces)) for r in records]
+        ready = tuple(one for record in prepared for one in record.each)
         # of an angle or a position the zero says nothing
         moved = [r.measured - (np.mean(r.measured) if r.record.unit in ("rad", "m") else 0.0) for r in ready]
         return WeightedRecords(ready, self.space, tuple(1.0 / max(float(np.linalg.norm(x)), 1e-300) for x in moved))
@@ -151,10 +151,10 @@ class Trial:
         if step < 2 or len(record.pieces) > 1 or record.pieces[0].start_index:
             return record
         Z = self.spread([record], N_BEST)
-        whole = self.signals(record, Z)
+        signals = self.signals(record, Z)
         while step > 1:
             rarer = every(record, step, self.model.plant)
-            kept = [signal[:, -record.pieces[0].window.start % step :: step] for signal in whole]
+            kept = [signal[:, -record.pieces[0].window.start % step :: step] for signal in signals]
             pairs = zip(self.signals(rarer, Z), kept, strict=True)
             if all(float(np.linalg.norm(a - b)) <= SAME * float(np.linalg.norm(b)) for a, b in pairs):
                 return rarer
@@ -273,8 +273,8 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
         best = min(hidden, key=lambda f: f[0], default=None)
         return [] if best is None else [best[2].issue(best[1], before, best[0])]
     first = min(sufficient, key=lambda f: f[0])[1]
-    told = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in sufficient]
-    return chosen(first, before, told)
+    pairs = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in sufficient]
+    return chosen(first, before, pairs)
 
 
 def of_two(issues: Sequence[DataIssue], train: Sequence[Record]) -> list[DataIssue]:

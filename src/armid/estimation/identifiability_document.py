@@ -136,10 +136,10 @@ def offer_table(result: Mapping[str, Any], most: int = MOST_OFFERS) -> Table:
     n_all = len(result["parameters"])
     some = "" if len(names) == n_all else f", {len(names)} of {n_all} parameters"
     repeats = [offer for offer in offers[most:] if " once more" in offer["words"]][:1]
-    told = {name: result["parameters"][name] for name in names}
-    rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in told.items()), 1.0)]
+    entries = {name: result["parameters"][name] for name in names}
+    rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in entries.items()), 1.0)]
     for offer in (*offers[:most], *repeats):
-        cells = [deviation_text(name, p, offer["deviation"][name]["after"]) for name, p in told.items()]
+        cells = [deviation_text(name, p, offer["deviation"][name]["after"]) for name, p in entries.items()]
         rows.append((offer["words"], *cells, offer["gain"]))
     columns = ["one more record of", *names, Column("gain", "gain", ".3g")]
     return table(f"What one more manoeuvre would buy (deviations{some})", columns, rows)
@@ -224,15 +224,16 @@ def by_name(names: Sequence[str], values: Array) -> dict[str, float]:
 
 def remarks(examination: Examination) -> list[str]:
     """Return what a reader must know, one sentence each: groups first, the best offer last."""
-    names, fisher, told = examination.space.free_names, examination.information.fisher, entries_of(examination)
+    names, fisher, entries = examination.space.free_names, examination.information.fisher, entries_of(examination)
     said = [group_remark(examination, group) for group in examination.groups]
     said += [f"{p.name} is not seen at all in these records: any value in the box leaves them as they are."
              for p in examination.profiles if not fisher[names.index(p.name), names.index(p.name)] > 0.0]  # fmt: skip
     said += [text for p in examination.profiles if (text := profile_remark(examination, p))]
     said += [f"With the constants within their tolerances, {text}." for text in examination.combinations]
     if (examination.wider > examination.information.deviation).any():
-        each = (f"{n} {deviation_text(n, told[n], wide)}" for n, wide in zip(names, examination.wider, strict=True))
-        said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(each)}.")
+        deviations = (f"{n} {deviation_text(n, entries[n], wide)}"
+                      for n, wide in zip(names, examination.wider, strict=True))  # fmt: skip
+        said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(deviations)}.")
     said += point_remarks(examination) + level_remarks(examination)
     if examination.offers:
         return [*said, f"One more record, {offer_text(examination, examination.offers[0])}."]
@@ -242,10 +243,10 @@ def remarks(examination: Examination) -> list[str]:
 def group_remark(examination: Examination, group: Group) -> str:
     span = (examination.space.high - examination.space.low)[examination.space.free]
     leader = int(np.argmax(np.abs(group.direction)))
-    moves, told = [], entries_of(examination)
+    moves, entries = [], entries_of(examination)
     for name, share in zip(group.names, group.direction, strict=True):
         change = 0.01 * float(share) * float(span[examination.space.free_names.index(name)])
-        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(name, told[name], abs(change))} of {name}")
+        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(name, entries[name], abs(change))} of {name}")
     followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
             f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
@@ -267,9 +268,9 @@ def profile_remark(examination: Examination, profile: Profile) -> str:
     if low != high:
         side = "above" if low else "below"
         return f"{value} is not bounded {side}: the 95 % interval runs into the box."
-    told, by = (interval_text(a * factor, b * factor) for a, b in ((profile.low, profile.high), profile.curvature))
+    interval, by = (interval_text(a * factor, b * factor) for a, b in ((profile.low, profile.high), profile.curvature))
     unit = "" if profile.unit == "1" else f" {shown(0.0, profile.unit)[1]}"
-    return (f"{value}: the profile says {told}{unit}, the curvature {by}: the records are not symmetric about the "
+    return (f"{value}: the profile says {interval}{unit}, the curvature {by}: the records are not symmetric about the "
             "minimum, or a bound holds what would make up for it; believe the profile.")  # fmt: skip
 
 

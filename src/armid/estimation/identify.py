@@ -401,32 +401,32 @@ def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors 
 
 
 def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
-    each = [record_errors(r, candidate) for r in replays]
+    errors = [record_errors(r, candidate) for r in replays]
     n = np.array([r.record.n_samples for r in replays], dtype=float)
     duration = np.array([r.record.duration for r in replays])
 
     def pooled(values: list[float], weights: Array) -> float:
-        told = ~np.isnan(values)
-        return float(np.sum(np.array(values)[told] * weights[told]) / weights[told].sum()) if told.any() else np.nan
+        known = ~np.isnan(values)
+        return float(np.sum(np.array(values)[known] * weights[known]) / weights[known].sum()) if known.any() else np.nan
 
-    chi2 = [e.chi2_per_sample for e in each if e.chi2_per_sample is not None]
+    chi2 = [e.chi2_per_sample for e in errors if e.chi2_per_sample is not None]
     return Errors(
-        rmse=float(np.sqrt(pooled([e.rmse**2 for e in each], n))),
-        nrmse=float(np.sqrt(pooled([e.nrmse**2 for e in each], n))),
-        chi2_per_sample=pooled(chi2, n) if len(chi2) == len(each) else None,
-        s=pooled([e.s for e in each], duration),
-        s1=pooled([e.s1 for e in each], duration),
-        s2=pooled([e.s2 for e in each], duration),
-        unit=each[0].unit,
+        rmse=float(np.sqrt(pooled([e.rmse**2 for e in errors], n))),
+        nrmse=float(np.sqrt(pooled([e.nrmse**2 for e in errors], n))),
+        chi2_per_sample=pooled(chi2, n) if len(chi2) == len(errors) else None,
+        s=pooled([e.s for e in errors], duration),
+        s1=pooled([e.s1 for e in errors], duration),
+        s2=pooled([e.s2 for e in errors], duration),
+        unit=errors[0].unit,
         span=float(np.ptp(np.concatenate([r.measured for r in replays]))),
     )
 
 
 def outputs_entry(replays: Sequence[Replay]) -> dict[str, dict[str, Any]]:
     """Return output -> its unit and its noise, the mean over records, in the order of the plant, for JSON."""
-    each = [(o, [r.record.noise.rms for r in replays if r.place == i])
-            for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
-    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in each if rms}
+    levels = [(o, [r.record.noise.rms for r in replays if r.place == i])
+              for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
+    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in levels if rms}
 
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:

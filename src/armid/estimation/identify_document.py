@@ -62,7 +62,7 @@ def identify_document(
     first = [text for text in details["known_first"] if text in said]
     correlated = correlation_tables(result["correlation"])
     remarks = remark_parts(first, [text for text in said if text not in first])
-    each = [(file, e["role"], e) for file, e in result["error_by_record"].items()]
+    rows = [(file, e["role"], e) for file, e in result["error_by_record"].items()]
     value = result["fitness_value"]
     search = [
         ("identifier", result["identifier"]),
@@ -72,7 +72,7 @@ def identify_document(
         ("engine's error [rad/s or m/s]",
          "not known" if result["engine_error"] is None else f"{result['engine_error']:.2g}"),
     ]  # fmt: skip
-    figures, by_record = stored_figures(FIGURES, svgs), error_table("Each record", ["record", "role"], each, unit)
+    figures, by_record = stored_figures(FIGURES, svgs), error_table("Each record", ["record", "role"], rows, unit)
     sections = (
         Section("Parameters", (parameters,)),
         fit_section(details),
@@ -176,8 +176,8 @@ def result_of(identification: Identification) -> dict[str, Any]:
     by_file = errors_by_file(replays, identification.candidate)
     noises: dict[str, dict[str, Any]] = {}
     for noise, r in ((r.record.noise, r) for r in replays):
-        told = {"rms": noise.rms, "mean": noise.mean, "source": noise.source}
-        noises.setdefault(r.record.file, dict(told, outputs={}))["outputs"][r.record.output] = told
+        entry = {"rms": noise.rms, "mean": noise.mean, "source": noise.source}
+        noises.setdefault(r.record.file, dict(entry, outputs={}))["outputs"][r.record.output] = entry
     return plain({
         "campaign": identification.campaign.name,
         "plant": identification.model.plant.name,
@@ -239,8 +239,8 @@ def ranked(identification: Identification) -> list[str]:
     said += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
     pairs = collinear(information)
     if pairs:
-        told = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs)
-        said.append(f"Hardly to be told apart on these records (correlation): {told}; a change of one is made up for "
+        text = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs)
+        said.append(f"Hardly to be told apart on these records (correlation): {text}; a change of one is made up for "
                     "by the other.")  # fmt: skip
     if identification.n_failed:
         said.append(f"{identification.n_failed} of {identification.used} candidates diverged and were given a penalty.")
@@ -315,7 +315,7 @@ def misfit_remarks(identification: Identification) -> list[str]:
              for r, level in pairs if level.from_residual]  # fmt: skip
     if not above:
         return []
-    told = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_NAMED])
+    text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_NAMED])
     more = f" (so it is in {len(above)} records)" if len(above) > MOST_NAMED else ""
     why = "the model, in which nothing is free, lacks something."
     if identification.space.free.any():
@@ -323,7 +323,7 @@ def misfit_remarks(identification: Identification) -> list[str]:
             "the model lacks something, or the search has not come to the minimum; the intervals are widened to the "
             "residual and its correlation in time, and hold only as far as what is lacking averages out."
         )
-    return [f"The residual is this many times the noise: {told}{more}: {why}"]
+    return [f"The residual is this many times the noise: {text}{more}: {why}"]
 
 
 def noise_remark(replay: Replay) -> str:

@@ -104,8 +104,8 @@ class LeastSquaresProblem:
         for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1)):
             shift = float(np.clip(z[i], STEP, 1.0 - STEP) - z[i])
             sides = ((signals[1 + i], shift + STEP), (signals[1 + n + i], shift - STEP))
-            whole = [(signal - here) / step for signal, step in sides if step != 0.0 and np.isfinite(signal).all()]
-            slopes[i] = whole[0] if whole and np.isfinite(here).all() else 0.0
+            quotients = [(signal - here) / step for signal, step in sides if step != 0.0 and np.isfinite(signal).all()]
+            slopes[i] = quotients[0] if quotients and np.isfinite(here).all() else 0.0
         return np.asarray(self.measured - here), np.ascontiguousarray(slopes.T)
 
 
@@ -142,8 +142,8 @@ def weighted_records(
     if weights is None:
         records = [r.record for r in replays]
         levels = [r.noise.rms for r in records]
-        each = by_sensor(records, levels)
-        pooled = np.array([np.sqrt(np.mean(np.square(each[sensor_of(r)]))) for r in records])
+        groups = by_sensor(records, levels)
+        pooled = np.array([np.sqrt(np.mean(np.square(groups[sensor_of(r)]))) for r in records])
         weights = list(1.0 / (pooled if all(levels) else output_sizes(replays)))
     return WeightedRecords(replays, space, tuple(map(float, weights)))
 

@@ -124,10 +124,10 @@ def levels_left(
         step, moved = replay.record.signals[0].sensor.step / np.sqrt(12.0), changing(replay.measured)
         sampled = part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part
         least.append(max(difference_rms(sampled), step))
-    each, noises = by_sensor([r.record for r in replays], least), []
+    groups, noises = by_sensor([r.record for r in replays], least), []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
-        rms = max(float(np.median(each[sensor])), noise_floor(sensor, replay.model.plant))
+        rms = max(float(np.median(groups[sensor])), noise_floor(sensor, replay.model.plant))
         noises.append(level if level.known or level.rms <= rms else white_level(rms, 0))
     return tuple(noises)
 

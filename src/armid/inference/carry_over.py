@@ -179,13 +179,13 @@ def predicting_best(
 def parts_of(data: WhitenedData) -> list[NDArray[np.int64]]:
     """Return what is left out in turn, as numbers of samples: manoeuvres with their repeats, or blocks of time."""
     names = [r.manoeuvre_file for r in data.each]
-    each = data.by_record(np.arange(data.edges[-1]))
+    indices = data.by_record(np.arange(data.edges[-1]))
     distinct = list(dict.fromkeys(names))
     if len(distinct) > 1:
         # of many manoeuvres several are left out together, spread over the campaign
         groups = [distinct[i::MOST_PARTS] for i in range(min(MOST_PARTS, len(distinct)))]
-        return [np.concatenate([x for x, n in zip(each, names, strict=True) if n in group]) for group in groups]
-    blocks = [np.array_split(x, MOST_PARTS) for x in each]
+        return [np.concatenate([x for x, n in zip(indices, names, strict=True) if n in group]) for group in groups]
+    blocks = [np.array_split(x, MOST_PARTS) for x in indices]
     return [np.concatenate(block) for block in zip(*blocks, strict=True)]
 
 
@@ -195,8 +195,8 @@ def misses(fit: Fit) -> Array:
     for part in parts_of(data):
         sound = data.sound.copy()
         sound[part] = 0.0
-        posed = replace(fit.records, data=replace(data, sound=sound))
-        z = descend(posed, [fit.z], ROUGHLY) if fit.n_free else fit.z
+        problem = replace(fit.records, data=replace(data, sound=sound))
+        z = descend(problem, [fit.z], ROUGHLY) if fit.n_free else fit.z
         left = fit.records.plain.residuals(z)[0][part]
         squares.append(float(np.mean(left**2)) if np.isfinite(left).all() else np.inf)
     return np.array(squares)

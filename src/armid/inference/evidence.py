@@ -229,9 +229,9 @@ class Forecast:
 
     def best(self, n: int) -> list[tuple[int, float]]:
         """Return the best variants with their strengths, the best first."""
-        each = logsumexp(self.log_factor, axis=1)
-        order = np.argsort(-each, kind="stable")[:n]
-        return [(int(i), float(self.strength[i, np.argmax(self.log_factor[i])])) for i in order if np.isfinite(each[i])]
+        logs = logsumexp(self.log_factor, axis=1)
+        order = np.argsort(-logs, kind="stable")[:n]
+        return [(int(i), float(self.strength[i, np.argmax(self.log_factor[i])])) for i in order if np.isfinite(logs[i])]
 
 
 def forecast(about: Expansion, proposal: Proposal) -> Forecast:
@@ -319,8 +319,8 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
         return 0.0
     size = np.array(sizes)
     covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
-    each = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
-    return float(density + logsumexp(each) - np.log(len(SCALES)) - np.sum(np.log(size)))
+    densities = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
+    return float(density + logsumexp(densities) - np.log(len(SCALES)) - np.sum(np.log(size)))
 
 
 def doubts_of(fit: Fit, library: Library) -> Array:

@@ -164,8 +164,8 @@ class Inference:
         That of noise is the one of `identify`: what the model leaves counts as noise.
         """
         exploration, fit = self.found, self.found.fits[model]
-        whole, n = expansion_of(fit, exploration.scale(), exploration.library), fit.n_free
-        narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(whole.spread)[:n])
+        expansion, n = expansion_of(fit, exploration.scale(), exploration.library), fit.n_free
+        narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(expansion.spread)[:n])
         wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))
         triples = zip(fit.values.items(), wide.tolist(), narrow.tolist(), strict=True)
         return {name: Interval(*in_box(fit.records.space, name, v - w, v + w), v - a, v + a)
@@ -197,8 +197,8 @@ def sentence_of(chances: Mapping[str, Any]) -> str:
 
 def listed(probabilities: Mapping[str, float]) -> dict[str, float]:
     """Return the probabilities that are listed, the largest first."""
-    told = {name: p for name, p in probabilities.items() if p >= LISTED}
-    return dict(sorted(told.items(), key=lambda pair: -pair[1]))
+    likely = {name: p for name, p in probabilities.items() if p >= LISTED}
+    return dict(sorted(likely.items(), key=lambda pair: -pair[1]))
 
 
 def prepared(
@@ -262,8 +262,8 @@ def prepared(
     chances = {**campaign.chances, **(priors or {})}
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
     library = replace(library, reach=REACH, priors=chances, known=known)
-    posed = library.problem(())
-    return with_noise(*with_scales(library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)))
+    problem = library.problem(())
+    return with_noise(*with_scales(library.about(with_fitted_starts(problem.replays, problem.space), library.misfit)))
 
 
 def infer(library: Library, declared: Fit) -> Inference:
@@ -278,9 +278,9 @@ def infer(library: Library, declared: Fit) -> Inference:
 
 def declared_fit(library: Library) -> Fit:
     """Return the declared model at its estimate, from starts that are spread over the box."""
-    posed = library.problem(())
-    starts = spread_starts(posed) if posed.space.free.any() else ()
-    return accurate(fit_from(posed, (), starts), library)
+    problem = library.problem(())
+    starts = spread_starts(problem) if problem.space.free.any() else ()
+    return accurate(fit_from(problem, (), starts), library)
 
 
 def with_scales(library: Library) -> tuple[Library, Fit]:

@@ -173,10 +173,10 @@ class Library:
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""
-        there = set(model.parameters)
+        names = set(model.parameters)
         space = space_of(
-            model, self.overrides, {n: b for n, b in self.bounds.items() if n in there},
-            {n: v for n, v in self.fixed.items() if n in there},
+            model, self.overrides, {n: b for n, b in self.bounds.items() if n in names},
+            {n: v for n, v in self.fixed.items() if n in names},
         )  # fmt: skip
         for name, (low, high) in self.widened.items():
             space = space.with_bounds(name, low, high)
@@ -352,9 +352,9 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
 
 
-def finest(*several: Sequence[Calibration]) -> tuple[Calibration, ...]:
+def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     """Return of several calibrations of the same pieces the finest for each, of equal ones the first."""
-    return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*several, strict=True))
+    return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*calibrations, strict=True))
 
 
 def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:

@@ -54,8 +54,8 @@ class Posterior:
 
     @cached_property
     def weights(self) -> Array:
-        each = np.array([a.log_evidence / self.temperature + a.log_prior for a in self.atoms])
-        return np.asarray(np.exp(each - logsumexp(each)))
+        logs = np.array([a.log_evidence / self.temperature + a.log_prior for a in self.atoms])
+        return np.asarray(np.exp(logs - logsumexp(logs)))
 
     @cached_property
     def means(self) -> Array:
@@ -111,8 +111,8 @@ class Posterior:
     def of_kind(self, kind: str, beside_unknown: bool = False) -> dict[str, float]:
         """Return the probabilities of the hypotheses of a kind, the most probable first."""
         names = sorted({n for s in self.sets for k, n in s if k == kind})
-        each = ((n, self.probability(kind, n, beside_unknown)) for n in names)
-        return dict(sorted(each, key=lambda pair: -pair[1]))
+        pairs = ((n, self.probability(kind, n, beside_unknown)) for n in names)
+        return dict(sorted(pairs, key=lambda pair: -pair[1]))
 
     def quantile(self, parameter: str, share: float) -> float:
         """Return the value below which a share of the mixture lies."""
@@ -137,8 +137,8 @@ class Posterior:
         i = self.parameters.index(parameter)
         first = int(np.argmax(self.weights))
         best, means, deviations = self.atoms[first], self.means[:, i], self.deviations[:, i]
-        whole, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), deviations[first] ** 2
-        if max(whole, own) <= 0.0:
+        total, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), deviations[first] ** 2
+        if max(total, own) <= 0.0:
             return []
         away: dict[str, float] = {}
         for j, (atom, weight) in enumerate(zip(self.atoms, self.weights, strict=True)):
@@ -148,10 +148,10 @@ class Posterior:
                 away[name] = away.get(name, 0.0) + float(more) / len(names)
         # Only what widens an interval is a cause; other models share their part of the variance in these proportions.
         away = {name: size for name, size in away.items() if size > 0.0}
-        scale = max(whole - own, 0.0) / max(sum(away.values()), 1e-300)
+        scale = max(total - own, 0.0) / max(sum(away.values()), 1e-300)
         variances = {"noise": min(noise**2, own), beside: max(own - noise**2, 0.0)}
         variances |= {name: scale * size for name, size in away.items()}
-        shares = {name: float(size) / max(whole, own) for name, size in variances.items() if size > 0.0}
+        shares = {name: float(size) / max(total, own) for name, size in variances.items() if size > 0.0}
         return sorted(shares.items(), key=lambda pair: (-pair[1], pair[0]))
 
 

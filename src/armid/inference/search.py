@@ -105,8 +105,8 @@ class Exploration:
     def ranked(self) -> list[tuple[Hypotheses, float]]:
         """Return the models with their log posteriors, the best first."""
         scale = self.scale()
-        each = [(model, self.log_posterior(model, scale)) for model in self.fits]
-        return sorted(each, key=lambda pair: -pair[1])
+        ranking = [(model, self.log_posterior(model, scale)) for model in self.fits]
+        return sorted(ranking, key=lambda pair: -pair[1])
 
     def take(self, model: Hypotheses, fit: Fit | None) -> bool:
         """Keep a fit where it is better than the one that is known; tell whether it is."""
@@ -169,8 +169,8 @@ def without_denied(exploration: Exploration, denied: Hypotheses, standing: Hypot
     gone = {h.public for h in denied}
     fits = {m: fit for m, fit in exploration.fits.items()
             if len(m) <= len(standing) and not any(h.public in gone for h in m)}  # fmt: skip
-    forecasts = {m: [f for f in several if f.proposal.hypothesis.public not in gone]
-                 for m, several in exploration.forecasts.items() if m in fits and len(m) < len(standing)}  # fmt: skip
+    forecasts = {m: [f for f in ahead if f.proposal.hypothesis.public not in gone]
+                 for m, ahead in exploration.forecasts.items() if m in fits and len(m) < len(standing)}  # fmt: skip
     left = replace(exploration, fits=fits, forecasts=forecasts, noise=exploration.scale(),
                    _evidence=WeakKeyDictionary())  # fmt: skip
     add_signals(left, [m for m, _ in left.ranked()[:N_BESIDE]])
@@ -290,8 +290,8 @@ def exchanges(exploration: Exploration, model: Hypotheses, fit: Fit, limit: floa
     The effect that explains most alone may be wrong together with the others.
     """
     scale, trials = exploration.scale(), []
-    several = [h for h in sorted(model) if h.kind == "effect"]
-    for hypothesis in several if len(several) > 1 else []:
+    hypotheses = [h for h in sorted(model) if h.kind == "effect"]
+    for hypothesis in hypotheses if len(hypotheses) > 1 else []:
         less = model - {hypothesis}
         if less not in exploration.fits:
             again = unless_diverged(partial(without, fit, hypothesis, exploration.library, scale.weight))
@@ -364,15 +364,15 @@ def name_of_size(hypothesis: Hypothesis) -> str:
 
 
 def near(
-    fit: Fit, active: tuple[EffectKey, ...], each: Sequence[dict[str, float]], library: Library, weight: float,
+    fit: Fit, active: tuple[EffectKey, ...], guesses: Sequence[dict[str, float]], library: Library, weight: float,
     limit: float = np.inf,
 ) -> Fit | None:  # fmt: skip
     """Return the model with some effects fitted from the best of several values, other unknowns as in a fit."""
-    posed = effects.beside(fit, active, library)
-    starts = [start_of(posed, values) for values in each]
+    problem = effects.beside(fit, active, library)
+    starts = [start_of(problem, values) for values in guesses]
     if len(starts) > 1:
-        starts = [starts[int(np.argmin(projected(fit, posed, weight).chi2(np.array(starts))))]]
-    return effects.fitted(fit, posed, active, starts, library, weight, limit)
+        starts = [starts[int(np.argmin(projected(fit, problem, weight).chi2(np.array(starts))))]]
+    return effects.fitted(fit, problem, active, starts, library, weight, limit)
 
 
 def swaps(
@@ -392,11 +392,11 @@ def swaps(
         about = Expansion(replace(fit, others=()), scale, exploration.library, none, key)
         others = {k.public for k in fit.active if k != key}
         wide = effects.propose_with_free_shapes(fit, key, exploration.known, exploration.library)
-        each = [likest(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
-        each.sort(key=lambda pair: pair[0])
-        each = list({one[1].hypothesis: one for one in each}.values())[::-1]
-        forms = [one for one in each if one[1].hypothesis.name == hypothesis.name]
-        for _, proposal, variant, strength in [*forms, *each[:N_SWAPPED]]:
+        ranking = [likest(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
+        ranking.sort(key=lambda pair: pair[0])
+        ranking = list({one[1].hypothesis: one for one in ranking}.values())[::-1]
+        forms = [one for one in ranking if one[1].hypothesis.name == hypothesis.name]
+        for _, proposal, variant, strength in [*forms, *ranking[:N_SWAPPED]]:
             other = model - {hypothesis} | {proposal.hypothesis}
             if not is_complete(exploration, other):  # a known rival may have been fitted from afar
                 start = partial(swapped, fit, key, proposal, variant, strength)
@@ -438,8 +438,8 @@ def swapped(
     active = (*(k for k in fit.active if k != key), new)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     shares = np.clip(strength * STRENGTHS, 0.01, library.reach)
-    each = [values | proposal.grid[variant].at(float(share)) for share in shares]
-    return near(fit, active, each, library, weight, limit)
+    guesses = [values | proposal.grid[variant].at(float(share)) for share in shares]
+    return near(fit, active, guesses, library, weight, limit)
 
 
 def pairs(

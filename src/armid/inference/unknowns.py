@@ -109,15 +109,15 @@ class ProjectedRecords(LeastSquaresProblem):
         return self.cover.white(self.records.signals(Z))
 
 
-def projected(fit: Fit, posed: WhiteRecords, weight: float) -> LeastSquaresProblem:
+def projected(fit: Fit, problem: WhiteRecords, weight: float) -> LeastSquaresProblem:
     """Return a problem whose further unknowns are those of a fit, with the columns that they have there.
 
-    posed: the records with the values that the unknowns have in the fit. weight: of each square, see `evidence.Scale`.
+    problem: with the values that the unknowns have in the fit. weight: of each square, see `evidence.Scale`.
     The problem itself where there are none.
     """
     if not fit.others:
-        return posed
-    return about_known(posed, fit.columns, np.array([f.value for f in fit.others]), weight)
+        return problem
+    return about_known(problem, fit.columns, np.array([f.value for f in fit.others]), weight)
 
 
 def about_known(records: WhiteRecords, columns: Array, values: Array, weight: float) -> ProjectedRecords:
@@ -154,8 +154,8 @@ def freed(
     (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
     damping, columns, is_new = FIRST, columns_about(base.plain, unknowns, values, z, kept), not kept
     for _ in range(MOST_ROUGH if rough else MOST_STEPS):
-        there = moved(base, unknowns, values)
-        here, square, slope = normal_equations(there, residual, columns, values, z, weight)
+        problem = moved(base, unknowns, values)
+        here, square, slope = normal_equations(problem, residual, columns, values, z, weight)
         if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
             break
         dampings = [max(factor * damping, LEAST) for factor in LADDER]
@@ -243,16 +243,16 @@ def normal_equations(
     slopes = np.empty((len(residual), 0))
     if len(z):
         slopes = forward_slopes(records, [Descent(z, residual, float(residual @ residual))])[0]
-    every = np.hstack([slopes, records.padded(columns)])
+    jacobian = np.hstack([slopes, records.padded(columns)])
     prior = np.concatenate([np.zeros(len(z)), np.full(len(values), 1.0 / weight)])
     here = np.concatenate([z, values])
-    return here, every.T @ every + np.diag(prior), every.T @ residual - prior * here
+    return here, jacobian.T @ jacobian + np.diag(prior), jacobian.T @ residual - prior * here
 
 
 def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array) -> WhiteRecords:
     """Return records before any unknown was moved, from the starts that fit best with some values of the unknowns."""
-    there = moved(base, unknowns, values)
-    started = with_starts(there.replays, there.whole(z[np.newaxis])[0])
+    problem = moved(base, unknowns, values)
+    started = with_starts(problem.replays, problem.whole(z[np.newaxis])[0])
     names = base.model.plant.start_constants.values()
     pieces_of = {r.record.file: r.pieces for r in started}
 
@@ -307,8 +307,8 @@ def columns_about(
     kept: columns that are known.
     """
     stepped = [i for i, u in enumerate(unknowns) if u.name not in kept and u.column is None]
-    there = np.vstack([values, values + STEP * np.eye(len(values))[stepped]])
-    residuals = residuals_at(base, unknowns, there, np.tile(z, (len(there), 1)))
+    points = np.vstack([values, values + STEP * np.eye(len(values))[stepped]])
+    residuals = residuals_at(base, unknowns, points, np.tile(z, (len(points), 1)))
     by_steps = dict(zip(stepped, (residuals[0] - residuals[1:]) / STEP, strict=True))
 
     def column(i: int, unknown: Unknown) -> Array:

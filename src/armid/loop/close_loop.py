@@ -125,7 +125,7 @@ def close_loop(
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
     path = [frozenset[Hypothesis]()] if implausible else path_of(inference)
-    judged = [judge(inference, each, campaign, within) for each in path]
+    judged = [judge(inference, hypotheses, campaign, within) for hypotheses in path]
     steps = steps_of(inference, path, judged)
     kept = confirmed(judged)
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
@@ -146,7 +146,7 @@ def close_loop(
         judged = rejudged(inference, path, judged, within)
         after, before = judged[kept], judged[0]
         steps = tuple(replace(step, claimed=False) for step in steps_of(inference, path, judged))
-    every = {
+    errors = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
     }  # fmt: skip
@@ -160,7 +160,7 @@ def close_loop(
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     said = (*told_first, *missed_sentences(after.missed), *limits_of(after), *dict.fromkeys(again))
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, said,
-                      known_together(in_force, inference.found.library), tuple(suspects), every, inference,
+                      known_together(in_force, inference.found.library), tuple(suspects), errors, inference,
                       missing)  # fmt: skip
 
 

@@ -115,10 +115,10 @@ def loop_document(
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
     parameters = parameter_table(report)
-    each = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
+    rows = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
             for model in ("before", "after")]  # fmt: skip
-    note = records_note(len(each) // 2, details["n_records"])
-    by_record = error_table("Errors of each record", ["record", "role", "model"], each, unit, note)
+    note = records_note(len(rows) // 2, details["n_records"])
+    by_record = error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
     shifts = (*details["suspects"], *details["shifts"])
     together = tuple(f"{said[0].upper()}{said[1:]}." for said in report["known_together"])
@@ -140,9 +140,9 @@ def loop_document(
         sections.insert(2, Section("Motion", figures["motion"]))
     last = ("diagnosis", "against", "autocorrelation", "missing")
     drawn = tuple(f for name in last for f in figures.get(name, ()))
-    told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
-            for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
-    tests = [Sentences(tuple(sentences), title) for title, sentences in told if sentences]
+    titled = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
+              for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
+    tests = [Sentences(tuple(sentences), title) for title, sentences in titled if sentences]
     unnamed = [Sentences(missing, "What is missing, without a name")] if missing else []
     sections.append(Section("Is what remains noise?", (*tests, *unnamed, *drawn)))
     sections.append(Section("Models that were fitted", (log_table(report["log"]),)))
@@ -204,10 +204,10 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     of_those = report["noise_rms_holdout"] if which == "holdout" else None
     noise, unit = shown(of_those or report["noise_rms"], report["unit"])
     alone = "" if which == "holdout" else "; no record was held out"
-    told, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
+    text, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
     if not report["effects"]:
-        told, errors = f"{now} {unit} RMSE,", [after[which]]
-    return f"Error on {on}: {told} the noise is {noise:.3g} {unit}{alone}.{others_text(*errors)}"
+        text, errors = f"{now} {unit} RMSE,", [after[which]]
+    return f"Error on {on}: {text} the noise is {noise:.3g} {unit}{alone}.{others_text(*errors)}"
 
 
 def step_table(report: Mapping[str, Any]) -> Table:
@@ -340,17 +340,17 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
 
 def models_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the most probable models with the parameters of the declared model, were each true."""
-    told: dict[str, dict[str, Any]] = {}
+    entries: dict[str, dict[str, Any]] = {}
     for model, _ in inference.found.ranked():
         probability = inference.posterior.sets.get(frozenset(h.public for h in model), 0.0)
-        if words(model) not in told and len(told) < MOST_DRAWN and (probability >= LISTED or not told):
+        if words(model) not in entries and len(entries) < MOST_DRAWN and (probability >= LISTED or not entries):
             own = {n: i for n, i in inference.of_fit(model).items() if n in inference.posterior.parameters}
             values = inference.found.fits[model].values
-            told[words(model)] = {
+            entries[words(model)] = {
                 "model": words(model), "probability": probability,
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in own.items()},
             }  # fmt: skip
-    return list(told.values())
+    return list(entries.values())
 
 
 def conclusion(loop: ClosedLoop) -> str:

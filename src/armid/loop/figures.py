@@ -198,8 +198,8 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
     labels = [fill(f"{m['model']} ({m['probability']:.2f})", 34) for m in models] + ["all models"]
     for axis, name in zip(axes.flat, names, strict=False):
         factor, unit = shown(1.0, averaged[name]["unit"])
-        each = [*(m["parameters"][name] for m in models), averaged[name]]
-        for i, p in enumerate(each):
+        entries = [*(m["parameters"][name] for m in models), averaged[name]]
+        for i, p in enumerate(entries):
             axis.errorbar([factor * p["value"]], [i], xerr=ends_of(p, factor), fmt="o", capsize=4,
                           color=AFTER if i == len(models) else GREY)  # fmt: skip
         axis.set_yticks(range(len(labels)), labels, fontsize="small")
@@ -226,10 +226,10 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]],
     parameters: of `report.json`; one whose value is 0 has no share. truth: true values that are known, SI.
     """
     before, after = parameters["before"], parameters["after"]
-    each = [(name, before.get(name), p) for name, p in after.items() if p["value"]
-            and (p["low"] is not None or (name in before and before[name]["low"] is not None))]  # fmt: skip
-    figure, axes = panels(max(len(each), 1), PARAMETERS_A_ROW, 2.8, 3.0)
-    for axis, (name, *pair) in zip(axes, each, strict=False):
+    entries = [(name, before.get(name), p) for name, p in after.items() if p["value"]
+               and (p["low"] is not None or (name in before and before[name]["low"] is not None))]  # fmt: skip
+    figure, axes = panels(max(len(entries), 1), PARAMETERS_A_ROW, 2.8, 3.0)
+    for axis, (name, *pair) in zip(axes, entries, strict=False):
         value, factor = pair[1]["value"], 100.0 / abs(pair[1]["value"])
         for place, (p, (_, colour)) in enumerate(zip(pair, LOOKS, strict=True)):
             if p is None:
@@ -241,10 +241,10 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]],
         axis.set_xticks([0, 1], ["before", "after"])
         axis.set(xlim=(-0.6, 1.6), ylabel="deviation [%]")
         axis.set_title(f"{name}, {value_text(pair[1] | {'low': None})}", fontsize="small")
-    if not each:
+    if not entries:
         axes[0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
         axes[0].set_axis_off()
-    known = "; dashed: true" if any(name in truth for name, *_ in each) else ""
+    known = "; dashed: true" if any(name in truth for name, *_ in entries) else ""
     title = f"{campaign}: deviation from the value after, 95 % intervals (open: not trusted{known})"
     entitle(figure, title)
     return figure

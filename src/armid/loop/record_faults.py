@@ -57,8 +57,8 @@ def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, inference
 def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> RecordFault:
     record, fault, plant = fit.records.data.each[what.index], what.fault, inference.found.library.declared.plant
     if fault.kind == "label":
-        told = record.constants[fault.constant]
-        return RecordFault(record.file, record.role, "label", FREED, 1.0 - told, fault.unit(record, plant))
+        constant = record.constants[fault.constant]
+        return RecordFault(record.file, record.role, "label", FREED, 1.0 - constant, fault.unit(record, plant))
     value, half = size_of(name, fit, inference)
     output = record.output if fault.kind in OF_SENSOR and len(plant.outputs) > 1 else ""
     low, high = what.largest * (value - half), what.largest * (value + half)

@@ -191,8 +191,8 @@ class ClosedLoop(Result):
         """Output -> its unit and the noise of its train records."""
         train = self.before.train
         pairs = [(r.place, level.rms) for r, level in zip(train.replays, train.data.levels, strict=True)]
-        each = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
-        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in each if rms}
+        levels = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
+        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in levels if rms}
 
     @property
     def noise_rms(self) -> float:
@@ -218,14 +218,14 @@ def estimates(
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
     is_unknown = inference.posterior.probability("unknown") >= MENTIONED
-    told = []
+    estimates = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
         if name not in library.declared.parameters and owner not in active:
             continue
         public = name if owner is None else f"{owner.public}.{name.partition('.')[2]}"
         if name not in known:
-            told.append(Estimate(public, value, unit, None, None, (NOT_IDENTIFIED,)))
+            estimates.append(Estimate(public, value, unit, None, None, (NOT_IDENTIFIED,)))
             continue
         one = known[name]
         low, high = min(one.low, value), max(one.high, value)
@@ -239,8 +239,8 @@ def estimates(
             wide = f"its interval reaches further than {within:.0%} from the value"
             doubts.append(f"{wide} ({'; '.join(causes)})" if causes else wide)
         ends, of_noise = shown_ends(low, high), shown_ends(one.noise_low, one.noise_high)
-        told.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))
-    return tuple(told)
+        estimates.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))
+    return tuple(estimates)
 
 
 def shown_ends(low: float, high: float) -> tuple[float | None, float | None]:
@@ -280,8 +280,8 @@ def report_of(loop: ClosedLoop) -> dict[str, Any]:
         "effects": loop.effects,
         "error": {"before": errors_of(loop.before), "after": errors_of(loop.after)},
         "error_all_records": {
-            when: dict(zip(("train", "holdout"), told, strict=True))
-            for when, told in loop.error_all_records.items()
+            when: dict(zip(("train", "holdout"), errors, strict=True))
+            for when, errors in loop.error_all_records.items()
         },
         "suspects": loop.suspects,
         "parameters": {"before": loop.before.entries, "after": loop.after.entries},

@@ -216,7 +216,7 @@ def signals_of_each(
             groups.setdefault(ready.simulates, []).append(i)
         for members in groups.values():
             rows = np.concatenate([forms[i][1] for i in members])
-            runs = alike[members[0]].simulated(candidates[rows], {n: several[rows] for n, several in shares.items()})
+            runs = alike[members[0]].simulated(candidates[rows], {n: share[rows] for n, share in shares.items()})
             edges = np.cumsum([0, *(len(forms[i][1]) for i in members)])
             for i, (first, end) in zip(members, pairwise(edges), strict=True):
                 own = [replace(run, outputs=run.outputs[:, first:end]) for run in runs]

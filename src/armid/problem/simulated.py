@@ -34,7 +34,8 @@ class SimulatedCampaign(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the parameters and the columns of each record, SI."""
-        records = {file: {key: values.tolist() for key, values in each.items()} for file, each in self.tables.items()}
+        records = {file: {key: values.tolist() for key, values in columns.items()}
+                   for file, columns in self.tables.items()}  # fmt: skip
         return {"campaign": self.campaign.name, "parameters": self.parameters, "records": records}
 
     @property
@@ -47,14 +48,15 @@ class SimulatedCampaign(Shown):
         """All records below each other, SI, with the file of each row."""
         from pandas import DataFrame, concat
 
-        return concat([DataFrame({"record": file, **each}) for file, each in self.tables.items()], ignore_index=True)
+        frames = [DataFrame({"record": file, **columns}) for file, columns in self.tables.items()]
+        return concat(frames, ignore_index=True)
 
     def document(self) -> Document:
         """Return the parameters and the size of each record."""
         model = " + ".join([self.model.plant.name, *(e.name for e in self.model.effects)])
         outputs = [si_header(output)[0] for output in self.model.plant.outputs]
-        rows = [(file, str(len(each["time_s"])), *(f"{np.abs(each[o]).max():.4g}" for o in outputs))
-                for file, each in self.tables.items()]  # fmt: skip
+        rows = [(file, str(len(columns["time_s"])), *(f"{np.abs(columns[o]).max():.4g}" for o in outputs))
+                for file, columns in self.tables.items()]  # fmt: skip
         values = listed([f"{name} = {value:.6g} {self.model.parameters[name].unit}".removesuffix(" 1")
                          for name, value in self.parameters.items()])  # fmt: skip
         answer = f"{model} simulated through {len(rows)} records of {self.campaign.name} with {values}."
@@ -65,10 +67,10 @@ class SimulatedCampaign(Shown):
 
     def plot(self) -> Any:
         """Draw the signal of each record over what was measured, and return matplotlib's figure."""
-        each = [one for record in self.campaign.records for one in record.each]
+        records = [one for record in self.campaign.records for one in record.each]
         outputs = {o.name: o for o in self.model.plant.outputs}
-        figure, cells = record_axes(len(each), 2.9)
-        for (axis,), record in zip(cells, each, strict=True):
+        figure, cells = record_axes(len(records), 2.9)
+        for (axis,), record in zip(cells, records, strict=True):
             output = outputs.get(record.output, self.model.plant.outputs[0])
             header, factor = si_header(output)
             columns = self.tables[record.file]
@@ -87,8 +89,8 @@ class SimulatedCampaign(Shown):
             raise DataError(f"{quoted(str(folder))} is the folder of the campaign, whose records would be lost: "
                              "another one is expected")  # fmt: skip
         with NewFiles(Path(folder)) as files:
-            for file, each in self.tables.items():
-                write_table(files.path(file), each)
+            for file, columns in self.tables.items():
+                write_table(files.path(file), columns)
         return files.names
 
 

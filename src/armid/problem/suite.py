@@ -150,8 +150,8 @@ def suite(
     for what, given, known in (("objectives", objectives, OBJECTIVES), ("units", units, UNITS)):
         if given not in known:
             raise ArmidError(f"{what} is {given!r}, {nearest(str(given), known)}")
-    several = [name for name, d in DEFINITIONS.items() if objectives == "one" or len(d.strokes) > 1]
-    keys = [(name, i) for name in several for i in range(1, N_INSTANCES + 1)]
+    names = [name for name, d in DEFINITIONS.items() if objectives == "one" or len(d.strokes) > 1]
+    keys = [(name, i) for name in names for i in range(1, N_INSTANCES + 1)]
     measured: dict[str, Campaign] = {}
     for one in [campaigns] if isinstance(campaigns, Campaign | str | Path) else campaigns:
         campaign = one if isinstance(one, Campaign) else read_campaign(one)

@@ -269,11 +269,11 @@ def record_path(folder: Path, file: str, where: str) -> Path:
         raise ArmidError(f"{where}: file {quoted(file)} is not a CSV file, a name that ends in {SUFFIX} is expected")
     path = os.path.join(folder, file)
     if not os.path.isfile(path):
-        there = sorted(p.name for p in folder.glob(f"*{SUFFIX}") if p.is_file())
+        files = sorted(p.name for p in folder.glob(f"*{SUFFIX}") if p.is_file())
         if os.path.lexists(path):
             raise ArmidError(f"{where}: file {quoted(file)} does not exist: a folder or a dead link has that name, a "
                              "CSV file is expected")  # fmt: skip
-        raise ArmidError(f"{where}: file {quoted(file)} does not exist, {nearest(file, there)}")
+        raise ArmidError(f"{where}: file {quoted(file)} does not exist, {nearest(file, files)}")
     real = Path(os.path.realpath(path))
     if not real.is_relative_to(os.path.realpath(folder)):
         raise ArmidError(f"{where}: file {quoted(file)} links out of the campaign's folder, a file inside is expected")

@@ -194,8 +194,8 @@ class Record:
 
     def with_pieces(self, change: Callable[[Piece], Piece]) -> "Record":
         """Return the record with each of its pieces changed."""
-        pieces, whole = (tuple(map(change, some)) for some in (self.pieces, self.whole_pieces))
-        return replace(self, pieces=pieces, whole_pieces=whole)
+        pieces, whole_pieces = (tuple(map(change, some)) for some in (self.pieces, self.whole_pieces))
+        return replace(self, pieces=pieces, whole_pieces=whole_pieces)
 
     def until_window_end(self) -> "Record":
         """Return the record with its pieces cut: what an identification has to simulate."""

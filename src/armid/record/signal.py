@@ -186,6 +186,6 @@ def without_turns(table: CsvTable, header: str, raw: Array, unwrap: bool) -> Arr
         line = table.line_of(int(rows[fast[0] + 1]))
         raise ArmidError(f"{table.file}, line {line}: {header} moves by half a turn or more from row to row, so that "
                          "its turns cannot be counted: faster sampling is expected")  # fmt: skip
-    whole = raw.copy()
-    whole[present] = raw[present] - turn * np.append(0.0, np.cumsum(turns))
-    return whole
+    unwrapped = raw.copy()
+    unwrapped[present] = raw[present] - turn * np.append(0.0, np.cumsum(turns))
+    return unwrapped

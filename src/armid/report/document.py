@@ -431,10 +431,10 @@ def record_axes(n: int, height: float, heights: Sequence[float] = (1,)) -> tuple
     rows = -(-n // columns)
     # as for `small_axes` margins are given, in inches: a layout engine takes longer than all the drawing
     width, above, below, gap, between = 6.8 * columns, 0.95, 1.0, 0.85, 1.1
-    whole = height * rows + above + below - gap
-    figure = pyplot().figure(figsize=(width, whole))
+    total = height * rows + above + below - gap
+    figure = pyplot().figure(figsize=(width, total))
     grid = figure.add_gridspec(
-        rows, columns, left=between / width, right=1.0 - 0.15 / width, bottom=below / whole, top=1.0 - above / whole,
+        rows, columns, left=between / width, right=1.0 - 0.15 / width, bottom=below / total, top=1.0 - above / total,
         wspace=between / (6.8 - between), hspace=gap / (height - gap),
     )  # fmt: skip
     cells = []

@@ -65,10 +65,10 @@ def report_of(
             facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, sections[0].parts[0])
     shown = (*(s for s in sections if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)
-    whole = state.startswith("Complete")
+    is_complete = state.startswith("Complete")
     return Document(
-        study["name"], "Study", str(study.get("question", "")), (*answer, state) if whole else answer, shown,
-        warning="" if whole else state, facts=facts, main=shown[0].parts, angle=angle,
+        study["name"], "Study", str(study.get("question", "")), (*answer, state) if is_complete else answer, shown,
+        warning="" if is_complete else state, facts=facts, main=shown[0].parts, angle=angle,
     )  # fmt: skip
 
 

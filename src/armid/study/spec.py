@@ -419,7 +419,7 @@ def imported_beside(plugin: Path) -> list[Path]:
     return sorted(f for name, f in loaded if f.parent == plugin.parent and not name.startswith(PLUGIN_PREFIX))
 
 
-def lookup(there: Mapping[str, Any], name: str, what: str, where: str) -> Any:
-    if name not in there:
-        raise unknown_name(what, name, there, where)
-    return there[name]
+def lookup(entries: Mapping[str, Any], name: str, what: str, where: str) -> Any:
+    if name not in entries:
+        raise unknown_name(what, name, entries, where)
+    return entries[name]

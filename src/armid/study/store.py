@@ -157,9 +157,9 @@ class Store:
             cursor = self._connection.execute("INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?)", row)
             is_new = cursor.rowcount == 1
             for table, rows in outcome.rows.items() if is_new else ():
-                for each in rows:
-                    marks = ", ".join("?" * (1 + len(each)))
-                    self._connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", (outcome.run, *each))
+                for values in rows:
+                    marks = ", ".join("?" * (1 + len(values)))
+                    self._connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", (outcome.run, *values))
         return is_new
 
     def _text(self, text: str) -> str:

@@ -172,7 +172,7 @@ class Entry:
         return max(self.several)
 
     def budgets(self, n_free: int) -> list[int]:
-        return sorted({min(self.budget, each * n_free) for each in self.per_parameter}) or [*self.several]
+        return sorted({min(self.budget, factor * n_free) for factor in self.per_parameter}) or [*self.several]
 
 
 @dataclass(frozen=True, eq=False)
@@ -470,7 +470,7 @@ def _parameter_rows(identification: Identification) -> list[tuple[Any, ...]]:
     information, space = identification.information, identification.space
     free, x, sizes = space.only(space.free_names), identification.candidate[space.free], np.abs(information.correlation)
     known = np.isfinite(sizes) & ~np.eye(len(sizes), dtype=bool)
-    largest = [float(row[there].max()) if there.any() else None for row, there in zip(sizes, known, strict=True)]
+    largest = [float(row[mask].max()) if mask.any() else None for row, mask in zip(sizes, known, strict=True)]
     columns = (free.names, free.units, x.tolist(), free.low.tolist(), free.high.tolist(),
                information.deviation.tolist(), largest, identification.at_bound[space.free].tolist())  # fmt: skip
     return list(zip(*columns, strict=True))

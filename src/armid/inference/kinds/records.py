@@ -100,5 +100,5 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
 
 def relabelled(fit: Fit, what: OfRecord, limit: float) -> Fit:
     """Return the model with another load, or key, of a record than its file says."""
-    posed = what.moved(fit.records, 1.0)
-    return fit_from(posed, fit.active, [fit.z, np.full(fit.n_free, 0.5)], limit=limit)
+    problem = what.moved(fit.records, 1.0)
+    return fit_from(problem, fit.active, [fit.z, np.full(fit.n_free, 0.5)], limit=limit)

@@ -31,8 +31,8 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         return ()
     kept, figures = evidence.histories, []
     if evidence.knows_truth:
-        every = np.ones(len(evidence.runs), bool)
-        draw = partial(convergence_figure, evidence, every, 100.0 * kept.errors, ERROR_LABEL, LEAST_PERCENT)
+        mask = np.ones(len(evidence.runs), bool)
+        draw = partial(convergence_figure, evidence, mask, 100.0 * kept.errors, ERROR_LABEL, LEAST_PERCENT)
         figures.append(Figure("convergence_error", "Convergence of the parameters", ERROR_CAPTION, draw))
     names = list(dict.fromkeys(map(str, evidence.runs["fitness"])))
     for name in names:
@@ -68,8 +68,8 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
                 spent = grid > evidence.runs["budget"].to_numpy()[rows[own[rows]]].max()
                 shown = np.where(np.isfinite(medians) & ~spent, np.maximum(medians, floor), np.nan)
                 curves.setdefault(setting, {})[variant] = shown
-    every = np.concatenate([line[np.isfinite(line)] for lines in curves.values() for line in lines.values()])
-    limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
+    finite = np.concatenate([line[np.isfinite(line)] for lines in curves.values() for line in lines.values()])
+    limits = (float(finite.min()) / 1.6, float(finite.max()) * 1.6) if finite.size else (0.1, 1.0)
     figure = line_panels([(setting, grid, lines) for setting, lines in curves.items()], evidence.colours,
                          xscale="log", yscale="log", xlim=(1, max(grid[-1], 2)), ylim=limits, xlabel="simulations",
                          ylabel=label)  # fmt: skip
