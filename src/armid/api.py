@@ -121,8 +121,8 @@ def refuse_others(effects: Any, plugins: Any, window: Any, bounds: Any, fix: Any
 
 
 def are_numbers(values: Iterable[Any], n: int | None = None) -> bool:
-    found = list(values)
-    return (n is None or len(found) == n) and all(isinstance(v, int | float | np.number) for v in found)
+    items = list(values)
+    return (n is None or len(items) == n) and all(isinstance(v, int | float | np.number) for v in items)
 
 
 def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
@@ -130,8 +130,8 @@ def campaign_of(given: Any, plant: Any, registry: Registry) -> Campaign:
     if isinstance(given, str | Path):
         with announced(f"reading campaign {given}"):
             return read_campaign(given, registry.plants, registry.effects)
-    several = given.values() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
-    tables: list[Any] = list(several)
+    items = given.values() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
+    tables: list[Any] = list(items)
     if not tables or not all(hasattr(each, "to_csv") for each in tables):
         raise DataError(f"the campaign is a {type(given).__name__}: a folder, a Campaign or pandas DataFrames are "
                         "expected")  # fmt: skip
@@ -251,26 +251,26 @@ def identify(
     if not isinstance(options or {}, Mapping):
         raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
     window = PAPER_WINDOW if paper and window is None else window
-    there = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
+    setup = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
     fitness = fitness or (PAPER_FITNESS if paper else FITNESS)
-    distance = (fitness_of_name(fitness, there.registry.fitness) if isinstance(fitness, str) else
+    distance = (fitness_of_name(fitness, setup.registry.fitness) if isinstance(fitness, str) else
                 as_fitness(name_of(fitness, getattr(fitness, "__name__", "own")), fitness))  # fmt: skip
     by_default = PAPER_IDENTIFIER if paper else IDENTIFIER if distance.weigh is not None else WITHOUT_RESIDUALS
-    searcher = identifier_of(identifier or by_default, there.registry).with_options(options or {})
+    searcher = identifier_of(identifier or by_default, setup.registry).with_options(options or {})
     if budget is None:
         budget = PAPER_BUDGET if paper or identifier is not None else BUDGET
-    space = space or there.space()
-    with angles_in(there.campaign.angle):
-        issues = data_issues(there.campaign, there.model, space)
+    space = space or setup.space()
+    with angles_in(setup.campaign.angle):
+        issues = data_issues(setup.campaign, setup.model, space)
     with warned_once(UserWarning):
         for issue in issues:
             warnings.warn(issue.sentence, stacklevel=2)
     with search_bar(progress is True) as shown:
         followed = progress if callable(progress) else shown
-        found = run(
-            there.campaign, there.model, space, distance, searcher, budget, seed, target, accuracy, followed, interval
+        identification = run(
+            setup.campaign, setup.model, space, distance, searcher, budget, seed, target, accuracy, followed, interval
         )
-    return replace(found, issues=issues)
+    return replace(identification, issues=issues)
 
 
 def identifier_of(given: Any, registry: Registry) -> Any:
@@ -320,11 +320,11 @@ def examine(
     """
     from armid.estimation.examine import examine as run
 
-    there = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
-    box = space or there.space()
+    setup = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
+    box = space or setup.space()
     at = free_values(box, x, where) if isinstance(x, Mapping) else x if x is None else np.asarray(x, dtype=np.float64)
     with status_line(progress) as told:
-        return run(there.campaign, there.model, box, at, noise, by, accuracy, told)
+        return run(setup.campaign, setup.model, box, at, noise, by, accuracy, told)
 
 
 def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array:
@@ -390,25 +390,25 @@ def close_loop(
     if isinstance(model, Model) != (campaign is not None):
         raise ArmidError("a Model and its campaign, or a campaign alone, is expected")
     declared = model if isinstance(model, Model) else None
-    there = opened(campaign if declared else model, effects, plugins, window, bounds, fix, plant, declared, units)
-    known = there.registry.effects_for(there.campaign.plant)
+    setup = opened(campaign if declared else model, effects, plugins, window, bounds, fix, plant, declared, units)
+    known = setup.registry.effects_for(setup.campaign.plant)
     wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "candidates")
     left_out = effects_of(without, known, "without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
-    own = there.registry.own["effects"] if candidates is None else kept
+    own = setup.registry.own["effects"] if candidates is None else kept
     for name in own.keys() & kept.keys():
-        refusals = [refusal_of(form, there.model.plant) for form in kept[name].every_form]
+        refusals = [refusal_of(form, setup.model.plant) for form in kept[name].every_form]
         if all(refusals):
             warnings.warn(f"effect '{name}' is not looked for: {refusals[0]}", stacklevel=2)
-    values = {**(fixed or {}), **there.fixed}
+    values = {**(fixed or {}), **setup.fixed}
     chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
-    known_too = with_known(there.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
+    known_too = with_known(setup.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
     share = {} if within is None else {"within": positive(within, "within")}
     file = progress if isinstance(progress, Path) else None
     with status_line(progress is True) as shown, angles_in(known_too.angle):
-        found: ClosedLoop = run(there.model, known_too, kept, rng, there.bounds, values, threads, told or shown, curve,
-                                file, chances, **share)  # fmt: skip
-    return found
+        loop: ClosedLoop = run(setup.model, known_too, kept, rng, setup.bounds, values, threads, told or shown, curve,
+                               file, chances, **share)  # fmt: skip
+    return loop
 
 
 def with_known(campaign: Campaign, given: Mapping[str, Sequence[float]]) -> Campaign:
@@ -435,8 +435,8 @@ def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[s
     """Return name -> Effect of names or Effects, None: all that are known; where: named in a refusal."""
     if given is None:
         return known
-    found = (e if isinstance(e, Effect) else chosen(e.strip(), known, f"{where}: effect") for e in each_of(given))
-    return {effect.name: effect for effect in found}
+    effects = (e if isinstance(e, Effect) else chosen(e.strip(), known, f"{where}: effect") for e in each_of(given))
+    return {effect.name: effect for effect in effects}
 
 
 def simulate(
@@ -481,12 +481,12 @@ def simulate(
         return run(model, manoeuvre, population, schedule or Schedule(), threads, states)
     if any(given is not None for given in of_model):
         raise ArmidError("a manoeuvre is given with a campaign: with a Model it is expected")
-    there = opened(model, effects, plugins, window, plant=plant)
-    whole = replace(there.model, plant=there.campaign.declared)
+    setup = opened(model, effects, plugins, window, plant=plant)
+    declared = replace(setup.model, plant=setup.campaign.declared)
     asked = {**values, **(parameters or {})}
-    candidate = candidate_of(whole, there.campaign, asked)
+    candidate = candidate_of(declared, setup.campaign, asked)
     with warned_once(UserWarning):
-        tables = {r.file: simulated_table(r, whole, candidate, accuracy) for r in there.campaign.records}
+        tables = {r.file: simulated_table(r, declared, candidate, accuracy) for r in setup.campaign.records}
     for name, value in asked.items():
-        warn_if_far(whole.parameters[name], [value], f"{name} = {value:g}")
-    return SimulatedCampaign(there.campaign, whole, candidate, tables)
+        warn_if_far(declared.parameters[name], [value], f"{name} = {value:g}")
+    return SimulatedCampaign(setup.campaign, declared, candidate, tables)

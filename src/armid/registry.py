@@ -116,9 +116,9 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
                 thing = point.load()
             except (Exception, SystemExit) as error:
                 raise ArmidError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
-            found = kind_of(thing, where)
-            if found != kind:
-                raise ArmidError(f"{where} belongs to {found}: armid.{found} is expected")
+            actual = kind_of(thing, where)
+            if actual != kind:
+                raise ArmidError(f"{where} belongs to {actual}: armid.{actual} is expected")
             registry.add(kind, name_of(thing, point.name), thing)
     for plugin in plugins:
         registry.add(*load_plugin(plugin))

@@ -65,10 +65,10 @@ def scale_of(unit: str, size: float = 1.0) -> tuple[str, float]:
     >>> scale_of("N m", 2e-5)
     ('uN m', 1000000.0)
     """
-    found = (SHOWN | ANGLES[_angle.get()]).get(unit, (unit, 1.0))
+    scale = (SHOWN | ANGLES[_angle.get()]).get(unit, (unit, 1.0))
     is_readable = not np.isfinite(size) or size == 0.0 or LEAST <= abs(size) < LARGEST
-    if found[0] != unit or is_readable or not PREFIXED.match(unit):
-        return found
+    if scale[0] != unit or is_readable or not PREFIXED.match(unit):
+        return scale
     sizes = [prefix for prefix in PREFIXES if prefix <= abs(size)]
     prefix = max(sizes, default=min(PREFIXES))
     return f"{PREFIXES[prefix]}{unit}", 1.0 / prefix

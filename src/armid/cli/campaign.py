@@ -56,16 +56,16 @@ def simulate_command(
     from armid.api import simulate
 
     known = given(effects, plugins)
-    found = simulate(campaign, parameters=numbers(settings, "--set"), accuracy=accuracy_of(accuracy),
-                     effects=known["effects"], plugins=known["plugins"])  # fmt: skip
-    files = found.save(out)
-    units = {name: p.unit for name, p in found.model.parameters.items()}
-    say(*(f"{name} = {value:.9g} {units[name]}".removesuffix(" 1") for name, value in found.parameters.items()))
-    for record in found.campaign.records:
+    simulated = simulate(campaign, parameters=numbers(settings, "--set"), accuracy=accuracy_of(accuracy),
+                         effects=known["effects"], plugins=known["plugins"])  # fmt: skip
+    files = simulated.save(out)
+    units = {name: p.unit for name, p in simulated.model.parameters.items()}
+    say(*(f"{name} = {value:.9g} {units[name]}".removesuffix(" 1") for name, value in simulated.parameters.items()))
+    for record in simulated.campaign.records:
         if record.irregularity is not None:
             say(f"{record.file}: on its even grid of {record.manoeuvre.interval:.6g} s, as its times are irregular")
     say(f"wrote {len(files)} files to {out}")
-    give(parameters=found.parameters, folder=out, files=files)
+    give(parameters=simulated.parameters, folder=out, files=files)
 
 
 DEFAULT = (
@@ -132,10 +132,11 @@ def identify_command(
     goal = 1.0 - target if target is not None and minimised.partition(":")[0] in SIMILARITIES else target
     named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
     refuse_unwritable(out, IDENTIFICATION.file)
-    found = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy), speaks(),
-                options=named, paper=paper, interval=not no_interval, **given(**problem))  # fmt: skip
-    show_and_save(found, out)
-    if found.stopped == INTERRUPTED:
+    identification = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy),
+                         speaks(), options=named, paper=paper, interval=not no_interval,
+                         **given(**problem))  # fmt: skip
+    show_and_save(identification, out)
+    if identification.stopped == INTERRUPTED:
         sys.exit(130)
 
 
@@ -185,9 +186,9 @@ def identifiability_command(
     point, where = numbers(at.split(","), "--at") if at else None, "--at"
     if source is not None:
         point, where = read_point(source), f"--from {source}"
-    found = examine(campaign, None, None, point, noise, rank, accuracy_of(accuracy), speaks(), where=where,
-                    **given(**problem))  # fmt: skip
-    show_and_save(found, out)
+    examination = examine(campaign, None, None, point, noise, rank, accuracy_of(accuracy), speaks(), where=where,
+                          **given(**problem))  # fmt: skip
+    show_and_save(examination, out)
 
 
 def read_point(path: Path) -> dict[str, float]:
@@ -245,10 +246,10 @@ def close_loop_command(
     kept = out / PROGRESS
     try:
         with status_line(speaks()) as show_status:
-            found = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
-                               without=without, curve=not no_curve, progress=kept, within=within,
-                               **given(**problem))  # fmt: skip
-        show_and_save(found, out)
+            loop = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
+                              without=without, curve=not no_curve, progress=kept, within=within,
+                              **given(**problem))  # fmt: skip
+        show_and_save(loop, out)
     except BaseException:
         if kept.exists():
             tell(f"armid: what was fitted is kept in {kept}: the same command goes on from there")

@@ -61,13 +61,13 @@ def tell_points(title: str, points: "Iterator[ContractPoint]", **about: str) -> 
     # what cannot be tried at all is refused before anything is printed
     first = next(points)
     say(title)
-    told = []
+    entries = []
     for point in chain([first], points):
-        told.append({"name": point.name, "passed": point.passed, "sentence": point.sentence})
+        entries.append({"name": point.name, "passed": point.passed, "sentence": point.sentence})
         say(f"  {'ok  ' if point.passed else 'FAIL'} {point.name}: {point.sentence}")
-    failed = sum(not point["passed"] for point in told)
-    say(f"{len(told) - failed} of {len(told)} points hold")
-    give(**about, passed=not failed, points=told)
+    failed = sum(not point["passed"] for point in entries)
+    say(f"{len(entries) - failed} of {len(entries)} points hold")
+    give(**about, passed=not failed, points=entries)
     if failed:
         sys.exit(1)
 
@@ -116,8 +116,8 @@ def points_of(thing: str, registry: Registry) -> tuple[str, str, "Iterator[Contr
     if Path(thing).is_dir() or (":" not in thing and Path(thing).suffix != ".py"):
         campaign = read_campaign(thing, registry.plants, registry.effects)
         return "campaign", campaign.name, check_campaign(campaign, registry.effects)
-    kind, name, found = load_plugin(thing)
-    return kind, name, check_thing(kind, name, found, registry.plants)
+    kind, name, plugin = load_plugin(thing)
+    return kind, name, check_thing(kind, name, plugin, registry.plants)
 
 
 @command("bench", short_help="Measure speed, error and memory.", epilog=examples("armid bench --quick"))
@@ -225,9 +225,10 @@ def identification() -> tuple[bool, str]:
 
     with TemporaryDirectory(prefix="armid-") as place:
         folder = write_campaign(f"{place}/axis", campaign_text("axis"), synthetic_records())
-        found = identify(folder, effects=["viscous"], identifier="least_squares").to_dict()["parameters"]["inertia"]
-    off = abs(found["value"] - INERTIA) / (found["high"] - found["value"])
-    return off <= NEAR, f"inertia {found['value']:.5g} kg m2 (true: {INERTIA:g}), {off:.1f} half widths of its interval"
+        inertia = identify(folder, effects=["viscous"], identifier="least_squares").to_dict()["parameters"]["inertia"]
+    off = abs(inertia["value"] - INERTIA) / (inertia["high"] - inertia["value"])
+    near = f"{off:.1f} half widths of its interval"
+    return off <= NEAR, f"inertia {inertia['value']:.5g} kg m2 (true: {INERTIA:g}), {near}"
 
 
 POINTS = {"versions": versions, "cache": cache, "compiler": compiler, "simulation": simulation, "threads": threads,

@@ -121,16 +121,16 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
 
 def new_headers(roles: Mapping[str, Column], linear: bool, notes: list[str]) -> dict[str, str]:
     """Return quantity -> header as a record has it, but for the time; notes: a line for each guess is added."""
-    found = {}
+    headers = {}
     for quantity, column in roles.items():
         if quantity == "time":
             continue
         begin, ends, usual = HEADERS[quantity, linear]
         end = column.end if column.end in ends else usual
-        found[quantity] = f"{begin}_{end}"
+        headers[quantity] = f"{begin}_{end}"
         guess = "" if end == column.end else f"; GUESS: its unit, which the header does not tell, is {end}"
-        notes.append(f"{found[quantity]}: the column {quoted(column.header)}{guess}")
-    return found
+        notes.append(f"{headers[quantity]}: the column {quoted(column.header)}{guess}")
+    return headers
 
 
 def seconds_of(column: Column, table: CsvTable, notes: list[str]) -> float:

@@ -47,11 +47,11 @@ def list_command(what: str, names: tuple[str, ...], is_long: bool, plugins: tupl
     if what not in KINDS:
         raise ArmidError(f"list '{what}' is not known: {nearest(what, KINDS)}")
     registry = load_registry(plugins)
-    there = things_of(what, registry)
+    catalogue = things_of(what, registry)
     for name in names:
-        if name not in there:
-            raise ArmidError(f"{what}: '{name}' is not known: {nearest(name, there)}")
-    things = {name: there[name] for name in names or there}
+        if name not in catalogue:
+            raise ArmidError(f"{what}: '{name}' is not known: {nearest(name, catalogue)}")
+    things = {name: catalogue[name] for name in names or catalogue}
     if wants("quiet"):
         put(*things)
     elif wants("json"):
@@ -105,18 +105,18 @@ def plain_text(name: str, thing: Any, registry: Registry, is_long: bool) -> str:
 
 
 def entry(thing: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {"note": getattr(thing, "note", "") or (getattr(thing, "__doc__", "") or "").strip()}
+    fields: dict[str, Any] = {"note": getattr(thing, "note", "") or (getattr(thing, "__doc__", "") or "").strip()}
     if isinstance(thing, Plant | Effect):
         keys = ("unit", "low", "high", "null", "fixed", "note")
-        found["parameters"] = {p.name: {key: getattr(p, key) for key in keys} for p in thing.parameters}
+        fields["parameters"] = {p.name: {key: getattr(p, key) for key in keys} for p in thing.parameters}
         ports = thing.ports if isinstance(thing, Plant) else {port: returned_text(f) for port, f in thing.adds.items()}
-        found["ports"] = dict(ports)
+        fields["ports"] = dict(ports)
     if hasattr(thing, "build"):
         from armid.identifiers import options_of
 
         flags = ("is_global", "uses_gradient", "is_stochastic", "needs_residuals")
-        found |= {flag: getattr(thing, flag) for flag in flags} | {"options": options_of(thing)}
-    return found | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
+        fields |= {flag: getattr(thing, flag) for flag in flags} | {"options": options_of(thing)}
+    return fields | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
 
 
 def identifier_text(name: str, identifier: Any, registry: Registry, is_long: bool) -> str:
@@ -133,13 +133,13 @@ def identifier_text(name: str, identifier: Any, registry: Registry, is_long: boo
 
 def effect_text(name: str, effect: Effect, registry: Registry, is_long: bool) -> str:
     plants = [p for plant in registry.plants.values() for p in (plant, *plant.variants)]
-    several = len(effect.every_form) > 1
+    has_forms = len(effect.every_form) > 1
     lines = [f"{name}: {note_of(effect)}"]
     for form in effect.every_form:
-        lines += [f"  in the form {form.form}"] if several else []
+        lines += [f"  in the form {form.form}"] if has_forms else []
         lines += form_lines(form, is_long)
-        lines += [f"  source: {form.source}"] if form.source and (several or form.source != effect.source) else []
-    lines += [f"  source: {effect.source}"] if effect.source and not several else []
+        lines += [f"  source: {form.source}"] if form.source and (has_forms or form.source != effect.source) else []
+    lines += [f"  source: {effect.source}"] if effect.source and not has_forms else []
     return "\n".join(folded(line) for line in [*lines, f"  on {places(effect, plants)}"])
 
 
@@ -157,12 +157,12 @@ def places(effect: Effect, plants: Sequence[Plant]) -> str:
     """Return the plants that offer the ports and names of an effect, siblings by what they record."""
     fitting = [p for p in plants if any(not refusal_of(e, p) for e in effect.every_form)]
     names = list(dict.fromkeys(p.name for p in fitting))
-    told = []
+    texts = []
     for name in names:
         units = [p.output_unit for p in fitting if p.name == name]
         whole = len(units) == sum(p.name == name for p in plants)
-        told.append(name if whole else f"{name} in {', '.join(units)}")
-    return ", ".join(told) or "no plant"
+        texts.append(name if whole else f"{name} in {', '.join(units)}")
+    return ", ".join(texts) or "no plant"
 
 
 def folded(line: str) -> str:

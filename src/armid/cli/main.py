@@ -57,8 +57,8 @@ class Commands(Heard, click.Group):
         if cmd_name not in self.commands:
             return None
         module, name = COMMANDS[cmd_name].split(":")
-        found: click.Command = getattr(import_module(f"armid.cli.{module}"), name)
-        return found
+        command: click.Command = getattr(import_module(f"armid.cli.{module}"), name)
+        return command
 
 
 @click.group(

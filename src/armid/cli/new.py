@@ -161,15 +161,15 @@ def check_new_name(kind: str, name: str, taken: Collection[str], template: str) 
 
 
 def names_in(text: str) -> set[str]:
-    found = set()
+    names = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Name):
-            found.add(node.id)
+            names.add(node.id)
         elif isinstance(node, ast.FunctionDef | ast.alias):
-            found.add(getattr(node, "asname", None) or node.name)
+            names.add(getattr(node, "asname", None) or node.name)
         elif isinstance(node, ast.arg):
-            found.add(node.arg)
-    return found
+            names.add(node.arg)
+    return names
 
 
 def campaign_text(name: str) -> str:
@@ -177,7 +177,7 @@ def campaign_text(name: str) -> str:
 
 
 def synthetic_records() -> dict[str, dict[str, Array]]:
-    return {file: record(*told) for file, told in RECORDS.items()}
+    return {file: record(*arguments) for file, arguments in RECORDS.items()}
 
 
 def record(size: float, frequency: float, seed: int) -> dict[str, Array]:

@@ -127,11 +127,11 @@ def present(document: "Document") -> None:
             show(document)
 
 
-def give(**found: Any) -> None:
+def give(**entries: Any) -> None:
     """Print the result as one JSON object if --json is given. Each command calls this once."""
     if wants("json"):
         with while_read(sys.stdout):
-            print(json.dumps(found, allow_nan=False, default=str), flush=True)
+            print(json.dumps(entries, allow_nan=False, default=str), flush=True)
 
 
 def tell(text: str) -> None:
@@ -229,15 +229,15 @@ def number(text: str, option: str) -> float:
 
 def assignments(texts: Iterable[str], option: str, form: str = "NAME=VALUE") -> dict[str, str]:
     """Return NAME -> text of options of the form NAME=TEXT; `form` is how messages write it."""
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals or not name or not value:
             raise ArmidError(f"{option} '{text}' is not of the form {form}")
-        if name in found:
+        if name in values:
             raise ArmidError(f"{option}: '{name}' is given twice")
-        found[name] = value
-    return found
+        values[name] = value
+    return values
 
 
 def value_of(text: str) -> float | int | bool | str:
@@ -263,8 +263,8 @@ def interval(text: str, option: str) -> tuple[float, float]:
 
 
 def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float]]:
-    found = assignments(texts, option, "NAME=LOW:HIGH")
-    return {name: interval(value, f"{option} {name}") for name, value in found.items()}
+    values = assignments(texts, option, "NAME=LOW:HIGH")
+    return {name: interval(value, f"{option} {name}") for name, value in values.items()}
 
 
 def accuracy_of(text: str) -> str | None:

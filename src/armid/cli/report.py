@@ -25,14 +25,14 @@ from armid.report.result import (
 )
 
 
-def show_and_save(found: Result, out: Path | None) -> None:
+def show_and_save(result: Result, out: Path | None) -> None:
     """Print the answer and the main tables of a result, then with a folder write its files, all or none."""
-    document = found.document()
+    document = result.document()
     present(document)
-    files = [] if out is None else found.save(out, made_by())
+    files = [] if out is None else result.save(out, made_by())
     if files:
         say(f"wrote {', '.join(files)} to {out}")
-    give(**found.to_dict(), answer=document.said, files=files)
+    give(**result.to_dict(), answer=document.said, files=files)
 
 
 def made_by() -> dict[str, Any]:
@@ -120,13 +120,13 @@ def kind_in(folder: Path) -> Kind | None:
     """Return the kind of result that a folder holds, None for a study, whose store may be named itself."""
     if folder.name == STUDY or (folder / STUDY).is_file():
         return None
-    there = [kind for kind in (LOOP, IDENTIFICATION) if (folder / kind.file).is_file()]
-    if len(there) > 1:
-        names = " and ".join(kind.file for kind in there)
+    kinds = [kind for kind in (LOOP, IDENTIFICATION) if (folder / kind.file).is_file()]
+    if len(kinds) > 1:
+        names = " and ".join(kind.file for kind in kinds)
         raise ArmidError(f"{folder} holds {names}, which two commands wrote: one of them is expected")
-    if not there and (folder / IDENTIFIABILITY.file).is_file():
+    if not kinds and (folder / IDENTIFIABILITY.file).is_file():
         return IDENTIFIABILITY
-    if there:
-        return there[0]
+    if kinds:
+        return kinds[0]
     names = f"{STUDY} of `armid study`, {LOOP.file} of `{LOOP.command}` or {IDENTIFICATION.file}"
     raise ArmidError(f"{folder} holds no result: {names} of `{IDENTIFICATION.command}` is expected")

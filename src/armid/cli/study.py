@@ -129,18 +129,18 @@ def tune_command(
             tell(f"{known.name}: {len(first.entries)} identifiers, {configurations} configurations of each on "
                  f"{len(first.cases)} instances: {whole.cost()}; what is finished already is kept")  # fmt: skip
         folder = OUT / f"{known.name}_tuned" if out is None else out
-        found, ending = tune(first, study, folder / "training", configurations, jobs, dask, show_progress)
+        tunings, ending = tune(first, study, folder / "training", configurations, jobs, dask, show_progress)
     answer: list[str] = []
-    if found:
+    if tunings:
         with NewFiles(folder) as files:
-            files.path("tuned.toml").write_text(tuned_study(known, found), encoding="utf-8")
-        document = tuned_document(known, found)
+            files.path("tuned.toml").write_text(tuned_study(known, tunings), encoding="utf-8")
+        document = tuned_document(known, tunings)
         present(document)
         say(f"wrote tuned.toml to {folder}")
         answer = document.said
     say(*words(ending))
-    give(study=known.name, folder=folder, answer=answer, tuned={each.label: each.options for each in found},
-         areas={each.label: {"default": each.default, "tuned": each.tuned} for each in found},
+    give(study=known.name, folder=folder, answer=answer, tuned={tuning.label: tuning.options for tuning in tunings},
+         areas={tuning.label: {"default": tuning.default, "tuned": tuning.tuned} for tuning in tunings},
          interrupted=ending.interrupted)  # fmt: skip
     if ending.interrupted:
         sys.exit(130)

@@ -67,11 +67,11 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         middle = space.complete(0.5 * (space.low + space.high)[np.newaxis, space.free])
         for replay in (one for record in campaign.records for one in ready_at(middle, record, model).each):
             signal = replay.signal(middle)[0]
-            whole = bool(np.isfinite(signal).all())
-            size = f"up to {np.max(np.abs(signal)):.3g}" if whole else "diverges"
+            is_finite = bool(np.isfinite(signal).all())
+            size = f"up to {np.max(np.abs(signal)):.3g}" if is_finite else "diverges"
             measured = f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
             text = f"simulated {size} at mid-range, measured up to {measured}"
-            yield ContractPoint(f"moves in {replay.record.file}", whole, text)
+            yield ContractPoint(f"moves in {replay.record.file}", is_finite, text)
         yield from plausible(data_issues(campaign, model, space))
     except ArmidError as error:
         yield ContractPoint("model", False, str(error))
@@ -84,9 +84,9 @@ def ready_at(candidate: Array, record: Record, model: Model) -> ReadyRecord:
     return ReadyRecord(record, model, tuple(calibrations))
 
 
-def plausible(found: Sequence[DataIssue]) -> list[ContractPoint]:
+def plausible(issues: Sequence[DataIssue]) -> list[ContractPoint]:
     alike: dict[tuple[str, str], list[str]] = {}
-    for s in found:
+    for s in issues:
         # what holds for several records is one sentence with their names
         of_record, said = s.sentence.startswith(f"{s.record}: "), s.sentence.removeprefix(f"{s.record}: ")
         alike.setdefault((s.kind, said), []).extend([s.record] if of_record else [])

@@ -171,8 +171,8 @@ def check_on(effect: Effect, alone: Model, model: Model) -> Iterator[ContractPoi
         lambda: agrees(model, alone, away(alone, effect, AWAY), manoeuvres[0]),
     )  # fmt: skip
     for point in points:
-        found = point()
-        yield replace(found, name=f"{found.name} {where}")
+        checked = point()
+        yield replace(checked, name=f"{checked.name} {where}")
 
 
 def within(model: Model, part: Model, candidates: Array) -> Array:

@@ -232,10 +232,10 @@ class PlainModel:
         delays = {delay for _, delay in self.late.values() if 0.0 < delay < times[-1] - times[0]}
         if not (self.inputs or delays):
             return times[-1:]
-        found = [times[1:], *(times + delay for delay in delays)]
+        instants = [times[1:], *(times + delay for delay in delays)]
         if any(of in self.states for of, _ in self.late.values()) and delays:
-            found.append(np.arange(times[0], times[-1], min(delays))[1:])
-        ends = np.unique(np.concatenate(found))
+            instants.append(np.arange(times[0], times[-1], min(delays))[1:])
+        ends = np.unique(np.concatenate(instants))
         # what lies within rounding of a sample is that sample
         near = np.abs(ends[:, np.newaxis] - times).min(axis=1)
         ends = ends[(near == 0.0) | (near > 1e-9 * self.manoeuvre.interval)]

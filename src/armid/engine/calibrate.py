@@ -132,9 +132,9 @@ def calibrate(
 def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str) -> Calibration:
     """Return the finest of the calibrations of parts of the candidates: all at once would fill the memory."""
     parts = [candidates[first : first + PART] for first in range(0, len(candidates), PART)]
-    found = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
-    schedule = max((c.schedule for c in found), key=lambda s: s.substeps)
-    return Calibration(replace(schedule, weights=None), max(c.error for c in found), all(c.reached for c in found))
+    calibrations = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
+    schedule = replace(max((c.schedule for c in calibrations), key=lambda s: s.substeps), weights=None)
+    return Calibration(schedule, max(c.error for c in calibrations), all(c.reached for c in calibrations))
 
 
 def switch_weights(candidates: Array, run: Simulation) -> Array | None:
@@ -179,10 +179,10 @@ def long_steps(
     for span in (2, 4, 8):
         places = range(start + 10 - start % 10, last - span, 10 if start < 200 else 40)
         # the later long steps begin, the less they change
-        found = bisect_left(places, True, key=partial(holds, span=span))
-        if found == len(places):
+        index = bisect_left(places, True, key=partial(holds, span=span))
+        if index == len(places):
             break
-        start = places[found]
+        start = places[index]
         plan = longer(start, span)
     return plan if plan.max() > 1 else None
 

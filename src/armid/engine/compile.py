@@ -102,8 +102,8 @@ def load_module(parts: KernelParts) -> ModuleType:
 def compile_error(error: Exception) -> ArmidError:
     # numba writes in bold where colorama is installed
     text, equation = re.sub(r"\x1b\[[\d;]*m", "", str(error)), re.compile(r"(?:\bdef |<function )f__(\w+)")
-    found = equation.search(text) or equation.search(definition_above(error))
-    name = f"the equation '{found[1].replace('__scalar', '').replace('__', '.')}'" if found else "an equation"
+    match = equation.search(text) or equation.search(definition_above(error))
+    name = f"the equation '{match[1].replace('__scalar', '').replace('__', '.')}'" if match else "an equation"
     return ArmidError(f"{name} cannot be compiled ({cause(text)}): numpy, math, numbers and plain functions of numbers "
                       "are expected")  # fmt: skip
 

@@ -100,7 +100,7 @@ class KernelParts:
         guards = [*self.latch_guards, *self.kinks]
         times = [f"time_of_{k}" for k in self.latches]
         carried = [*self.latches, *times, *self.states, *(f"ga_{g}" for g in guards)]
-        late_inputs, late_states = ([one.name for one in several] for several in (self.late_inputs, self.late_states))
+        late_inputs, late_states = ([one.name for one in late] for late in (self.late_inputs, self.late_states))
         driven = [*self.inputs, *late_inputs]
         prefixed = ((self.states, OF_STATES), (driven, OF_INPUTS), (self.outputs, OF_OUTPUTS), (guards, OF_GUARDS),
                     (carried, OF_CARRIED), (late_states, OF_LATE_STATES))  # fmt: skip
@@ -158,8 +158,8 @@ def strengths_of(model: Model) -> dict[str, dict[str, float]]:
     """Return effect -> {key of a strength: its null} of the effects that may be inactive, none in a small model."""
     if len(model.effects) < FEWEST:
         return {}
-    found = {e.name: {f"{e.name}__{p.name}": p.null for p in e.parameters if p.null is not None} for e in model.effects}
-    return {name: strengths for name, strengths in found.items() if strengths}
+    nulls = {e.name: {f"{e.name}__{p.name}": p.null for p in e.parameters if p.null is not None} for e in model.effects}
+    return {name: strengths for name, strengths in nulls.items() if strengths}
 
 
 def use_lines(effect: str, nulls: Mapping[str, float]) -> list[str]:
@@ -237,7 +237,7 @@ class Emitter:
             for n in late if n.kind == kind
         ] for kind, known in (("late_input", inputs), ("late_state", states))}  # fmt: skip
         n_moving = len({n.by for n in late if n.key in seen})
-        delays = [" + ".join(map(variable, several)) for several in by]
+        delays = [" + ".join(map(variable, terms)) for terms in by]
         return delays, n_moving, made["late_input"], made["late_state"]
 
     def uses(self, keys: list[str], wanted: list[str]) -> bool:
@@ -259,11 +259,11 @@ class Emitter:
         users = Counter(key for node in nodes for key in node.needs)
         terms = (key for n in nodes if n.kind == "port" for key in n.terms)
         spared = {key for key in terms if self.is_optional(key) and users[key] == 1}
-        found: list[str] = []
+        lines: list[str] = []
         for n in nodes:
             if n.key not in spared:
-                found += self.sum_lines(n, spared) if spared.intersection(n.terms) else [self.line(n.key, static)]
-        return found
+                lines += self.sum_lines(n, spared) if spared.intersection(n.terms) else [self.line(n.key, static)]
+        return lines
 
     def is_optional(self, key: str) -> bool:
         """Tell whether a term moves and belongs to an effect that may be inactive."""

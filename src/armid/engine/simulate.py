@@ -155,8 +155,8 @@ class Prepared:
         """Return the constants of candidates, some with shares added to their value, see `run`."""
         order = list(self.model.constants)
         moved = np.tile(self.constants, (len(next(iter(shares.values()))), 1))
-        for name, several in shares.items():
-            moved[:, order.index(name)] *= 1.0 + several
+        for name, share in shares.items():
+            moved[:, order.index(name)] *= 1.0 + share
         return moved
 
     def run(self, population: ArrayLike, threads: int = 1, constants: Array | None = None) -> Simulation:

@@ -118,11 +118,11 @@ def advise(
     most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
     promising = sorted(possible, key=lambda f: rank(mean_of(powers[f], 0), powers[f]), reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
-    found = side_by_side(lambda f: simulated(rivals, f, white, draws), promising, threads)
-    each = [(f, *one) for f, one in zip(promising, found, strict=True)]
+    outcomes = side_by_side(lambda f: simulated(rivals, f, white, draws), promising, threads)
+    ranking = [(f, *one) for f, one in zip(promising, outcomes, strict=True)]
     now = max(float(entropy(probabilities(rivals))), 1e-9)
-    each.sort(key=lambda e: rank(e[1] / now, e[2]), reverse=True)
-    return tuple(advice_of(rivals, *one) for one in each)
+    ranking.sort(key=lambda e: rank(e[1] / now, e[2]), reverse=True)
+    return tuple(advice_of(rivals, *one) for one in ranking)
 
 
 def rank(merit: float, powers: Powers) -> tuple[float, float]:
@@ -177,12 +177,12 @@ def predictions_of(
     motions = Motions(rival.records.replays, rival.candidate, speed_limit)
     above, below = rival.z + rival.root.T, rival.z - rival.root.T
     points = rival.records.whole(np.concatenate([rival.z[np.newaxis], above, below]))
-    n, found = len(rival.z), {}
+    n, predictions = len(rival.z), {}
     upward = np.where(outside(above) < outside(below), 1.0, np.where(outside(above) > outside(below), 0.0, 0.5))
     for feasible, signals in motions.signals(grid, points):
         seen = white(signals)
-        found[feasible] = Prediction(seen[0], spread_of(seen[0], seen[1 : n + 1], seen[n + 1 :], upward))
-    return found
+        predictions[feasible] = Prediction(seen[0], spread_of(seen[0], seen[1 : n + 1], seen[n + 1 :], upward))
+    return predictions
 
 
 def spread_of(here: Array, above: Array, below: Array, upward: Array) -> Array:
@@ -191,13 +191,13 @@ def spread_of(here: Array, above: Array, below: Array, upward: Array) -> Array:
 
 
 def predicted_powers(rivals: Sequence[Rival], predictions: Sequence[Prediction], draws: Array) -> Powers:
-    found = {}
+    powers = {}
     for a, b in combinations(range(len(rivals)), 2):
         old = rivals[b].criterion - rivals[a].criterion
         one = chance(predictions[a], predictions[b], old, draws)
         other = chance(predictions[b], predictions[a], -old, draws)
-        found[a, b] = (0.5 * (one[0] + other[0]), float(np.sqrt(0.5 * (one[1] + other[1]))))
-    return found
+        powers[a, b] = (0.5 * (one[0] + other[0]), float(np.sqrt(0.5 * (one[1] + other[1]))))
+    return powers
 
 
 def chance(right: Prediction, wrong: Prediction, old: float, draws: Array) -> tuple[float, float]:

@@ -103,10 +103,10 @@ def bootstrap(
         return without(x, f"the records do not determine {', '.join(unknown)}")
     task = Task(fitness, replays, space, x, information)
     rng = np.random.default_rng(seed)
-    found = refined(task, task.noises(rng, DRAWS), rng, progress)
-    if not found.doubt and np.abs(skew(found.draws)).max() > SKEWED:
-        found = refined(task, task.noises(rng, MANY_DRAWS), rng, progress)
-    return found
+    scatter = refined(task, task.noises(rng, DRAWS), rng, progress)
+    if not scatter.doubt and np.abs(skew(scatter.draws)).max() > SKEWED:
+        scatter = refined(task, task.noises(rng, MANY_DRAWS), rng, progress)
+    return scatter
 
 
 def without(x: Array, doubt: str) -> Scatter:
@@ -173,15 +173,15 @@ class Task:
         """Return the fitness of the candidates of each draw, (n_draws, n_candidates), from U with a last axis more."""
         n_draws, n_candidates, n = U.shape
         size = max(MOST_VALUES // (n_candidates * measured.shape[1]), LANES)
-        found = np.empty((n_draws, n_candidates))
+        values = np.empty((n_draws, n_candidates))
         for begin in range(0, n_draws, size):
             part = slice(begin, begin + size)
             whole = self.space.complete(self.candidates(U[part]).reshape(-1, n))
             signals = [s.reshape(-1, n_candidates, s.shape[1]) for s in signals_of(self.replays, whole)]
             for i, row in enumerate(measured[part]):
-                found[begin + i] = fitness_of(self.fitness, self.replays, np.split(row, self.ends),
-                                              [s[i] for s in signals], self.weights, self.sizes)  # fmt: skip
-        return found
+                values[begin + i] = fitness_of(self.fitness, self.replays, np.split(row, self.ends),
+                                               [s[i] for s in signals], self.weights, self.sizes)  # fmt: skip
+        return values
 
 
 def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Callable[[Refined], bool]) -> Scatter:
@@ -207,10 +207,10 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
         ends = np.quantile(kept, (0.025, 0.975), axis=0)
         low, high = np.where(skewed, ends[0], low), np.where(skewed, ends[1], high)
     moved = (draws[0] - x) / np.maximum(deviation, 1e-300)
-    found = Scatter(kept, low, high, kept.mean(axis=0) - x, moved)
+    scatter = Scatter(kept, low, high, kept.mean(axis=0) - x, moved)
     if lost[0] or np.abs(moved).max() > AT_MINIMUM:
-        return replace(found, doubt=f"the search has not come to the minimum of {task.fitness.name}", is_far=True)
-    return found
+        return replace(scatter, doubt=f"the search has not come to the minimum of {task.fitness.name}", is_far=True)
+    return scatter
 
 
 class ParallelCmaes:

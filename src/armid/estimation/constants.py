@@ -88,34 +88,34 @@ def products(records: LeastSquaresProblem, z: Array, tolerances: Mapping[str, fl
         return ()
     slopes = slopes_of_constants(records, z, names)
     lengths = np.linalg.norm(slopes, axis=1)
-    left, found = [i for i in range(len(names)) if lengths[i] > NOTHING * lengths.max()], []
+    left, products = [i for i in range(len(names)) if lengths[i] > NOTHING * lengths.max()], []
     while left:
         first = left[0]
         cosines = {i: float(slopes[first] @ slopes[i]) / (lengths[first] * lengths[i]) for i in left}
         members = [i for i in left if abs(cosines[i]) > 1.0 - ONE]
         exponents = tuple(float(np.sign(cosines[i]) * lengths[i] / lengths[first]) for i in members)
         tolerance = float(np.linalg.norm([e * tolerances[names[i]] for e, i in zip(exponents, members, strict=True)]))
-        found.append(Product(tuple(names[i] for i in members), exponents, tolerance, slopes[first]))
+        products.append(Product(tuple(names[i] for i in members), exponents, tolerance, slopes[first]))
         left = [i for i in left if i not in members]
-    return tuple(found)
+    return tuple(products)
 
 
-def columns_of(found: Sequence[Product], n_samples: int) -> Array:
-    return np.array([p.column for p in found]).reshape(len(found), n_samples).T
+def columns_of(products: Sequence[Product], n_samples: int) -> Array:
+    return np.array([p.column for p in products]).reshape(len(products), n_samples).T
 
 
-def common_factors(names: Sequence[str], slopes: Array, found: Sequence[Product]) -> tuple[str, ...]:
+def common_factors(names: Sequence[str], slopes: Array, products: Sequence[Product]) -> tuple[str, ...]:
     """Return in words which parameters the records give only together with constants.
 
     Of each parameter the smallest set of constants and further parameters that makes up for a change of it.
     """
-    if len(names) + len(found) < 2:
+    if len(names) + len(products) < 2:
         return ()
-    every = np.column_stack([slopes, *(p.slope for p in found)])
-    lengths = np.linalg.norm(every, axis=0)
-    labels = [*names, *(p.public.removeprefix(NAMED) for p in found)]
+    columns = np.column_stack([slopes, *(p.slope for p in products)])
+    lengths = np.linalg.norm(columns, axis=0)
+    labels = [*names, *(p.public.removeprefix(NAMED) for p in products)]
     seen = [i for i, length in enumerate(lengths) if length > NOTHING * lengths.max()]
-    small: Array = np.asarray(np.linalg.qr(every[:, seen] / lengths[seen], mode="r"))
+    small: Array = np.asarray(np.linalg.qr(columns[:, seen] / lengths[seen], mode="r"))
     said: dict[frozenset[str], str] = {}
     for place, i in enumerate(seen):
         others = [k for k in range(len(seen)) if k != place]

@@ -149,11 +149,9 @@ def corrections_of_keys(plant: Plant, record: Record) -> Iterator[Correction]:
             words = f"start and end ({key.unlike} and {key.constant}) look exchanged: the other way round"
             yield correction(words, lambda given, a=key.constant, b=key.unlike: {a: given[b], b: given[a]})
     degrees = [k for k in plant.keys if k.key.endswith("_deg") and may_be_radians(k, constants[k.constant] / k.factor)]
-    for several in sorted({tuple(degrees), *((k,) for k in degrees)} - {()}, key=len):
-        words = (
-            f"{' and '.join(k.key for k in several)} {'look' if several[1:] else 'looks'} given in radians: in degrees"
-        )
-        names = [k.constant for k in several]
+    for keys in sorted({tuple(degrees), *((k,) for k in degrees)} - {()}, key=len):
+        words = f"{' and '.join(k.key for k in keys)} {'look' if keys[1:] else 'looks'} given in radians: in degrees"
+        names = [k.constant for k in keys]
         yield correction(words, lambda given, names=names: {n: IN_DEGREES * given[n] for n in names}, "angle")
 
 

@@ -82,20 +82,20 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
         return (*seen, *times)
     trial = Trial(model, space).scaled(train)
     train = [trial.thinned(r, len(train)) for r in train]
-    found, z = mistakes(trial, train)
-    found = of_two(found, train)
+    issues, z = mistakes(trial, train)
+    issues = of_two(issues, train)
     errors = trial.errors(train, z)[0]
-    if not found:
+    if not issues:
         n = len(campaign.holdout)
         others = [trial.thinned(shortened(r, n), n) for r in campaign.holdout if r.file not in noise]
-        found += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))
-                  if s.after * AS_GOOD < least_nearby(trial, train, r, z)]  # fmt: skip
+        issues += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))
+                   if s.after * AS_GOOD < least_nearby(trial, train, r, z)]  # fmt: skip
         worst = int(np.argmax(errors))
-        if not found and LEFT < errors[worst] < np.inf:
-            found = [beyond(train[worst].file, float(errors[worst]))]
-    found += () if found else begun_elsewhere(trial, train, z)
-    told = {s.record for s in found if s.kind == "time"}
-    return (*seen, *(s for s in times if not told & {"", s.record}), *found)
+        if not issues and LEFT < errors[worst] < np.inf:
+            issues = [beyond(train[worst].file, float(errors[worst]))]
+    issues += () if issues else begun_elsewhere(trial, train, z)
+    files = {s.record for s in issues if s.kind == "time"}
+    return (*seen, *(s for s in times if not files & {"", s.record}), *issues)
 
 
 def filled(record: Record) -> Record:
@@ -114,8 +114,8 @@ class Trial:
 
     def problem(self, records: Sequence[Record]) -> WeightedRecords:
         rough = Calibration(Schedule(SUBSTEPS), np.nan, True)
-        whole = [ReadyRecord(r, self.model, (rough,) * len(r.pieces)) for r in records]
-        ready = tuple(one for each in whole for one in each.each)
+        prepared = [ReadyRecord(r, self.model, (rough,) * len(r.pieces)) for r in records]
+        ready = tuple(one for record in prepared for one in record.each)
         # of an angle or a position the zero says nothing
         moved = [r.measured - (np.mean(r.measured) if r.record.unit in ("rad", "m") else 0.0) for r in ready]
         return WeightedRecords(ready, self.space, tuple(1.0 / max(float(np.linalg.norm(x)), 1e-300) for x in moved))
@@ -151,10 +151,10 @@ class Trial:
         if step < 2 or len(record.pieces) > 1 or record.pieces[0].start_index:
             return record
         Z = self.spread([record], N_BEST)
-        whole = self.signals(record, Z)
+        signals = self.signals(record, Z)
         while step > 1:
             rarer = every(record, step, self.model.plant)
-            kept = [signal[:, -record.pieces[0].window.start % step :: step] for signal in whole]
+            kept = [signal[:, -record.pieces[0].window.start % step :: step] for signal in signals]
             pairs = zip(self.signals(rarer, Z), kept, strict=True)
             if all(float(np.linalg.norm(a - b)) <= SAME * float(np.linalg.norm(b)) for a, b in pairs):
                 return rarer
@@ -230,24 +230,24 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
     starts = [z, *(t[0] for t in likely)]
     z, before = trial.fit_hard(train, starts)
-    found = chosen(
+    issues = chosen(
         "", before, [(own.fit_hard(undone, starts)[1], correction) for _, _, correction, own, undone in likely]
     )
-    if trial.errors(train, z).max() <= TOLERABLE or any(s.after <= TOLERABLE for s in found):
-        return found, z
-    everywhere, found = found, of_few(trial, train, before, below)
-    if found:
-        return found, z
+    if trial.errors(train, z).max() <= TOLERABLE or any(s.after <= TOLERABLE for s in issues):
+        return issues, z
+    everywhere, issues = issues, of_few(trial, train, before, below)
+    if issues:
+        return issues, z
     z = agreed(trial, train, z)
     errors = trial.errors(train, z)[0]
     typical = typical_of(errors)
     outside = [train[i] for i in np.argsort(-errors)[:MOST_APART] if errors[i] > max(TOLERABLE, APART * typical)]
-    found = exchanged(trial, train, outside, before) or [s for r in outside for s in apart(trial, r, z, typical)]
-    if not found and not everywhere and trial.model.plant.from_rest:
+    issues = exchanged(trial, train, outside, before) or [s for r in outside for s in apart(trial, r, z, typical)]
+    if not issues and not everywhere and trial.model.plant.from_rest:
         # a driven machine drifts away from a model without friction
-        found = [unlike(r.file, e) for r, e in zip(train, errors, strict=True)
-                 if NOTHING < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
-    return found or everywhere, z
+        issues = [unlike(r.file, e) for r, e in zip(train, errors, strict=True)
+                  if NOTHING < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
+    return issues or everywhere, z
 
 
 def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -> list[DataIssue]:
@@ -262,27 +262,27 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
         undone = tuple(changes[r.file].undo(r) if r.file in changes else r for r in train)
         own, (file, correction) = trial.scaled(undone), next(iter(changes.items()))
         tried.append((*own.fit(undone, below=below), own, undone, file, correction))
-    found, hidden = [], []
+    sufficient, hidden = [], []
     for start, _, own, undone, file, correction in sorted(tried, key=lambda t: t[1])[:N_LIKELY]:
         z, error = own.fit_hard(undone, [start])
         if own.errors(undone, z).max() <= TOLERABLE:
-            found.append((error, file, correction))
+            sufficient.append((error, file, correction))
         elif correction.other and before > NOTHING and error <= EXCHANGED:
             hidden.append((error, file, correction))
-    if not found:
+    if not sufficient:
         best = min(hidden, key=lambda f: f[0], default=None)
         return [] if best is None else [best[2].issue(best[1], before, best[0])]
-    first = min(found, key=lambda f: f[0])[1]
-    told = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in found]
-    return chosen(first, before, told)
+    first = min(sufficient, key=lambda f: f[0])[1]
+    pairs = [(e, m if file == first else replace(m, words=f"{file}: {m.words}")) for e, file, m in sufficient]
+    return chosen(first, before, pairs)
 
 
-def of_two(found: Sequence[DataIssue], train: Sequence[Record]) -> list[DataIssue]:
+def of_two(issues: Sequence[DataIssue], train: Sequence[Record]) -> list[DataIssue]:
     """Return issues, where those against one of two train records say that it may as well be the other."""
     if len(train) != 2:
-        return list(found)
+        return list(issues)
     doubt = f" {train[0].file} and {train[1].file} disagree: one of the two is wrong, and no third record tells which."
-    return [replace(s, sentence=f"{s.sentence}{doubt}") if s.record and s.kind not in SURE else s for s in found]
+    return [replace(s, sentence=f"{s.sentence}{doubt}") if s.record and s.kind not in SURE else s for s in issues]
 
 
 def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Correction]]:
@@ -518,9 +518,9 @@ def fingerprints(values: Array) -> NDArray[np.uint64]:
     n = len(values) - ALIKE + 1
     if n < 1:
         return np.empty(0, dtype=np.uint64)
-    bits, found = np.ascontiguousarray(values + 0.0).view(np.uint64), np.zeros(n, dtype=np.uint64)
+    bits, hashes = np.ascontiguousarray(values + 0.0).view(np.uint64), np.zeros(n, dtype=np.uint64)
     changes = np.append(0, np.cumsum(values[1:] != values[:-1]))
     for i in range(ALIKE):
-        found = found * np.uint64(0x100000001B3) + bits[i : i + n]
-        found ^= found >> np.uint64(29)
-    return np.unique(found[changes[ALIKE - 1 :] - changes[:n] >= DIFFERENT])
+        hashes = hashes * np.uint64(0x100000001B3) + bits[i : i + n]
+        hashes ^= hashes >> np.uint64(29)
+    return np.unique(hashes[changes[ALIKE - 1 :] - changes[:n] >= DIFFERENT])

@@ -93,14 +93,14 @@ def offers(
     """
     low, span = space.low[space.free], space.high[space.free] - space.low[space.free]
     candidates = space.complete(low + stencil((x - low) / span) * span)
-    before, found = np.sqrt(np.diag(inverse(fisher))) * span, []
+    before, offers = np.sqrt(np.diag(inverse(fisher))) * span, []
     for feasible, signals in motions.signals(grid, candidates):
         more = fisher
         for level, signal in zip(levels, signals, strict=True):
             slopes = slopes_of(signal)
             more = more + level.effective_fraction / level.rms**2 * slopes @ slopes.T
-        found.append(Offer(feasible, before, np.sqrt(np.diag(inverse(more))) * span, gain(fisher, more, by)))
-    return tuple(sorted(found, key=lambda offer: -offer.gain))
+        offers.append(Offer(feasible, before, np.sqrt(np.diag(inverse(more))) * span, gain(fisher, more, by)))
+    return tuple(sorted(offers, key=lambda offer: -offer.gain))
 
 
 def gain(fisher: Array, more: Array, by: str) -> float:
@@ -200,12 +200,12 @@ def starts_at(initial: Callable[..., float], key: ManoeuvreKey, value: float) ->
 
 def key_travel(plant: Plant) -> dict[str, tuple[float, float]]:
     """Return state -> its range, SI, where the state starts at the constant of a key that has a range."""
-    found = {}
+    ranges = {}
     for key, state in product(plant.keys, plant.states):
         ends = [key.factor * end for end in range_of(key)]
         if np.isfinite(ends).all() and starts_at(state.initial, key, ends[0]):
-            found[state.name] = (min(ends), max(ends))
-    return found
+            ranges[state.name] = (min(ends), max(ends))
+    return ranges
 
 
 def changed_inputs(records: Sequence[Record]) -> Iterator[Feasible]:

@@ -63,15 +63,15 @@ def groups(fisher: Array, names: tuple[str, ...]) -> tuple[Group, ...]:
     scaled, seen = normalised(fisher)
     visible = tuple(n for n, s in zip(names, seen, strict=True) if s)
     scale = np.sqrt(np.diag(fisher)[seen])
-    left, found = tuple(range(len(visible))), []
+    left, groups = tuple(range(len(visible))), []
     while (index := index_of(scaled, left)) >= CRITICAL:
         members = smallest(scaled, left, max(CRITICAL, EXPLAINS * index))
         _, vectors = np.linalg.eigh(scaled[np.ix_(members, members)])
         moves = vectors[:, 0] / scale[list(members)]
         moves = moves / moves[int(np.argmax(np.abs(moves)))]
-        found.append(Group(tuple(visible[i] for i in members), index_of(scaled, members), moves))
+        groups.append(Group(tuple(visible[i] for i in members), index_of(scaled, members), moves))
         left = min((tuple(i for i in left if i != m) for m in members), key=lambda rest: index_of(scaled, rest))
-    return tuple(found)
+    return tuple(groups)
 
 
 def collinearity_index(fisher: Array) -> float:
@@ -174,7 +174,7 @@ def examine(
     records = as_scattered(weighted_records(train, space), levels_of(train, space, start, noise))
     if not np.isfinite(records.chi2(records.shares(start))[0]):
         raise ArmidError("the simulation diverges at the point that was given: another point is expected")
-    z, found = profiles(records, records.shares(start), progress)
+    z, curves = profiles(records, records.shares(start), progress)
     minimum = records.values(z)
     at = minimum if x is None else start
     information = information_at(train, space, at, levels_of(train, space, at, noise), records.weights)
@@ -192,7 +192,7 @@ def examine(
     return Examination(campaign, model, space, train, at, x is not None, minimum, information,
                        groups(information.fisher, space.free_names),
                        common_factors(space.free_names, relative, within) if within else (),
-                       wider if within else information.deviation, found, bought, by)  # fmt: skip
+                       wider if within else information.deviation, curves, bought, by)  # fmt: skip
 
 
 def as_scattered(records: WeightedRecords, levels: Sequence[Level]) -> WeightedRecords:

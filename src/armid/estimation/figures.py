@@ -29,29 +29,29 @@ PAIRS = (
 ELLIPSE = 2.4477
 
 
-def figures_of(found: Identification) -> dict[str, Callable[[], Any]]:
-    made: dict[str, Callable[[], Any]] = {"fit": lambda: fit_figure(found)}
-    made |= {"convergence": lambda: convergence_figure(found)} if len(found.trace[0]) else {}
-    own = found.candidate[found.space.free], found.campaign.truth
-    draws = None if found.scatter is None else found.scatter.draws
-    return made | pairs_of(found.campaign.name, found.space, found.information, *own, draws)
+def figures_of(identification: Identification) -> dict[str, Callable[[], Any]]:
+    made: dict[str, Callable[[], Any]] = {"fit": lambda: fit_figure(identification)}
+    made |= {"convergence": lambda: convergence_figure(identification)} if len(identification.trace[0]) else {}
+    own = identification.candidate[identification.space.free], identification.campaign.truth
+    draws = None if identification.scatter is None else identification.scatter.draws
+    return made | pairs_of(identification.campaign.name, identification.space, identification.information, *own, draws)
 
 
-def fit_figure(found: Identification) -> Any:
-    replays = chosen(found)
+def fit_figure(identification: Identification) -> Any:
+    replays = chosen(identification)
     figure, axes = record_axes(len(replays), 4.4, (3, 1.4))
     for pair, replay in zip(axes, replays, strict=True):
         factor, unit = shown(1.0, replay.record.unit)
-        curves = curves_of(replay, found.candidate)
+        curves = curves_of(replay, identification.candidate)
         rms = factor * np.sqrt(np.mean(curves["residual"] ** 2))
         pair[0].set_title(f"{replay.name} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
         draw_record(pair, {name: (replay.times, y) for name, y in curves.items()}, replay.record.unit)
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=2, frameon=False)
-    there_are = len(found.train_replays) + len(found.holdout_replays)
-    model = " + ".join([found.model.plant.name, *(e.name for e in found.model.effects)])
+    there_are = len(identification.train_replays) + len(identification.holdout_replays)
+    model = " + ".join([identification.model.plant.name, *(e.name for e in identification.model.effects)])
     some = "" if len(replays) == there_are else f" ({len(replays)} of {there_are} records)"
-    title = f"{found.campaign.name}: {model}, {found.identifier} on {found.fitness.name}{some}"
-    entitle(figure, title, "large")
+    search = f"{identification.identifier} on {identification.fitness.name}"
+    entitle(figure, f"{identification.campaign.name}: {model}, {search}{some}", "large")
     return figure
 
 
@@ -60,9 +60,9 @@ def curves_of(replay: Replay, candidate: Array) -> dict[str, Array]:
     return {"measured": measured, "simulated": simulated, "residual": measured - simulated}
 
 
-def chosen(found: Identification) -> list[Replay]:
+def chosen(identification: Identification) -> list[Replay]:
     """Return the records that are drawn: the first of each role where there are too many."""
-    train, holdout = list(found.train_replays), list(found.holdout_replays)
+    train, holdout = list(identification.train_replays), list(identification.holdout_replays)
     n_holdout = min(len(holdout), max(MOST_FITS_DRAWN // 2, MOST_FITS_DRAWN - len(train)))
     return train[: MOST_FITS_DRAWN - n_holdout] + holdout[:n_holdout]
 
@@ -92,17 +92,17 @@ def draw_record(axes: Sequence[Any], curves: Mapping[str, Any], si_unit: str) ->
         axis.margins(x=0.01)
 
 
-def convergence_figure(found: Identification) -> Any:
+def convergence_figure(identification: Identification) -> Any:
     """Draw the best fitness, or for a similarity its degree, against the number of simulations."""
     from matplotlib.ticker import LogLocator, StrMethodFormatter
 
-    similarity = found.fitness.name.partition(":")[0] in SIMILARITIES
-    evaluations, values = found.trace
-    x, y = np.append(evaluations, found.used), np.append(values, values[-1:])
+    similarity = identification.fitness.name.partition(":")[0] in SIMILARITIES
+    evaluations, values = identification.trace
+    x, y = np.append(evaluations, identification.used), np.append(values, values[-1:])
     figure, axis = pyplot().subplots(figsize=(6.8, 4.2), layout="constrained")
     # the SI unit of a fitness that has that of the signal, "" for another, or for one of several outputs
-    units = {r.record.unit for r in judged_by(found.fitness, found.train_replays)}
-    si_unit = next(iter(units)) if found.fitness.unit == "signal" and len(units) == 1 else ""
+    units = {r.record.unit for r in judged_by(identification.fitness, identification.train_replays)}
+    si_unit = next(iter(units)) if identification.fitness.unit == "signal" and len(units) == 1 else ""
     factor, unit = shown(1.0, si_unit) if si_unit else (1.0, "")
     height = 1.0 - y if similarity else y * factor
     axis.step(x, height, where="post", color=OKABE_ITO["blue"], lw=1.8)
@@ -112,10 +112,10 @@ def convergence_figure(found: Identification) -> Any:
         axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
         axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))
-    named = f"{found.fitness.name} [{unit}]" if unit else found.fitness.name
+    named = f"{identification.fitness.name} [{unit}]" if unit else identification.fitness.name
     axis.set(ylabel="similarity degree of the best" if similarity else f"best {named}", xlabel="simulations")
-    text = f"{found.campaign.name}: {found.identifier}, seed {found.seed}, ends at {height[-1]:.6g} {unit}"
-    axis.set_title(text.rstrip(), fontsize="medium")
+    text = f"{identification.identifier}, seed {identification.seed}, ends at {height[-1]:.6g} {unit}".rstrip()
+    axis.set_title(f"{identification.campaign.name}: {text}", fontsize="medium")
     return figure
 
 

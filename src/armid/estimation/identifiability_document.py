@@ -136,10 +136,10 @@ def offer_table(result: Mapping[str, Any], most: int = MOST_OFFERS) -> Table:
     n_all = len(result["parameters"])
     some = "" if len(names) == n_all else f", {len(names)} of {n_all} parameters"
     repeats = [offer for offer in offers[most:] if " once more" in offer["words"]][:1]
-    told = {name: result["parameters"][name] for name in names}
-    rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in told.items()), 1.0)]
+    entries = {name: result["parameters"][name] for name in names}
+    rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in entries.items()), 1.0)]
     for offer in (*offers[:most], *repeats):
-        cells = [deviation_text(name, p, offer["deviation"][name]["after"]) for name, p in told.items()]
+        cells = [deviation_text(name, p, offer["deviation"][name]["after"]) for name, p in entries.items()]
         rows.append((offer["words"], *cells, offer["gain"]))
     columns = ["one more record of", *names, Column("gain", "gain", ".3g")]
     return table(f"What one more manoeuvre would buy (deviations{some})", columns, rows)
@@ -156,50 +156,51 @@ def most_helped(names: list[str], offers: list[Mapping[str, Any]]) -> list[str]:
     return [names[i] for i in sorted(np.argsort(-helped, kind="stable")[:MOST_COLUMNS])]
 
 
-def parts_of(found: Examination) -> Parts:
-    return Parts(result_of(found), {}, figures_of(found))
+def parts_of(examination: Examination) -> Parts:
+    return Parts(result_of(examination), {}, figures_of(examination))
 
 
-def result_of(found: Examination) -> dict[str, Any]:
+def result_of(examination: Examination) -> dict[str, Any]:
     """Return everything of an examination that JSON can hold, SI throughout; what is not known is null."""
-    names, correlation, fisher = found.space.free_names, found.information.correlation, found.information.fisher
-    levels = {r.name: level for r, level in zip(found.replays, found.information.levels, strict=True)}
+    space, information = examination.space, examination.information
+    names, correlation, fisher = space.free_names, information.correlation, information.fisher
+    levels = {r.name: level for r, level in zip(examination.replays, information.levels, strict=True)}
     return plain({
-        "campaign": found.campaign.name,
-        "plant": found.model.plant.name,
-        "effects": [e.name for e in found.model.effects],
-        "unit": found.campaign.unit,
-        "at": "given" if found.given else "estimate",
-        "parameters": entries_of(found),
-        "fixed": {n: float(v) for n, v in zip(found.space.names, found.space.fixed, strict=True) if not np.isnan(v)},
+        "campaign": examination.campaign.name,
+        "plant": examination.model.plant.name,
+        "effects": [e.name for e in examination.model.effects],
+        "unit": examination.campaign.unit,
+        "at": "given" if examination.given else "estimate",
+        "parameters": entries_of(examination),
+        "fixed": {n: float(v) for n, v in zip(space.names, space.fixed, strict=True) if not np.isnan(v)},
         "correlation": {name: dict(zip(names, row, strict=True)) for name, row in zip(names, correlation, strict=True)},
         "collinearity_index": collinearity_index(fisher),
-        "groups": [plain(g) | {"direction": by_name(g.names, g.direction)} for g in found.groups],
+        "groups": [plain(g) | {"direction": by_name(g.names, g.direction)} for g in examination.groups],
         "directions": directions(fisher, names),
         "records": {file: {"level": level.rms, **plain(level)} for file, level in levels.items()},
-        "ranked_by": found.ranked_by,
+        "ranked_by": examination.ranked_by,
         "offers": [
             {"manoeuvre": dict(o.feasible.keys), "words": o.feasible.name, "gain": o.gain, "deviation": {
                 name: {"before": o.before[i], "after": o.after[i]} for i, name in enumerate(names)
-            }} for o in found.offers
+            }} for o in examination.offers
         ],
-        "remarks": remarks(found),
-        "for_the_record": level_remarks(found),
+        "remarks": remarks(examination),
+        "for_the_record": level_remarks(examination),
         "versions": versions_of(PACKAGES),
     })  # fmt: skip
 
 
-def entries_of(found: Examination) -> dict[str, dict[str, Any]]:
-    return {p.name: entry(found, i, p) for i, p in enumerate(found.profiles)}
+def entries_of(examination: Examination) -> dict[str, dict[str, Any]]:
+    return {p.name: entry(examination, i, p) for i, p in enumerate(examination.profiles)}
 
 
-def entry(found: Examination, i: int, profile: Profile) -> dict[str, Any]:
-    value, half = float(found.x[i]), float(found.information.half_width[i])
+def entry(examination: Examination, i: int, profile: Profile) -> dict[str, Any]:
+    value, half = float(examination.x[i]), float(examination.information.half_width[i])
     return {
-        "value": value, "unit": profile.unit, "deviation": found.information.deviation[i],
-        "deviation_with_tolerances": found.wider[i],
+        "value": value, "unit": profile.unit, "deviation": examination.information.deviation[i],
+        "deviation_with_tolerances": examination.wider[i],
         "low": value - half, "high": value + half,
-        "bound_low": profile.box[0], "bound_high": profile.box[1], "bound_active": bool(found.at_bound[i]),
+        "bound_low": profile.box[0], "bound_high": profile.box[1], "bound_active": bool(examination.at_bound[i]),
         "profile": {
             "minimum": profile.estimate, "low": profile.low, "high": profile.high,
             "bounded_low": profile.bounded[0], "bounded_high": profile.bounded[1],
@@ -221,40 +222,41 @@ def by_name(names: Sequence[str], values: Array) -> dict[str, float]:
     return dict(zip(names, (float(v) for v in values), strict=True))
 
 
-def remarks(found: Examination) -> list[str]:
+def remarks(examination: Examination) -> list[str]:
     """Return what a reader must know, one sentence each: groups first, the best offer last."""
-    names, fisher, told = found.space.free_names, found.information.fisher, entries_of(found)
-    said = [group_remark(found, group) for group in found.groups]
+    names, fisher, entries = examination.space.free_names, examination.information.fisher, entries_of(examination)
+    said = [group_remark(examination, group) for group in examination.groups]
     said += [f"{p.name} is not seen at all in these records: any value in the box leaves them as they are."
-             for p in found.profiles if not fisher[names.index(p.name), names.index(p.name)] > 0.0]  # fmt: skip
-    said += [text for p in found.profiles if (text := profile_remark(found, p))]
-    said += [f"With the constants within their tolerances, {text}." for text in found.combinations]
-    if (found.wider > found.information.deviation).any():
-        each = (f"{n} {deviation_text(n, told[n], wide)}" for n, wide in zip(names, found.wider, strict=True))
-        said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(each)}.")
-    said += point_remarks(found) + level_remarks(found)
-    if found.offers:
-        return [*said, f"One more record, {offer_text(found, found.offers[0])}."]
+             for p in examination.profiles if not fisher[names.index(p.name), names.index(p.name)] > 0.0]  # fmt: skip
+    said += [text for p in examination.profiles if (text := profile_remark(examination, p))]
+    said += [f"With the constants within their tolerances, {text}." for text in examination.combinations]
+    if (examination.wider > examination.information.deviation).any():
+        deviations = (f"{n} {deviation_text(n, entries[n], wide)}"
+                      for n, wide in zip(names, examination.wider, strict=True))  # fmt: skip
+        said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(deviations)}.")
+    said += point_remarks(examination) + level_remarks(examination)
+    if examination.offers:
+        return [*said, f"One more record, {offer_text(examination, examination.offers[0])}."]
     return [*said, "No further manoeuvre was found that the machine could make."]
 
 
-def group_remark(found: Examination, group: Group) -> str:
-    span = (found.space.high - found.space.low)[found.space.free]
+def group_remark(examination: Examination, group: Group) -> str:
+    span = (examination.space.high - examination.space.low)[examination.space.free]
     leader = int(np.argmax(np.abs(group.direction)))
-    moves, told = [], entries_of(found)
+    moves, entries = [], entries_of(examination)
     for name, share in zip(group.names, group.direction, strict=True):
-        change = 0.01 * float(share) * float(span[found.space.free_names.index(name)])
-        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(name, told[name], abs(change))} of {name}")
+        change = 0.01 * float(share) * float(span[examination.space.free_names.index(name)])
+        moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(name, entries[name], abs(change))} of {name}")
     followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
             f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
             f"{followers}.")  # fmt: skip
 
 
-def profile_remark(found: Examination, profile: Profile) -> str:
+def profile_remark(examination: Examination, profile: Profile) -> str:
     """Return the sentence for a profile that is not bounded, or that tells another interval than the curvature."""
     value, factor = profile.name, scale_of(profile.unit)[1]
-    null = found.model.parameters[profile.name].null
+    null = examination.model.parameters[profile.name].null
     low, high = profile.bounded
     if not (low or high):
         return f"{value} is bounded on neither side: the records leave open the whole box."
@@ -266,31 +268,31 @@ def profile_remark(found: Examination, profile: Profile) -> str:
     if low != high:
         side = "above" if low else "below"
         return f"{value} is not bounded {side}: the 95 % interval runs into the box."
-    told, by = (interval_text(a * factor, b * factor) for a, b in ((profile.low, profile.high), profile.curvature))
+    interval, by = (interval_text(a * factor, b * factor) for a, b in ((profile.low, profile.high), profile.curvature))
     unit = "" if profile.unit == "1" else f" {shown(0.0, profile.unit)[1]}"
-    return (f"{value}: the profile says {told}{unit}, the curvature {by}: the records are not symmetric about the "
+    return (f"{value}: the profile says {interval}{unit}, the curvature {by}: the records are not symmetric about the "
             "minimum, or a bound holds what would make up for it; believe the profile.")  # fmt: skip
 
 
-def point_remarks(found: Examination) -> list[str]:
-    names, deviation = found.space.free_names, found.information.deviation
+def point_remarks(examination: Examination) -> list[str]:
+    names, deviation = examination.space.free_names, examination.information.deviation
     with np.errstate(invalid="ignore", divide="ignore"):
-        away = np.nan_to_num(np.abs(found.x - found.minimum) / deviation, nan=0.0, posinf=0.0)
-        wider = deviation / np.array([p.deviation for p in found.profiles])
+        away = np.nan_to_num(np.abs(examination.x - examination.minimum) / deviation, nan=0.0, posinf=0.0)
+        wider = deviation / np.array([p.deviation for p in examination.profiles])
     wider = np.nan_to_num(wider, nan=1.0, posinf=1.0)
-    if found.given and away.max() > AWAY:
+    if examination.given and away.max() > AWAY:
         return [f"The point that was given is not the least-squares minimum: {names[int(away.argmax())]} is "
                 f"{away.max():.3g} standard deviations from it. The profiles are drawn around the minimum. All other "
                 "results belong to the point."]  # fmt: skip
-    if not found.given and wider.max() >= WIDENS:
+    if not examination.given and wider.max() >= WIDENS:
         return [f"Records start from measured states, whose noise widens the deviation of {names[int(wider.argmax())]} "
                 f"{wider.max():.3g} times; the profiles do not show it."]  # fmt: skip
     return []
 
 
-def level_remarks(found: Examination) -> list[str]:
+def level_remarks(examination: Examination) -> list[str]:
     texts: dict[str, list[str]] = {}
-    for replay, level in zip(found.replays, found.information.levels, strict=True):
+    for replay, level in zip(examination.replays, examination.information.levels, strict=True):
         texts.setdefault(level_text(level, replay.record.unit, replay.record.noise.rms), []).append(replay.name)
     said = [f"{listed(files[:MOST_NAMED])}: {text}" for text, files in texts.items()]
     return said[:MOST_NAMED] + ([f"So it is with {len(said) - MOST_NAMED} more."] if len(said) > MOST_NAMED else [])
@@ -311,9 +313,9 @@ def level_text(level: Level, unit: str, noise: float) -> str:
     return f"noise {value:.2g} {name} rms{coloured}."
 
 
-def offer_text(found: Examination, offer: Offer) -> str:
+def offer_text(examination: Examination, offer: Offer) -> str:
     i = offer.best
-    name, p = found.space.free_names[i], entry(found, i, found.profiles[i])
+    name, p = examination.space.free_names[i], entry(examination, i, examination.profiles[i])
     before, after = (deviation_text(name, p, float(d[i])) for d in (offer.before, offer.after))
     return f"{offer.feasible.name}: {name} from {before} to {after}"
 
@@ -325,13 +327,14 @@ MOST_RECORDS, MOST_PANELS = 4, 12
 LINE = 60
 
 
-def figures_of(found: Examination) -> dict[str, Callable[[], Any]]:
-    pairs = pairs_of(found.campaign.name, found.space, found.information, found.x, found.campaign.truth)
-    return {"profiles": lambda: profile_figure(found), "sensitivities": lambda: sensitivity_figure(found), **pairs}
+def figures_of(examination: Examination) -> dict[str, Callable[[], Any]]:
+    campaign = examination.campaign
+    own = {"profiles": lambda: profile_figure(examination), "sensitivities": lambda: sensitivity_figure(examination)}
+    return own | pairs_of(campaign.name, examination.space, examination.information, examination.x, campaign.truth)
 
 
-def profile_figure(found: Examination) -> Any:
-    shown = found.profiles[:MOST_PANELS]
+def profile_figure(examination: Examination) -> Any:
+    shown = examination.profiles[:MOST_PANELS]
     columns = min(len(shown), 2 if len(shown) <= 4 else 3)
     rows = -(-len(shown) // columns)
     size = (4.6 * columns, 3.3 * rows + 1.0)
@@ -344,7 +347,7 @@ def profile_figure(found: Examination) -> Any:
         axis.set_ylabel("rise of chi2")
     handles = dict(pair for axis in axes.flat for pair in zip(*axis.get_legend_handles_labels()[::-1], strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(fill(f"{title(found)}: profile likelihood", LINE * columns // 2 + 15), fontsize="large")
+    figure.suptitle(fill(f"{title(examination)}: profile likelihood", LINE * columns // 2 + 15), fontsize="large")
     return figure
 
 
@@ -390,64 +393,64 @@ def view(profile: Profile) -> tuple[float, float]:
     return left - room, right + room
 
 
-def sensitivity_figure(found: Examination) -> Any:
+def sensitivity_figure(examination: Examination) -> Any:
     """Draw correlations, the information of each record, and the sensitivities of the most informative records.
 
     With one record its sensitivities are drawn next to the correlations.
     """
-    weights = level_weights(found.information.levels)
+    space, replays, weights = examination.space, examination.replays, level_weights(examination.information.levels)
     # d signal / d parameter of each record in units of its level, (n_samples, n_free) each
-    jacobians = [w * sensitivities(r, found.space, found.x) for w, r in zip(weights, found.replays, strict=True)]
-    order = telling(found, jacobians)
-    n = len(found.space.free_names)
+    jacobians = [w * sensitivities(r, space, examination.x) for w, r in zip(weights, replays, strict=True)]
+    order = telling(examination, jacobians)
+    n = len(space.free_names)
     height, rows = max(3.2, 0.55 * n + 1.6), 0 if len(jacobians) == 1 else -(-len(order) // 2)
     figure = pyplot().figure(figsize=(11.2, height + 2.6 * rows + 0.8), layout="constrained")
     parts = figure.subfigures(2, 1, height_ratios=(height, 2.6 * rows)) if rows else [figure]
     left, right = parts[0].subplots(1, 2)
     font = {"size": 11 if n <= 6 else 8}
-    draw_map(left, found, found.information.correlation, found.space.free_names, "correlation of estimates",
+    draw_map(left, examination, examination.information.correlation, space.free_names, "correlation of estimates",
              vmin=-1, vmax=1, cmap="vlag", annot=True, fmt=".2f", annot_kws=font, square=True)  # fmt: skip
     axes = list(parts[1].subplots(rows, 2, squeeze=False).flat) if rows else [right]
     if rows:
         # how much of the information on each parameter comes from each record
         squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
         shares = 100 * squares / np.where(squares.sum(axis=0) > 0.0, squares.sum(axis=0), 1.0)
-        files = [r.name.replace(".csv", "") for r in found.replays]
-        draw_map(right, found, shares, files, "share of the information [%]", vmin=0, vmax=100, cmap="Blues", fmt=".0f",
-                 annot=len(files) <= 14, annot_kws={"size": 11 if len(files) <= 8 else 8})  # fmt: skip
+        files = [r.name.replace(".csv", "") for r in replays]
+        draw_map(right, examination, shares, files, "share of the information [%]", vmin=0, vmax=100, cmap="Blues",
+                 fmt=".0f", annot=len(files) <= 14, annot_kws={"size": 11 if len(files) <= 8 else 8})  # fmt: skip
     for axis, i in zip(axes, order, strict=False):
-        draw_sensitivities(axis, found, i, jacobians[i])
+        draw_sensitivities(axis, examination, i, jacobians[i])
     for axis in axes[len(order) :]:
         axis.set_visible(False)
     parts[-1].legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=min(n, 6), frameon=False)
-    figure.suptitle(fill(f"{title(found)}: what the records see", 2 * LINE), fontsize="large")
+    figure.suptitle(fill(f"{title(examination)}: what the records see", 2 * LINE), fontsize="large")
     return figure
 
 
-def telling(found: Examination, jacobians: list[Array]) -> list[int]:
+def telling(examination: Examination, jacobians: list[Array]) -> list[int]:
     """Return the records that tell most, the most telling first, repeats of one manoeuvre once."""
     order = np.argsort([-np.sum(j**2) for j in jacobians], kind="stable")
     seen: dict[object, int] = {}
     for i in order:
-        seen.setdefault((found.replays[i].place, identity(found.replays[i].record.manoeuvre)), int(i))
+        seen.setdefault((examination.replays[i].place, identity(examination.replays[i].record.manoeuvre)), int(i))
     return list(seen.values())[:MOST_RECORDS]
 
 
-def draw_map(axis: Any, found: Examination, values: Array, rows: Sequence[str], label: str, **looks: Any) -> None:
+def draw_map(axis: Any, examination: Examination, values: Array, rows: Sequence[str], label: str, **looks: Any) -> None:
     """Draw a map with numbers, (n_rows, n_free), names turned so that the longest stays off its neighbours."""
     import seaborn as sns
 
-    names = found.space.free_names
+    names = examination.space.free_names
     sns.heatmap(values, xticklabels=names, yticklabels=rows, cbar_kws={"label": label}, ax=axis, **looks)
     axis.tick_params(axis="both", labelrotation=0, length=0)
     if max(len(n) for n in names) > 8 or len(names) > 8:
         axis.set_xticklabels(names, rotation=30, ha="right", rotation_mode="anchor")
 
 
-def draw_sensitivities(axis: Any, found: Examination, i: int, jacobian: Array) -> None:
+def draw_sensitivities(axis: Any, examination: Examination, i: int, jacobian: Array) -> None:
     """Draw the sensitivities of one record, each scaled to its own largest: curves that look alike are collinear."""
-    replay = found.replays[i]
-    for j, name in enumerate(found.space.free_names):
+    replay = examination.replays[i]
+    for j, name in enumerate(examination.space.free_names):
         largest = float(np.abs(jacobian[:, j]).max())
         curve = jacobian[:, j] / largest if largest > 0.0 else jacobian[:, j]
         axis.plot(replay.times, curve, lw=1.7, label=name, **look(j))
@@ -457,5 +460,6 @@ def draw_sensitivities(axis: Any, found: Examination, i: int, jacobian: Array) -
     axis.margins(x=0.01)
 
 
-def title(found: Examination) -> str:
-    return f"{found.campaign.name}: {' + '.join([found.model.plant.name, *(e.name for e in found.model.effects)])}"
+def title(examination: Examination) -> str:
+    model = examination.model
+    return f"{examination.campaign.name}: {' + '.join([model.plant.name, *(e.name for e in model.effects)])}"

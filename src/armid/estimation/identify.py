@@ -155,7 +155,7 @@ class Identification(Result):
 
     @cached_property
     def parameters(self) -> dict[str, ParameterEstimate]:
-        """Name -> value, 95 % interval and what stands against it, SI: `found.parameters["p0"].low`."""
+        """Name -> value, 95 % interval and what stands against it, SI: `identification.parameters["p0"].low`."""
         return {name: self._estimate(i) for i, name in enumerate(self.space.names)}
 
     def _estimate(self, i: int) -> ParameterEstimate:
@@ -204,19 +204,22 @@ class Identification(Result):
     @property
     def table(self) -> "DataFrame":
         """Parameters as people read them; `low` and `high` are numbers in the unit of the value."""
-        found = self.parameters.values()
+        parameters = self.parameters.values()
         with angles_in(self.campaign.angle):
-            scales = [scale_of(p.unit, p.value)[1] for p in found]
+            scales = [scale_of(p.unit, p.value)[1] for p in parameters]
         # None becomes NaN
-        ends = {"low": np.array([p.low for p in found], float), "high": np.array([p.high for p in found], float)}
+        ends = {
+            "low": np.array([p.low for p in parameters], float),
+            "high": np.array([p.high for p in parameters], float),
+        }
         return super().table.assign(**{end: values * scales for end, values in ends.items()})
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
         """Which of all parameters are free and sit on a bound."""
-        found = self.space.free.copy()
-        found[found] = held_by_bound(self.space, self.candidate[self.space.free])
-        return found
+        mask = self.space.free.copy()
+        mask[mask] = held_by_bound(self.space, self.candidate[self.space.free])
+        return mask
 
 
 def identify(
@@ -398,38 +401,38 @@ def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors 
 
 
 def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
-    each = [record_errors(r, candidate) for r in replays]
+    errors = [record_errors(r, candidate) for r in replays]
     n = np.array([r.record.n_samples for r in replays], dtype=float)
     duration = np.array([r.record.duration for r in replays])
 
     def pooled(values: list[float], weights: Array) -> float:
-        told = ~np.isnan(values)
-        return float(np.sum(np.array(values)[told] * weights[told]) / weights[told].sum()) if told.any() else np.nan
+        known = ~np.isnan(values)
+        return float(np.sum(np.array(values)[known] * weights[known]) / weights[known].sum()) if known.any() else np.nan
 
-    chi2 = [e.chi2_per_sample for e in each if e.chi2_per_sample is not None]
+    chi2 = [e.chi2_per_sample for e in errors if e.chi2_per_sample is not None]
     return Errors(
-        rmse=float(np.sqrt(pooled([e.rmse**2 for e in each], n))),
-        nrmse=float(np.sqrt(pooled([e.nrmse**2 for e in each], n))),
-        chi2_per_sample=pooled(chi2, n) if len(chi2) == len(each) else None,
-        s=pooled([e.s for e in each], duration),
-        s1=pooled([e.s1 for e in each], duration),
-        s2=pooled([e.s2 for e in each], duration),
-        unit=each[0].unit,
+        rmse=float(np.sqrt(pooled([e.rmse**2 for e in errors], n))),
+        nrmse=float(np.sqrt(pooled([e.nrmse**2 for e in errors], n))),
+        chi2_per_sample=pooled(chi2, n) if len(chi2) == len(errors) else None,
+        s=pooled([e.s for e in errors], duration),
+        s1=pooled([e.s1 for e in errors], duration),
+        s2=pooled([e.s2 for e in errors], duration),
+        unit=errors[0].unit,
         span=float(np.ptp(np.concatenate([r.measured for r in replays]))),
     )
 
 
 def outputs_entry(replays: Sequence[Replay]) -> dict[str, dict[str, Any]]:
     """Return output -> its unit and its noise, the mean over records, in the order of the plant, for JSON."""
-    each = [(o, [r.record.noise.rms for r in replays if r.place == i])
-            for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
-    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in each if rms}
+    levels = [(o, [r.record.noise.rms for r in replays if r.place == i])
+              for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
+    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in levels if rms}
 
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:
     files = dict.fromkeys(r.record.file for r in replays)
-    found = {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
-    return {file: errors for file, errors in found.items() if errors is not None}
+    by_file = {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
+    return {file: errors for file, errors in by_file.items() if errors is not None}
 
 
 @contextmanager

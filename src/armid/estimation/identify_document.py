@@ -62,7 +62,7 @@ def identify_document(
     first = [text for text in details["known_first"] if text in said]
     correlated = correlation_tables(result["correlation"])
     remarks = remark_parts(first, [text for text in said if text not in first])
-    each = [(file, e["role"], e) for file, e in result["error_by_record"].items()]
+    rows = [(file, e["role"], e) for file, e in result["error_by_record"].items()]
     value = result["fitness_value"]
     search = [
         ("identifier", result["identifier"]),
@@ -72,7 +72,7 @@ def identify_document(
         ("engine's error [rad/s or m/s]",
          "not known" if result["engine_error"] is None else f"{result['engine_error']:.2g}"),
     ]  # fmt: skip
-    figures, by_record = stored_figures(FIGURES, svgs), error_table("Each record", ["record", "role"], each, unit)
+    figures, by_record = stored_figures(FIGURES, svgs), error_table("Each record", ["record", "role"], rows, unit)
     sections = (
         Section("Parameters", (parameters,)),
         fit_section(details),
@@ -164,138 +164,140 @@ def fit_section(details: Mapping[str, Any]) -> Section:
     return Section("Fit of each record", (gallery,), text + records_note(len(figures), details["n_records"]))
 
 
-def parts_of(found: Identification) -> Parts:
-    return Parts(result_of(found), details_of(found), figures_of(found))
+def parts_of(identification: Identification) -> Parts:
+    return Parts(result_of(identification), details_of(identification), figures_of(identification))
 
 
-def result_of(found: Identification) -> dict[str, Any]:
+def result_of(identification: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
-    names, correlation = found.information.names, found.information.correlation
-    replays = (*found.train_replays, *found.holdout_replays)
+    names, correlation = identification.information.names, identification.information.correlation
+    replays = (*identification.train_replays, *identification.holdout_replays)
     roles = {r.record.file: r.record.role for r in replays}
-    by_file = errors_by_file(replays, found.candidate)
+    by_file = errors_by_file(replays, identification.candidate)
     noises: dict[str, dict[str, Any]] = {}
     for noise, r in ((r.record.noise, r) for r in replays):
-        told = {"rms": noise.rms, "mean": noise.mean, "source": noise.source}
-        noises.setdefault(r.record.file, dict(told, outputs={}))["outputs"][r.record.output] = told
+        entry = {"rms": noise.rms, "mean": noise.mean, "source": noise.source}
+        noises.setdefault(r.record.file, dict(entry, outputs={}))["outputs"][r.record.output] = entry
     return plain({
-        "campaign": found.campaign.name,
-        "plant": found.model.plant.name,
-        "effects": [e.name for e in found.model.effects],
-        "parameters": found.parameters,
-        "error": {"train": found.train, "holdout": found.holdout},
+        "campaign": identification.campaign.name,
+        "plant": identification.model.plant.name,
+        "effects": [e.name for e in identification.model.effects],
+        "parameters": identification.parameters,
+        "error": {"train": identification.train, "holdout": identification.holdout},
         "error_by_record": {file: {"role": roles[file], **plain(e)} for file, e in by_file.items()},
         "correlation": {name: dict(zip(names, row, strict=True)) for name, row in zip(names, correlation, strict=True)},
-        "unit": found.campaign.unit,
-        "fitness": found.fitness.name,
-        "fitness_value": found.value,
-        "identifier": found.identifier,
-        "budget": found.budget,
-        "used": found.used,
-        "failed": found.n_failed,
-        "stopped": found.stopped,
-        "seed": found.seed,
+        "unit": identification.campaign.unit,
+        "fitness": identification.fitness.name,
+        "fitness_value": identification.value,
+        "identifier": identification.identifier,
+        "budget": identification.budget,
+        "used": identification.used,
+        "failed": identification.n_failed,
+        "stopped": identification.stopped,
+        "seed": identification.seed,
         "noise": noises,
         "outputs": outputs_entry(replays),
-        "engine_error": max(r.engine_error_at(found.candidate) for r in found.train_replays),
-        "model": str(found.model),
+        "engine_error": max(r.engine_error_at(identification.candidate) for r in identification.train_replays),
+        "model": str(identification.model),
         "versions": versions_of(PACKAGES),
     })  # fmt: skip
 
 
-def details_of(found: Identification) -> dict[str, Any]:
+def details_of(identification: Identification) -> dict[str, Any]:
     """Return details as JSON can hold them, SI; the command adds `made_by`, its line and options.
 
     Of long records each curve keeps the samples that `thinned` chooses.
     """
-    replays = (*found.train_replays, *found.holdout_replays)
+    replays = (*identification.train_replays, *identification.holdout_replays)
     records = [{
         "file": r.name, "role": r.record.role, "noise_rms": r.record.noise.rms, "unit": r.record.unit,
         "n_samples": len(r.measured),
-        "curves": {name: curve_entry(r.times, y) for name, y in curves_of(r, found.candidate).items()},
+        "curves": {name: curve_entry(r.times, y) for name, y in curves_of(r, identification.candidate).items()},
     } for r in replays[:MOST_RECORDS]]  # fmt: skip
     return {
-        "remarks": remarks(found),
-        "known_first": ranked(found)[:MOST_KNOWN_FIRST],
-        "warnings": [*(s.sentence for s in found.issues), *convergence_remarks(found)],
+        "remarks": remarks(identification),
+        "known_first": ranked(identification)[:MOST_KNOWN_FIRST],
+        "warnings": [*(s.sentence for s in identification.issues), *convergence_remarks(identification)],
         "records": records,
         "n_records": len(replays),
-        "search": curve_entry(found.trace[0].astype(float), found.trace[1]),
+        "search": curve_entry(identification.trace[0].astype(float), identification.trace[1]),
     }
 
 
-def remarks(found: Identification) -> list[str]:
+def remarks(identification: Identification) -> list[str]:
     """Return what a reader must know, the most important first, then what is for the record, one sentence each."""
-    return ranked(found) + noise_remarks(found)
+    return ranked(identification) + noise_remarks(identification)
 
 
-def ranked(found: Identification) -> list[str]:
+def ranked(identification: Identification) -> list[str]:
     """Return what stands against the result, the most important first."""
-    information = found.information
-    said = [s.sentence for s in found.issues] + convergence_remarks(found)
-    said += [bound_remark(found, int(i)) for i in np.flatnonzero(found.at_bound)]
-    said += misfit_remarks(found)
+    information = identification.information
+    said = [s.sentence for s in identification.issues] + convergence_remarks(identification)
+    said += [bound_remark(identification, int(i)) for i in np.flatnonzero(identification.at_bound)]
+    said += misfit_remarks(identification)
     deviations = zip(information.names, information.deviation, strict=True)
     said += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
     pairs = collinear(information)
     if pairs:
-        told = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs)
-        said.append(f"Hardly to be told apart on these records (correlation): {told}; a change of one is made up for "
+        text = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs)
+        said.append(f"Hardly to be told apart on these records (correlation): {text}; a change of one is made up for "
                     "by the other.")  # fmt: skip
-    if found.n_failed:
-        said.append(f"{found.n_failed} of {found.used} candidates diverged and were given a penalty.")
+    if identification.n_failed:
+        said.append(f"{identification.n_failed} of {identification.used} candidates diverged and were given a penalty.")
     # that probes elsewhere miss the accuracy says nothing about the estimate
-    coarse = [r for r in (*found.train_replays, *found.holdout_replays) if not all(c.reached for c in r.calibrations)]
-    off = {r: r.engine_error_at(found.candidate) for r in coarse}
-    return said + bootstrap_remarks(found) + [
+    replays = (*identification.train_replays, *identification.holdout_replays)
+    coarse = [r for r in replays if not all(c.reached for c in r.calibrations)]
+    off = {r: r.engine_error_at(identification.candidate) for r in coarse}
+    return said + bootstrap_remarks(identification) + [
         "{}: the engine is off by up to {:.2g} {} at the estimate, even at its finest steps: the equations change too "
         "fast there, or switch somewhere without a guard.".format(r.name, *shown(error, r.record.unit))
         for r, error in off.items() if error > r.record.noise.rms / NOISE_HIDES
     ]  # fmt: skip
 
 
-def bootstrap_remarks(found: Identification) -> list[str]:
+def bootstrap_remarks(identification: Identification) -> list[str]:
     """Return from how many draws intervals come, and the bias of the estimate, in one sentence."""
-    scatter, names = found.scatter, found.information.names
+    scatter, names = identification.scatter, identification.information.names
     if scatter is None or not len(scatter.draws):
         return []
-    units = [unit for unit, free in zip(found.space.units, found.space.free, strict=True) if free]
+    units = [unit for unit, free in zip(identification.space.units, identification.space.free, strict=True) if free]
     biases = [f"{name} {'{:+.2g} {}'.format(*shown(bias, unit)).removesuffix(' 1')}"
               for name, bias, unit in zip(names, scatter.bias, units, strict=True)]  # fmt: skip
     return [f"The intervals come from {len(scatter.draws)} draws of the noise, each minimised again by "
-            f"{found.fitness.name}. Bias of the estimate: {', '.join(biases)}."]  # fmt: skip
+            f"{identification.fitness.name}. Bias of the estimate: {', '.join(biases)}."]  # fmt: skip
 
 
-def bound_remark(found: Identification, i: int) -> str:
-    name, value = found.space.names[i], found.candidate[i]
-    null = found.model.parameters[name].null
-    margin = 1e-3 * (found.space.high[i] - found.space.low[i])
+def bound_remark(identification: Identification, i: int) -> str:
+    name, value = identification.space.names[i], identification.candidate[i]
+    null = identification.model.parameters[name].null
+    margin = 1e-3 * (identification.space.high[i] - identification.space.low[i])
     if null is not None and abs(value - null) <= margin:
         return f"{name} sits at its null value: no such effect is seen on these records by this search."
     return (f"{name} sits on its bound: the search was held there, so neither it nor its interval, nor what is "
             "correlated with it, can be trusted.")  # fmt: skip
 
 
-def convergence_remarks(found: Identification) -> list[str]:
+def convergence_remarks(identification: Identification) -> list[str]:
     said = []
-    if found.is_far_from_minimum:
-        steps = np.abs(np.nan_to_num(found.information.step))
-        name = found.information.names[int(np.argmax(steps))]
+    if identification.is_far_from_minimum:
+        steps = np.abs(np.nan_to_num(identification.information.step))
+        name = identification.information.names[int(np.argmax(steps))]
         of, better = "least-squares minimum", "Identifier least_squares on fitness rmse, a"
-        if found.scatter is not None:
-            of, better = f"minimum of {found.fitness.name}", "A"
+        if identification.scatter is not None:
+            of, better = f"minimum of {identification.fitness.name}", "A"
         said.append(f"The search has not come to the {of}: a step from here would move {name} by {steps.max():.3g} of "
                     f"its standard deviations, so the intervals do not hold. {better} larger budget or another seed "
                     "may get there.")  # fmt: skip
-    train, holdout = found.train.chi2_per_sample, None if found.holdout is None else found.holdout.chi2_per_sample
+    train, unseen = identification.train.chi2_per_sample, identification.holdout
+    holdout = None if unseen is None else unseen.chi2_per_sample
     if train is not None and holdout is not None and holdout > CARRIES_OVER * max(train, 1.0):
         said.append(f"The fit does not carry over: its mean square is {holdout:.3g} times that of the noise on the "
                     f"held-out records, {train:.3g} times on those fitted.")  # fmt: skip
     return said
 
 
-def noise_remarks(found: Identification) -> list[str]:
-    replays = found.train_replays
+def noise_remarks(identification: Identification) -> list[str]:
+    replays = identification.train_replays
     said = [noise_remark(r) for r in replays if len(replays) <= MOST_NAMED]
     for output in dict.fromkeys(r.record.output for r in replays if not said):
         of = [r.record for r in replays if r.record.output == output]
@@ -306,21 +308,22 @@ def noise_remarks(found: Identification) -> list[str]:
     return said
 
 
-def misfit_remarks(found: Identification) -> list[str]:
-    pairs = zip(judged_by(found.fitness, found.train_replays), found.information.levels, strict=True)
+def misfit_remarks(identification: Identification) -> list[str]:
+    replays = judged_by(identification.fitness, identification.train_replays)
+    pairs = zip(replays, identification.information.levels, strict=True)
     above = [(level.rms / r.record.noise.rms if r.record.noise.rms else np.inf, r.name)
              for r, level in pairs if level.from_residual]  # fmt: skip
     if not above:
         return []
-    told = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_NAMED])
+    text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_NAMED])
     more = f" (so it is in {len(above)} records)" if len(above) > MOST_NAMED else ""
     why = "the model, in which nothing is free, lacks something."
-    if found.space.free.any():
+    if identification.space.free.any():
         why = (
             "the model lacks something, or the search has not come to the minimum; the intervals are widened to the "
             "residual and its correlation in time, and hold only as far as what is lacking averages out."
         )
-    return [f"The residual is this many times the noise: {told}{more}: {why}"]
+    return [f"The residual is this many times the noise: {text}{more}: {why}"]
 
 
 def noise_remark(replay: Replay) -> str:

@@ -76,11 +76,11 @@ def information_at(
     ratios = np.ones(len(replays)) if weights is None or noise_free else np.divide(weights, level_weights(levels))
     others = np.ptp(ratios) > 1e-9 * ratios.max()
     squares = np.repeat((ratios / ratios.max()) ** 2, [r.record.n_samples for r in replays]) if others else None
-    found = replace(information_of(records, records.shares(x), weighed=squares), levels=levels)
+    information = replace(information_of(records, records.shares(x), weighed=squares), levels=levels)
     if not noise_free:
-        return found
-    shown = np.where(np.isfinite(found.deviation), 0.0, found.deviation)
-    return replace(found, deviation=shown, step=np.zeros(len(x)))
+        return information
+    shown = np.where(np.isfinite(information.deviation), 0.0, information.deviation)
+    return replace(information, deviation=shown, step=np.zeros(len(x)))
 
 
 def information_of(

@@ -104,8 +104,8 @@ class LeastSquaresProblem:
         for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1)):
             shift = float(np.clip(z[i], STEP, 1.0 - STEP) - z[i])
             sides = ((signals[1 + i], shift + STEP), (signals[1 + n + i], shift - STEP))
-            whole = [(signal - here) / step for signal, step in sides if step != 0.0 and np.isfinite(signal).all()]
-            slopes[i] = whole[0] if whole and np.isfinite(here).all() else 0.0
+            quotients = [(signal - here) / step for signal, step in sides if step != 0.0 and np.isfinite(signal).all()]
+            slopes[i] = quotients[0] if quotients and np.isfinite(here).all() else 0.0
         return np.asarray(self.measured - here), np.ascontiguousarray(slopes.T)
 
 
@@ -142,8 +142,8 @@ def weighted_records(
     if weights is None:
         records = [r.record for r in replays]
         levels = [r.noise.rms for r in records]
-        each = by_sensor(records, levels)
-        pooled = np.array([np.sqrt(np.mean(np.square(each[sensor_of(r)]))) for r in records])
+        groups = by_sensor(records, levels)
+        pooled = np.array([np.sqrt(np.mean(np.square(groups[sensor_of(r)]))) for r in records])
         weights = list(1.0 / (pooled if all(levels) else output_sizes(replays)))
     return WeightedRecords(replays, space, tuple(map(float, weights)))
 
@@ -373,7 +373,7 @@ def forward_slopes(records: LeastSquaresProblem, paths: Sequence[Descent]) -> li
     signs = np.array([np.where(p.z > 0.5, -1.0, 1.0) for p in paths])
     points = np.concatenate([p.z + np.diag(STEP * s) for p, s in zip(paths, signs, strict=True)])
     residuals = records.residuals(points)
-    found = []
+    slopes = []
     for i, (path, sign) in enumerate(zip(paths, signs, strict=True)):
         columns = (path.residual - residuals[i * n :][:n]) / (STEP * sign)[:, np.newaxis]
         for k in np.flatnonzero(~np.isfinite(columns).all(axis=1)):
@@ -382,8 +382,8 @@ def forward_slopes(records: LeastSquaresProblem, paths: Sequence[Descent]) -> li
             other = records.residuals(z)[0]
             inside = 0.0 <= z[k] <= 1.0 and bool(np.isfinite(other).all())
             columns[k] = (path.residual - other) / (-sign[k] * STEP) if inside else 0.0
-        found.append(np.ascontiguousarray(columns.T))
-    return found
+        slopes.append(np.ascontiguousarray(columns.T))
+    return slopes
 
 
 def side_by_side(work: Callable[[S], T], items: Iterable[S], threads: int) -> list[T]:
@@ -424,11 +424,11 @@ class Estimates:
         key = hashlib.sha256(b"/".join(parts)).hexdigest()[:32]
         if key in self._known:
             return np.array(self._known[key])
-        found = make()
-        self._known[key] = found.tolist()
+        estimate = make()
+        self._known[key] = estimate.tolist()
         # On a disk that is full the search goes on; saving its result says so.
         with self._lock, suppress(OSError):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps([key, self._known[key]]) + "\n")
-        return found
+        return estimate

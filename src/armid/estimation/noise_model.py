@@ -101,10 +101,10 @@ def sensor_of(record: Record) -> tuple[str, float]:
 
 def by_sensor(records: Sequence[Record], values: Sequence[T]) -> dict[tuple[str, float], list[T]]:
     """Return the values of the records of each sensor."""
-    found: dict[tuple[str, float], list[T]] = {}
+    groups: dict[tuple[str, float], list[T]] = {}
     for record, value in zip(records, values, strict=True):
-        found.setdefault(sensor_of(record), []).append(value)
-    return found
+        groups.setdefault(sensor_of(record), []).append(value)
+    return groups
 
 
 def noise_floor(sensor: tuple[str, float], plant: Plant) -> float:
@@ -131,13 +131,13 @@ def levels_left(
         memory = memories[sensor_of(record)]
         new = difference_rms(part[1:] - memory * part[:-1])
         least.append(max(new / np.sqrt(1.0 - memory**2), record.signals[0].sensor.step / np.sqrt(12.0)))
-    each, found = by_sensor(records, least), []
+    groups, noises = by_sensor(records, least), []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
-        rms = max(float(np.median(each[sensor])), noise_floor(sensor, replay.model.plant))
-        is_told = level.known or (level.rms <= rms and not memories[sensor])
-        found.append(level if is_told else remembering_level(rms, memories[sensor]))
-    return tuple(found)
+        rms = max(float(np.median(groups[sensor])), noise_floor(sensor, replay.model.plant))
+        stays = level.known or (level.rms <= rms and not memories[sensor])
+        noises.append(level if stays else remembering_level(rms, memories[sensor]))
+    return tuple(noises)
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:
@@ -264,13 +264,13 @@ def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | 
         if len({r.place for r in replays}) > 1:
             raise ArmidError(f"a noise of {noise:g} was given, but records hold several outputs: none is expected")
         return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
-    found = []
+    levels = []
     for replay in replays:
         level = level_of(replay, space, x)
         if replay.record.is_noise_free and level.rms <= NOISE_FREE * float(np.max(np.abs(replay.measured))):
             level = Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
-        found.append(level)
-    return tuple(found)
+        levels.append(level)
+    return tuple(levels)
 
 
 def level_weights(levels: Sequence[Level]) -> tuple[float, ...]:

@@ -95,17 +95,17 @@ def profiles(
     effective samples. z: a start, as shares of the range; the minimum is returned so, too. progress: called with
     a sentence before each profile.
     """
-    best, names, found = fit(records, z), records.space.free_names, list[Profile]()
+    best, names, profiles = fit(records, z), records.space.free_names, list[Profile]()
     for _ in range(MOST_RESTARTS):
-        found = []
+        profiles = []
         for i, name in enumerate(names):
             progress(f"profile of {name}, {i + 1} of {len(names)}")
-            found.append(profile(records, best, i))
-        lowest = min(found, key=lambda p: float(p.rise.min()))
+            profiles.append(profile(records, best, i))
+        lowest = min(profiles, key=lambda p: float(p.rise.min()))
         if lowest.rise.min() > -BETTER:
             break
         best = fit(records, records.shares(lowest.candidates[int(lowest.rise.argmin())]))
-    return best, tuple(found)
+    return best, tuple(profiles)
 
 
 def profile(records: LeastSquaresProblem, z: Array, i: int) -> Profile:
@@ -209,8 +209,8 @@ def between_points(held: HeldFit, points: list[Point], end: float) -> list[Point
     inside = [p for p in points if abs(p.place - middle.place) < abs(end - middle.place)]
     if len(inside) > FEWEST or end == middle.place:
         return []
-    found = [middle]
+    path = [middle]
     for share in np.arange(1, FEWEST + 1) / (FEWEST + 1):
         place = middle.place + float(share) * (end - middle.place)
-        found.append(held(place, start_at(found, place)))
-    return found[1:]
+        path.append(held(place, start_at(path, place)))
+    return path[1:]

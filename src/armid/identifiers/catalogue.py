@@ -63,5 +63,5 @@ def options_of(identifier: Identifier) -> dict[str, dict[str, Any]]:
     if identifier.algorithm is None:
         return {name: {"default": p.default, "unit": "", "meaning": ""}
                 for name, p in signature(identifier.build).parameters.items() if p.default is not p.empty}  # fmt: skip
-    declared = ((each.name, each.default, each.metadata["option"]) for each in options_in(identifier.algorithm))
+    declared = ((option.name, option.default, option.metadata["option"]) for option in options_in(identifier.algorithm))
     return {name: {"default": default, "unit": o.unit, "meaning": o.meaning} for name, default, o in declared}

@@ -40,9 +40,10 @@ def chain_of(phases: Sequence[Identifier]) -> Identifier:
 
 
 def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> SearchAlgorithm:
-    told = of_phases(options, phases, ("share",), f"'{'+'.join(phase.name for phase in phases)}'")
+    configured = of_phases(options, phases, ("share",), f"'{'+'.join(phase.name for phase in phases)}'")
     shares = shares_of(options.get("share"), len(phases))
-    builds = [partial(phase.build, max(1, round(share * budget))) for phase, share in zip(told, shares, strict=True)]
+    builds = [partial(phase.build, max(1, round(share * budget)))
+              for phase, share in zip(configured, shares, strict=True)]  # fmt: skip
     for phase, build in zip(phases, builds, strict=True):
         if not takes_start(build()) and phase is not phases[0]:
             raise ArmidError(f"identifier '{phase.name}' takes no start x0, in a chain it is expected to be the first")
@@ -108,8 +109,8 @@ def multistart_of(local: Identifier) -> Identifier:
 
 
 def built_multistart(local: Identifier, budget: int, **options: Any) -> SearchAlgorithm:
-    (told,) = of_phases(options, (local,), (), f"'{PREFIX}{local.name}'")
-    build = partial(told.build, budget)
+    (configured,) = of_phases(options, (local,), (), f"'{PREFIX}{local.name}'")
+    build = partial(configured.build, budget)
     if not takes_start(build()):
         raise ArmidError(f"identifier '{local.name}' takes no start x0, {PREFIX} expects one that does")
 

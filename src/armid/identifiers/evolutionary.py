@@ -28,7 +28,7 @@ class PymooOptions(Options):
     def build(self, budget: int) -> Algorithm:
         """Return the algorithm; what is None is left to pymoo."""
         module, kind = self.place.split(":")
-        given = {each.name: getattr(self, each.name) for each in options_in(type(self))}
+        given = {field.name: getattr(self, field.name) for field in options_in(type(self))}
         algorithm = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{module}"), kind)
         return algorithm(evaluator=FiniteEvaluator(), **{n: value for n, value in given.items() if value is not None})
 

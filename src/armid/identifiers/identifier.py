@@ -75,10 +75,10 @@ class Options(ABC):
     package: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        for each in options_in(type(self)):
-            value = getattr(self, each.name)
-            if value is not None or each.default is not None:
-                object.__setattr__(self, each.name, checked(each.name, value, kind_of(each), each.metadata["option"]))
+        for option in options_in(type(self)):
+            name, value = option.name, getattr(self, option.name)
+            if value is not None or option.default is not None:
+                object.__setattr__(self, name, checked(name, value, kind_of(option), option.metadata["option"]))
 
     @abstractmethod
     def build(self, budget: int) -> Algorithm:
@@ -86,7 +86,7 @@ class Options(ABC):
 
 
 def options_in(algorithm: Any) -> list[Any]:
-    return [each for each in fields(algorithm) if "option" in each.metadata]
+    return [option for option in fields(algorithm) if "option" in option.metadata]
 
 
 def kind_of(option: Any) -> type:
@@ -177,7 +177,7 @@ def built(algorithm: Any, fixed: tuple[Any, ...], name: str, budget: int, **opti
         raise ArmidError(f"identifier '{name}' needs the package {algorithm.package}, which is not installed: "
                          "pip install 'armid[suite]' is expected")  # fmt: skip
     checked_count("the budget", budget)
-    refuse_unknown(options, [each.name for each in options_in(algorithm)], f"'{name}'")
+    refuse_unknown(options, [option.name for option in options_in(algorithm)], f"'{name}'")
     return algorithm(*fixed, **options).build(budget)
 
 

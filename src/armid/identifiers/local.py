@@ -153,10 +153,10 @@ class ByValues(SearchOptions):
             here = u.copy()
             beside = self.beside(here) if gradient.size else None
             F = task.ask(cube.candidates(here if beside is None else np.vstack([here, beside.points]))).F
-            found = height.of(float(F[0]))
+            scaled = height.of(float(F[0]))
             if beside is not None:
                 gradient[:] = slopes(beside, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
-            return found
+            return scaled
 
         # NLopt's generator belongs to the thread and would be seeded by the clock
         nlopt.srand(seed)

@@ -82,7 +82,7 @@ class PaperPSO(SearchAlgorithm):
     """
 
     def __init__(self, n_particles: int = 80, n_iterations: int = 150, **options: Any) -> None:
-        names = [each.name for each in fields(Swarm)]
+        names = [field.name for field in fields(Swarm)]
         refuse_unknown(options, names, "the swarm", OF_PYMOO)
         swarm = Swarm(n_particles, n_iterations, **{n: options.pop(n) for n in names if n in options})
         super().__init__(swarm.search, n_particles * n_iterations, Swarm.is_seeded, **options)

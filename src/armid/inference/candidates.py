@@ -82,33 +82,33 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
     First those without states and late signals of their own, whose model takes half of the time; then these and all
     others, whose model holds test signals too.
     """
-    each = sorted(((key, compiled(key, effect)) for key, effect in effects.items()), key=lambda pair: pair[1].name)
-    plain = [pair for pair in each if not (pair[1].states or pair[1].delays)]
-    others = [pair for pair in each if pair not in plain]
-    first = grouped(declared, (declared, ()), plain) if len(each) >= APART else []
-    rest = grouped(declared, first[0] if first else (declared, ()), others if first else each)
+    pairs = sorted(((key, compiled(key, effect)) for key, effect in effects.items()), key=lambda pair: pair[1].name)
+    plain = [pair for pair in pairs if not (pair[1].states or pair[1].delays)]
+    others = [pair for pair in pairs if pair not in plain]
+    first = grouped(declared, (declared, ()), plain) if len(pairs) >= APART else []
+    rest = grouped(declared, first[0] if first else (declared, ()), others if first else pairs)
     return tuple(keys for _, keys in [*first, *rest])
 
 
 def grouped(
-    declared: Model, begun: tuple[Model, Active], each: Sequence[tuple[EffectKey, Effect]]
+    declared: Model, begun: tuple[Model, Active], pairs: Sequence[tuple[EffectKey, Effect]]
 ) -> list[tuple[Model, Active]]:
     """Return models that hold effects, the first what is begun too, as few as compose without a circle."""
-    if not each:
+    if not pairs:
         return []
-    whole = joined(begun[0], *(effect for _, effect in each))
-    if whole is not None:
-        return [(whole, (*begun[1], *(key for key, _ in each)))]
-    found: list[tuple[Model, Active]] = []
-    for key, effect in each:
-        for i, (model, held) in enumerate(found or [begun]):
+    joint = joined(begun[0], *(effect for _, effect in pairs))
+    if joint is not None:
+        return [(joint, (*begun[1], *(key for key, _ in pairs)))]
+    models: list[tuple[Model, Active]] = []
+    for key, effect in pairs:
+        for i, (model, held) in enumerate(models or [begun]):
             extended = joined(model, effect)
             if extended is not None:
-                found[i : i + 1] = [(extended, (*held, key))]
+                models[i : i + 1] = [(extended, (*held, key))]
                 break
         else:
-            found.append((declared + effect, (key,)))
-    return found
+            models.append((declared + effect, (key,)))
+    return models
 
 
 def joined(model: Model, *effects: Effect) -> Model | None:

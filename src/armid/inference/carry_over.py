@@ -74,7 +74,7 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
     """Return the held-out records that are missed by more than noise, and by far more than the train records."""
     if holdout is None:
         return []
-    outputs, found = [o.name for o in fit.model.plant.outputs], []
+    outputs, missed = [o.name for o in fit.model.plant.outputs], []
     known = {place: max(rms_of(train, place), 1.0) for place in {r.place for r in train.replays}}
     edges = holdout.data.edges
     for i, (replay, raw) in enumerate(zip(holdout.replays, holdout.raw, strict=True)):
@@ -85,19 +85,19 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
             continue
         output = outputs[replay.place]
         before = train.errors.outputs[output].rmse if output in train.errors.outputs else holdout.noise_of[output]
-        found.append(Missed(replay.name, factor, (float(np.sqrt(np.mean(raw**2))), before), replay.record.unit,
-                            outside(train, holdout, inside), changes(fit, holdout, inside)))  # fmt: skip
-    return found
+        missed.append(Missed(replay.name, factor, (float(np.sqrt(np.mean(raw**2))), before), replay.record.unit,
+                             outside(train, holdout, inside), changes(fit, holdout, inside)))  # fmt: skip
+    return missed
 
 
 def over_noise(train: Residuals, holdout: Residuals) -> list[bool]:
     """Return of each held-out record whether it is missed by more than noise, as it is there and on train records."""
-    outputs, found = [o.name for o in train.model.plant.outputs], dict[str, bool]()
+    outputs, flags = [o.name for o in train.model.plant.outputs], dict[str, bool]()
     least = least_noise(train, holdout)
     for replay, raw in zip(holdout.replays, holdout.raw, strict=True):
         is_noise = float(np.sqrt(np.mean(raw**2))) <= OVER_NOISE * least[outputs[replay.place]]
-        found[replay.record.file] = found.get(replay.record.file, False) or not is_noise
-    return list(found.values())
+        flags[replay.record.file] = flags.get(replay.record.file, False) or not is_noise
+    return list(flags.values())
 
 
 def least_noise(train: Residuals, holdout: Residuals) -> dict[str, float]:
@@ -114,7 +114,7 @@ def rms_of(seen: Residuals, place: int) -> float:
 
 def outside(train: Residuals, holdout: Residuals, inside: slice) -> dict[str, tuple[float, float, str]]:
     """Return the variables of the motion that leave the range of the train records."""
-    plant, found = train.model.plant, {}
+    plant, excursions = train.model.plant, {}
     units = {s.name: s.unit for s in plant.states} | {i.name: i.unit for i in plant.inputs}
     for name, known in train.variables.items():
         values = holdout.variables[name][inside]
@@ -123,10 +123,10 @@ def outside(train: Residuals, holdout: Residuals, inside: slice) -> dict[str, tu
         margin = OUTSIDE * max(high - low, 1e-300)
         unit = units.get(name, plant.scales.effort_unit)
         if most - high > max(margin, low - least):
-            found[name] = (most, high, unit)
+            excursions[name] = (most, high, unit)
         elif low - least > margin:
-            found[name] = (least, low, unit)
-    return found
+            excursions[name] = (least, low, unit)
+    return excursions
 
 
 def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
@@ -135,7 +135,7 @@ def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
         return {}
     records = WhiteRecords(holdout.replays, fit.records.space, holdout.data)
     residual, slopes = records.residual_and_slopes(fit.z)
-    own, found = residual[inside], {}
+    own, changes = residual[inside], {}
     if not np.isfinite(own).all():
         return {}
     total = float(own @ own)
@@ -147,8 +147,8 @@ def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
         moved = float(column @ own) / square
         taken = moved**2 * square / total
         if taken > EXPLAINS:
-            found[name] = (taken, moved * float(fit.records.span[i]) / abs(value))
-    return {name: change for name, (_, change) in sorted(found.items(), key=lambda pair: -pair[1][0])}
+            changes[name] = (taken, moved * float(fit.records.span[i]) / abs(value))
+    return {name: change for name, (_, change) in sorted(changes.items(), key=lambda pair: -pair[1][0])}
 
 
 def predicting_best(
@@ -179,24 +179,24 @@ def predicting_best(
 def parts_of(data: WhitenedData) -> list[NDArray[np.int64]]:
     """Return what is left out in turn, as numbers of samples: manoeuvres with their repeats, or blocks of time."""
     names = [r.manoeuvre_file for r in data.each]
-    each = data.by_record(np.arange(data.edges[-1]))
+    indices = data.by_record(np.arange(data.edges[-1]))
     distinct = list(dict.fromkeys(names))
     if len(distinct) > 1:
         # of many manoeuvres several are left out together, spread over the campaign
         groups = [distinct[i::MOST_PARTS] for i in range(min(MOST_PARTS, len(distinct)))]
-        return [np.concatenate([x for x, n in zip(each, names, strict=True) if n in group]) for group in groups]
-    blocks = [np.array_split(x, MOST_PARTS) for x in each]
+        return [np.concatenate([x for x, n in zip(indices, names, strict=True) if n in group]) for group in groups]
+    blocks = [np.array_split(x, MOST_PARTS) for x in indices]
     return [np.concatenate(block) for block in zip(*blocks, strict=True)]
 
 
 def misses(fit: Fit) -> Array:
     """Return the mean square by which a model misses each part, fitted without it, (n_parts,)."""
-    data, found = fit.records.data, []
+    data, squares = fit.records.data, []
     for part in parts_of(data):
         sound = data.sound.copy()
         sound[part] = 0.0
-        posed = replace(fit.records, data=replace(data, sound=sound))
-        z = descend(posed, [fit.z], ROUGHLY) if fit.n_free else fit.z
+        problem = replace(fit.records, data=replace(data, sound=sound))
+        z = descend(problem, [fit.z], ROUGHLY) if fit.n_free else fit.z
         left = fit.records.plain.residuals(z)[0][part]
-        found.append(float(np.mean(left**2)) if np.isfinite(left).all() else np.inf)
-    return np.array(found)
+        squares.append(float(np.mean(left**2)) if np.isfinite(left).all() else np.inf)
+    return np.array(squares)

@@ -81,13 +81,13 @@ class Residuals:
     @property
     def noise_of(self) -> dict[str, float]:
         """Noise of all samples of each output that is recorded, by its name, [its unit]."""
-        found: dict[str, float] = {}
+        noise: dict[str, float] = {}
         for place in sorted({r.place for r in self.replays}):
             of = [(level.rms, len(r.measured)) for level, r in zip(self.data.levels, self.replays, strict=True)
                   if r.place == place]  # fmt: skip
             square = sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)
-            found[self.model.plant.outputs[place].name] = float(np.sqrt(square))
-        return found
+            noise[self.model.plant.outputs[place].name] = float(np.sqrt(square))
+        return noise
 
     @cached_property
     def memory(self) -> dict[int, float]:
@@ -131,22 +131,22 @@ class Residuals:
         for replay in self.replays:
             triples = zip(replay.pieces, replay.calibrations, replay.record.samples, strict=True)
             for piece, calibration, samples in triples:
-                found = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
+                motion = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
                 for n in names:
-                    parts[n].append(found[n][samples])
+                    parts[n].append(motion[n][samples])
         return {n: np.concatenate(p) for n, p in parts.items()}
 
     @cached_property
     def stages(self) -> dict[str, NDArray[np.bool_]]:
         """Samples before and after each one-way switch of the plant, name -> (n_samples,); empty without a switch."""
-        found: dict[str, NDArray[np.bool_]] = {}
+        stages: dict[str, NDArray[np.bool_]] = {}
         for name in (g.name for g in self.model.plant.guards if g.latch):
             runs = (zip(r.pieces, r.record.samples, r.ready.runs(self.candidate[np.newaxis]), strict=True)
                     for r in self.replays)  # fmt: skip
             after = np.concatenate([piece.manoeuvre.times()[samples] >= run.switch_times[name][0]
                                     for piece, samples, run in chain.from_iterable(runs)])  # fmt: skip
-            found |= {f"before '{name}'": ~after, f"after '{name}'": after}
-        return {n: samples for n, samples in found.items() if samples.any()}
+            stages |= {f"before '{name}'": ~after, f"after '{name}'": after}
+        return {n: samples for n, samples in stages.items() if samples.any()}
 
     @cached_property
     def phases(self) -> dict[str, NDArray[np.bool_]]:
@@ -171,12 +171,12 @@ def time_in_words(seen: Residuals) -> str:
     """Say when, in words of the motion, most of a residual is more than noise; "" where no state is a speed."""
     excess = np.maximum(seen.residual**2 - float(seen.data.known), 0.0)
     stages = seen.stages or {"": np.ones(len(excess), dtype=np.bool_)}
-    each = {", ".join(filter(None, (phase, stage))): a & b
-            for phase, a in seen.phases.items() for stage, b in stages.items()}  # fmt: skip
-    if not each:
+    masks = {", ".join(filter(None, (phase, stage))): a & b
+             for phase, a in seen.phases.items() for stage, b in stages.items()}  # fmt: skip
+    if not masks:
         return ""
-    words = max(each, key=lambda name: float(excess[each[name]].sum()))
-    share, time = float(excess[each[words]].sum() / excess.sum()), float(np.mean(each[words]))
+    words = max(masks, key=lambda name: float(excess[masks[name]].sum()))
+    share, time = float(excess[masks[words]].sum() / excess.sum()), float(np.mean(masks[words]))
     return f"When it is: {share:.0%} of it {words}, in {time:.0%} of the samples."
 
 
@@ -205,8 +205,8 @@ def train_residuals(fit: Fit) -> Residuals:
 def is_significant(fit: Fit) -> bool:
     """Tell whether what a model leaves on train is more than noise; where its size alone says so, that is enough."""
     seen = train_residuals(fit)
-    whole = next(size_tests(seen), None)
-    return (whole is not None and whole.p < CERTAIN) or seen.diagnosis.significant
+    finding = next(size_tests(seen), None)
+    return (finding is not None and finding.p < CERTAIN) or seen.diagnosis.significant
 
 
 def is_certain(fit: Fit) -> bool:
@@ -227,16 +227,16 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     records = tuple(moved_record(r, plant, fit.constants) for r in records)
     data = whitened(records, plant, library.data)
     ready = calibrated_replays(records, fit.model, fit.records.space, fit.values)
-    posed = WhiteRecords(ready, fit.records.space, data)
-    residual, slopes = posed.residual_and_slopes(fit.z)
+    problem = WhiteRecords(ready, fit.records.space, data)
+    residual, slopes = problem.residual_and_slopes(fit.z)
     within = fit.products(tolerances)
     known = columns_of(within, len(fit.residual))
-    unseen = slopes_of_constants(posed, fit.z, [p.names[0] for p in within]).T * [p.tolerance for p in within]
+    unseen = slopes_of_constants(problem, fit.z, [p.names[0] for p in within]).T * [p.tolerance for p in within]
     prior = np.hstack([np.zeros((len(within), fit.n_free)), np.eye(len(within))])
     _, values, right = np.linalg.svd(np.vstack([np.hstack([fit.jacobian, known]), prior]), full_matrices=False)
     good = values > 1e-7 * values.max(initial=0.0)
     spread = np.hstack([slopes, unseen.reshape(len(residual), len(within))]) @ (right[good].T / values[good])
-    starts = list(start_changes(posed, fit.z, bent=True))
+    starts = list(start_changes(problem, fit.z, bent=True))
     spread = np.column_stack([spread, *starts])
     # A simulation that diverges there is not held to any doubt.
     spread = spread[:, np.isfinite(residual).all() & np.isfinite(spread).all(axis=0)]
@@ -461,7 +461,7 @@ def spectra(
 
     without: stretches of frequency, (low, high) [Hz], that are left out.
     """
-    found: dict[int, list[float]] = {}
+    ordinates: dict[int, list[float]] = {}
     for record, level, signal in zip(seen.data.each, seen.data.levels, signals, strict=True):
         if not len(signal):  # the rest of a record in motion
             continue
@@ -471,5 +471,5 @@ def spectra(
         kept = ~np.any([(low < frequency) & (frequency < high) for low, high in without] or [frequency < 0.0], axis=0)
         bands = np.searchsorted(BANDS_HZ, frequency[kept], side="right") - 1
         for band, value in zip(bands, power[kept], strict=True):
-            found.setdefault(int(band), []).append(float(value))
-    return found
+            ordinates.setdefault(int(band), []).append(float(value))
+    return ordinates

@@ -105,15 +105,15 @@ class Expansion:
     def density(self) -> Array:
         """Prior density of each free parameter along its range, at the estimate, (n_free,)."""
         fit, space = self.fit, self.fit.records.space
-        found = np.ones(fit.n_free)
+        density = np.ones(fit.n_free)
         places, _, deviations = fit.records.rows
-        found[places] = fit.records.span[places] / deviations / np.sqrt(2.0 * np.pi)
+        density[places] = fit.records.span[places] / deviations / np.sqrt(2.0 * np.pi)
         for i, (name, value) in enumerate(fit.values.items()):
             low, high = space.low[space.free][i], space.high[space.free][i]
             is_shape = self.library.owner(name) is not None and fit.model.parameters[name].null is None
             if is_shape and i not in places and low > 0.0 and high > 5.0 * low:  # log-uniform
-                found[i] = (high - low) / (max(value, low) * np.log(high / low))
-        return found
+                density[i] = (high - low) / (max(value, low) * np.log(high / low))
+        return density
 
     @cached_property
     def precision(self) -> Array:
@@ -124,15 +124,15 @@ class Expansion:
     @cached_property
     def gradient(self) -> Array:
         """Of half the sum of squares by the unknowns, less what their priors pull back, (n_unknowns,)."""
-        found = self.scale.weight * (self.unknowns.T @ self.fit.residual)
+        gradient = self.scale.weight * (self.unknowns.T @ self.fit.residual)
         places, means, deviations = self.fit.records.rows
         if len(places):
             pull = np.zeros(self.fit.n_free)
             pull[places] = (self.fit.x[places] - means) * self.fit.records.span[places] / deviations**2
-            found[: int(self.kept.sum())] -= pull[self.kept]
+            gradient[: int(self.kept.sum())] -= pull[self.kept]
         first = int(self.kept.sum())
-        found[first : first + len(self.fit.others)] -= [f.value for f in self.fit.others]
-        return np.asarray(found)
+        gradient[first : first + len(self.fit.others)] -= [f.value for f in self.fit.others]
+        return np.asarray(gradient)
 
     @cached_property
     def information(self) -> Array:
@@ -161,9 +161,9 @@ class Expansion:
         known, cover = self.information + np.diag(flat), self.fit.records.data.cover
         if cover is not None:
             known = known - cover.taken(self.unknowns, self.scale.weight)
-        found = self.scale.variance(self.fit.chi2) * np.linalg.inv(known)[:n, :n]
-        shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(found), 1e-300)))
-        return np.asarray(found * np.outer(shrunk, shrunk))
+        covariance = self.scale.variance(self.fit.chi2) * np.linalg.inv(known)[:n, :n]
+        shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(covariance), 1e-300)))
+        return np.asarray(covariance * np.outer(shrunk, shrunk))
 
     def beyond(self, columns: Array) -> tuple[Array, Array]:
         """Return inner products of columns, (n, n_samples), with themselves and the residual, beyond the unknowns.
@@ -229,9 +229,9 @@ class Forecast:
 
     def best(self, n: int) -> list[tuple[int, float]]:
         """Return the best variants with their strengths, the best first."""
-        each = logsumexp(self.log_factor, axis=1)
-        order = np.argsort(-each, kind="stable")[:n]
-        return [(int(i), float(self.strength[i, np.argmax(self.log_factor[i])])) for i in order if np.isfinite(each[i])]
+        logs = logsumexp(self.log_factor, axis=1)
+        order = np.argsort(-logs, kind="stable")[:n]
+        return [(int(i), float(self.strength[i, np.argmax(self.log_factor[i])])) for i in order if np.isfinite(logs[i])]
 
 
 def forecast(about: Expansion, proposal: Proposal) -> Forecast:
@@ -282,17 +282,17 @@ def log_evidence(about: Expansion) -> float:
     density, factor = about.density, about.factor[0]
     determinant = 2.0 * float(np.sum(np.log(np.diag(factor))))
     # A strength counts with its own prior, below; the density along its box cancels there.
-    found = scale.log_likelihood(fit.chi2) + 0.5 * fit.n_free * LOG_2PI - 0.5 * determinant
-    found += float(np.sum(np.log(density)))
+    evidence = scale.log_likelihood(fit.chi2) + 0.5 * fit.n_free * LOG_2PI - 0.5 * determinant
+    evidence += float(np.sum(np.log(density)))
     _, means, deviations = fit.records.rows
-    found -= 0.5 * float(np.sum(((fit.x[fit.records.rows[0]] - means) / deviations) ** 2))
+    evidence -= 0.5 * float(np.sum(((fit.x[fit.records.rows[0]] - means) / deviations) ** 2))
     # Samples that are left out count as all others do: only independent ones.
     share = scale.n / len(fit.residual)
-    found -= 0.5 * float(sum(f.value**2 + share * f.unknown.lost(f.value) for f in fit.others))
-    found -= 0.5 * fit.records.data.log_cover
+    evidence -= 0.5 * float(sum(f.value**2 + share * f.unknown.lost(f.value) for f in fit.others))
+    evidence -= 0.5 * fit.records.data.log_cover
     for key in fit.active:
-        found += log_strength(about, key)
-    return found
+        evidence += log_strength(about, key)
+    return evidence
 
 
 def log_strength(about: Expansion, key: EffectKey) -> float:
@@ -305,7 +305,7 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
     places: list[int] = []
     shares: list[float] = []
     sizes: list[float] = []
-    found = 0.0
+    density = 0.0
     for i, (name, value) in enumerate(fit.values.items()):
         parameter = fit.model.parameters[name]
         if not key.owns(name) or parameter.null is None:
@@ -314,13 +314,13 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
         places.append(i)
         shares.append((value - parameter.null) / far)
         sizes.append(far / (high[i] - low[i]))
-        found += 0.0 if low[i] < parameter.null < high[i] else LOG_2
+        density += 0.0 if low[i] < parameter.null < high[i] else LOG_2
     if not places:
         return 0.0
     size = np.array(sizes)
     covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
-    each = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
-    return float(found + logsumexp(each) - np.log(len(SCALES)) - np.sum(np.log(size)))
+    densities = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
+    return float(density + logsumexp(densities) - np.log(len(SCALES)) - np.sum(np.log(size)))
 
 
 def doubts_of(fit: Fit, library: Library) -> Array:

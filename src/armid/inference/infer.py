@@ -86,8 +86,8 @@ class Inference:
 
     def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
-        found = without_denied(self.found, denied, standing)
-        return Inference(found, posterior(found), standing)
+        exploration = without_denied(self.found, denied, standing)
+        return Inference(exploration, posterior(exploration), standing)
 
     def after_holdout(self, over: Sequence[bool]) -> "Inference":
         """Return what is probable where some of the records held out are missed by more than noise.
@@ -130,20 +130,20 @@ class Inference:
 
     def partners(self, model: Hypotheses, hypothesis: Hypothesis) -> dict[str, float]:
         """Return the effects that may replace one of a model, with the probability of such sets."""
-        rest, found = {h.public for h in model} - {hypothesis.public}, dict[str, float]()
+        rest, probabilities = {h.public for h in model} - {hypothesis.public}, dict[str, float]()
         for names, p in self.posterior.sets.items():
             named = {n for n in names if n[0] != "unknown"}
             other = named - rest
             if rest < named and len(other) == 1 and other != {hypothesis.public}:
                 ((kind, name),) = other
                 if kind == "effect":
-                    found[name] = found.get(name, 0.0) + p
-        return listed(found)
+                    probabilities[name] = probabilities.get(name, 0.0) + p
+        return listed(probabilities)
 
     @cached_property
     def intervals(self) -> dict[str, Interval]:
         """Of each parameter of the declared model, about the model in force."""
-        fit, found = self.found.fits[self.in_force], {}
+        fit, intervals = self.found.fits[self.in_force], {}
         alone = Expansion(replace(fit, others=()), self.found.scale(), self.found.library,
                           np.empty((len(fit.residual), 0)))  # fmt: skip
         of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(alone.spread)), strict=True))
@@ -156,17 +156,17 @@ class Inference:
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
                 low, high = in_box(fit.records.space, name, *self.posterior.interval(name))
-                found[name] = replace(one, low=low, high=high, causes=causes)
-        return found
+                intervals[name] = replace(one, low=low, high=high, causes=causes)
+        return intervals
 
     def of_fit(self, model: Hypotheses) -> dict[str, Interval]:
         """Return the intervals of all parameters of one model, were it true: with its constants, and of noise alone.
 
         That of noise is the one of `identify`: what the model leaves counts as noise.
         """
-        found, fit = self.found, self.found.fits[model]
-        whole, n = expansion_of(fit, found.scale(), found.library), fit.n_free
-        narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(whole.spread)[:n])
+        exploration, fit = self.found, self.found.fits[model]
+        expansion, n = expansion_of(fit, exploration.scale(), exploration.library), fit.n_free
+        narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(expansion.spread)[:n])
         wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))
         triples = zip(fit.values.items(), wide.tolist(), narrow.tolist(), strict=True)
         return {name: Interval(*in_box(fit.records.space, name, v - w, v + w), v - a, v + a)
@@ -198,8 +198,8 @@ def sentence_of(chances: Mapping[str, Any]) -> str:
 
 def listed(probabilities: Mapping[str, float]) -> dict[str, float]:
     """Return the probabilities that are listed, the largest first."""
-    told = {name: p for name, p in probabilities.items() if p >= LISTED}
-    return dict(sorted(told.items(), key=lambda pair: -pair[1]))
+    likely = {name: p for name, p in probabilities.items() if p >= LISTED}
+    return dict(sorted(likely.items(), key=lambda pair: -pair[1]))
 
 
 def prepared(
@@ -263,8 +263,8 @@ def prepared(
     chances = {**campaign.chances, **(priors or {})}
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
     library = replace(library, reach=REACH, priors=chances, known=known)
-    posed = library.problem(())
-    library = library.about(with_fitted_starts(posed.replays, posed.space), library.misfit)
+    problem = library.problem(())
+    library = library.about(with_fitted_starts(problem.replays, problem.space), library.misfit)
     library, declared = with_noise(*with_scales(library))
     return replace(library, doubles=effects.doubles(declared, library)), declared
 
@@ -275,15 +275,15 @@ def infer(library: Library, declared: Fit) -> Inference:
     Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
     with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
     """
-    found = explore(library, declared)
-    return Inference(found, posterior(found))
+    exploration = explore(library, declared)
+    return Inference(exploration, posterior(exploration))
 
 
 def declared_fit(library: Library) -> Fit:
     """Return the declared model at its estimate, from starts that are spread over the box."""
-    posed = library.problem(())
-    starts = spread_starts(posed) if posed.space.free.any() else ()
-    return accurate(fit_from(posed, (), starts), library)
+    problem = library.problem(())
+    starts = spread_starts(problem) if problem.space.free.any() else ()
+    return accurate(fit_from(problem, (), starts), library)
 
 
 def with_scales(library: Library) -> tuple[Library, Fit]:
@@ -329,8 +329,8 @@ def rescaled(library: Library, declared: Fit) -> Library:
         return library
     largest = 0.0
     for replay in declared.records.replays:
-        for piece, found in zip(replay.pieces, replay.calibrations, strict=True):
-            effort = along(model, piece.manoeuvre, declared.candidate, found.schedule, ["drive_effort"])
+        for piece, schedule in zip(replay.pieces, (c.schedule for c in replay.calibrations), strict=True):
+            effort = along(model, piece.manoeuvre, declared.candidate, schedule, ["drive_effort"])
             largest = max(largest, float(np.nanmax(np.abs(effort["drive_effort"]), initial=0.0)))
     if not np.isfinite(largest) or largest <= 0.0 or 1.0 / ALIKE < largest / plant.scales.effort < ALIKE:
         return library

@@ -176,10 +176,10 @@ class Library:
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""
-        there = set(model.parameters)
+        names = set(model.parameters)
         space = space_of(
-            model, self.overrides, {n: b for n, b in self.bounds.items() if n in there},
-            {n: v for n, v in self.fixed.items() if n in there},
+            model, self.overrides, {n: b for n, b in self.bounds.items() if n in names},
+            {n: v for n, v in self.fixed.items() if n in names},
         )  # fmt: skip
         for name, (low, high) in self.widened.items():
             space = space.with_bounds(name, low, high)
@@ -355,9 +355,9 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
 
 
-def finest(*several: Sequence[Calibration]) -> tuple[Calibration, ...]:
+def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     """Return of several calibrations of the same pieces the finest for each, of equal ones the first."""
-    return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*several, strict=True))
+    return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*calibrations, strict=True))
 
 
 def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:
@@ -395,9 +395,9 @@ def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: A
         for share in SHARES:
             tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))
             run = simulate(model, manoeuvre, spread, tried)
-            found = judged(run, runs[2 * n])
-            if found[2] and run.n_steps < n:
-                schedule, (error, is_hidden, _) = tried, found
+            judgement = judged(run, runs[2 * n])
+            if judgement[2] and run.n_steps < n:
+                schedule, (error, is_hidden, _) = tried, judgement
                 break
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
@@ -436,13 +436,13 @@ def activation_grid(
     along = [points_within(*bound[n], count) for n, count in zip(shapes, shape_counts(len(shapes)), strict=True)]
     points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*along)]
     chosen = [(n,) for n in null] + ([tuple(null)] if len(null) > 1 else [])
-    found = []
+    activations = []
     for names, side, shape in product(chosen, (1, 0), points):
         full = {n: float(bound[n][side]) if n in names else null[n] for n in null}
         if all(full[n] != null[n] for n in names):
             shares = STRENGTHS_OF_SHAPES if shapes else STRENGTHS
-            found += [Activation(shape | full, null, share) for share in shares]
-    return found, len(points)
+            activations += [Activation(shape | full, null, share) for share in shares]
+    return activations, len(points)
 
 
 def shape_counts(n_shapes: int) -> tuple[int, ...]:

@@ -113,20 +113,20 @@ def missing_from(lacking: Fit, library: Library) -> Missing:
 
     Each port costs a simulation for every knot of every piece.
     """
-    whole = segments_about(library.problem(lacking.active, lacking.values), lacking.values, library)
+    segments = segments_about(library.problem(lacking.active, lacking.values), lacking.values, library)
     # Pieces spread evenly over all, as many as the knots allow.
-    most = max(1, int(MOST_KNOTS / np.mean([len(s.knots) for s in whole])))
-    shown = [whole[i] for i in np.unique(np.linspace(0, len(whole) - 1, min(most, len(whole))).astype(int))]
-    signals = sorted((missing_signal(shown, port) for port in whole[0].gains), key=lambda s: -s.share)
-    return Missing(lacking, tuple(shown), tuple(signals), tuple(dependences(whole)))
+    most = max(1, int(MOST_KNOTS / np.mean([len(s.knots) for s in segments])))
+    shown = [segments[i] for i in np.unique(np.linspace(0, len(segments) - 1, min(most, len(segments))).astype(int))]
+    signals = sorted((missing_signal(shown, port) for port in segments[0].gains), key=lambda s: -s.share)
+    return Missing(lacking, tuple(shown), tuple(signals), tuple(dependences(segments)))
 
 
 def segments_about(records: WhiteRecords, values: Mapping[str, float], library: Library) -> list[Segment]:
     """Return every piece of the train records about values of the free parameters, SI, with gains and motions."""
     tested, levels = library.with_test_signals(records.model), [level.rms for level in records.data.levels]
     x, ports = free_values(records, values), list(records.model.plant.ports)
-    whole = segments(tested, records.space, x, records.replays, levels, ports)
-    return motions(records.model, candidate_at(records, values), whole)
+    candidate = candidate_at(records, values)
+    return motions(records.model, candidate, segments(tested, records.space, x, records.replays, levels, ports))
 
 
 def segments(
@@ -140,25 +140,25 @@ def segments(
     do, a factor aside.
     """
     level_of = dict(zip(replays, levels, strict=True))
-    whole = [segment_of(outputs, [level_of[r] for r in outputs], i, k, space, x)
-             for i, (ready, outputs) in enumerate(by_record(replays).items())
-             for k in range(len(ready.record.pieces))]  # fmt: skip
+    segments = [segment_of(outputs, [level_of[r] for r in outputs], i, k, space, x)
+                for i, (ready, outputs) in enumerate(by_record(replays).items())
+                for k in range(len(ready.record.pieces))]  # fmt: skip
     known = {n: idle(p) for n, p in model.parameters.items()}
     known |= dict(zip(space.names, space.complete(x[np.newaxis])[0], strict=True))
     kept: list[Array] = []
     for port in ports:
         probe = Probe(model, known, f"{PROBE}{port}")
-        size = probe.fitting_size(whole[0])
+        size = probe.fitting_size(segments[0])
         if size is None:
             continue
-        gains = [probe.gain(segment, size) for segment in whole]
-        every = np.concatenate([gain.ravel() for gain in gains])
-        unit = every / (np.linalg.norm(every) or 1.0)
+        gains = [probe.gain(segment, size) for segment in segments]
+        stacked = np.concatenate([gain.ravel() for gain in gains])
+        unit = stacked / (np.linalg.norm(stacked) or 1.0)
         if not any(abs(float(unit @ other)) > SAME_PORT for other in kept):
             kept.append(unit)
-            for segment, gain in zip(whole, gains, strict=True):
+            for segment, gain in zip(segments, gains, strict=True):
                 segment.gains[port] = gain
-    return whole
+    return segments
 
 
 def segment_of(
@@ -221,24 +221,24 @@ LITTLE = 1e-6
 ROUNDING = 1e-13
 
 
-def missing_signal(whole: Sequence[Segment], port: str) -> MissingSignal:
+def missing_signal(segments: Sequence[Segment], port: str) -> MissingSignal:
     """Recover the missing signal at a port.
 
     minimise sum |P (r - G c)|^2 + s sum |D c|^2 over the knots' values c of all segments; P projects off the
     sensitivities to the free parameters of all segments together, D takes second differences; s by generalised
     cross-validation (Golub, Heath, Wahba 1979, doi:10.1080/00401706.1979.10489751).
     """
-    basis = np.concatenate([s.jacobian for s in whole])
+    basis = np.concatenate([s.jacobian for s in segments])
     if basis.shape[1]:
         left, values, _ = np.linalg.svd(basis, full_matrices=False)
         basis = left[:, values > 1e-12 * values[0]] if values[0] > 0.0 else basis[:, :0]
-    r = beyond(basis, np.concatenate([s.residual for s in whole]))
-    g = beyond(basis, np.asarray(block_diag(*(s.gains[port] for s in whole))))
+    r = beyond(basis, np.concatenate([s.residual for s in segments]))
+    g = beyond(basis, np.asarray(block_diag(*(s.gains[port] for s in segments))))
     scale = np.sqrt(np.mean(np.sum(g**2, axis=0))) or 1.0
-    rough = np.asarray(block_diag(*(np.diff(np.eye(len(s.knots)), 2, axis=0) for s in whole)))
+    rough = np.asarray(block_diag(*(np.diff(np.eye(len(s.knots)), 2, axis=0) for s in segments)))
     signal = smoothest(g.T @ g / scale**2, g.T @ r / scale, rough, float(r @ r), len(r))
     rest = r - g @ signal / scale
-    edges = np.cumsum([len(s.knots) for s in whole])[:-1]
+    edges = np.cumsum([len(s.knots) for s in segments])[:-1]
     share = 1.0 - float(rest @ rest) / float(r @ r)
     return MissingSignal(port, tuple(np.split(signal / scale, edges)), share)
 
@@ -266,7 +266,7 @@ def smoothest(normal: Array, slope: Array, rough: Array, total: float, n: int) -
     return np.asarray(np.linalg.solve(lower.T, vectors @ (along / (values + strength))))
 
 
-def motions(model: Model, candidate: Array, whole: Sequence[Segment]) -> list[Segment]:
+def motions(model: Model, candidate: Array, segments: Sequence[Segment]) -> list[Segment]:
     """Return the segments with the variables of the motion on which a missing signal may depend, and their factors.
 
     candidate: whole, SI, (n_parameters,). Variables that never move, and those that order the samples as an earlier one
@@ -275,20 +275,20 @@ def motions(model: Model, candidate: Array, whole: Sequence[Segment]) -> list[Se
     names = curve_variables(model)
     asked = [*names, *(n for n in ("omega", "drive_effort") if knows(model, n) and n not in names)]
     tables = []
-    for segment in whole:
+    for segment in segments:
         values = along(model, segment.piece.manoeuvre, candidate, segment.schedule, asked)
         times = segment.piece.manoeuvre.times()
         tables.append({name: np.interp(segment.knots, times, v) for name, v in values.items()})
     ranks: dict[str, Array] = {}
     for name in names:
-        every = np.concatenate([t[name] for t in tables])
-        if np.ptp(every) <= 1e-9 * max(float(np.abs(every).max()), 1e-300):
+        samples = np.concatenate([t[name] for t in tables])
+        if np.ptp(samples) <= 1e-9 * max(float(np.abs(samples).max()), 1e-300):
             continue
-        rank = np.argsort(np.argsort(every)).astype(float)
+        rank = np.argsort(np.argsort(samples)).astype(float)
         if all(abs(np.corrcoef(rank, other)[0, 1]) < SAME_VARIABLE for other in ranks.values()):
             ranks[name] = rank
     return [replace(s, variables={n: t[n] for n in ranks}, factors=factors(t, model))
-            for s, t in zip(whole, tables, strict=True)]  # fmt: skip
+            for s, t in zip(segments, tables, strict=True)]  # fmt: skip
 
 
 def curve_variables(model: Model) -> list[str]:
@@ -302,13 +302,13 @@ def knows(model: Model, name: str) -> bool:
 
 def factors(values: dict[str, Array], model: Model) -> dict[str, Array]:
     """Return what a curve may be multiplied by, at the knots."""
-    found = {"1": np.ones(len(next(iter(values.values()))))}
+    factors = {"1": np.ones(len(next(iter(values.values()))))}
     speed = values.get(model.plant.aliases.get("omega", "omega"), values.get("omega"))
     if speed is not None:
-        found["direction"] = speed / np.hypot(speed, 0.005 * model.plant.scales.speed)
+        factors["direction"] = speed / np.hypot(speed, 0.005 * model.plant.scales.speed)
     if "drive_effort" in values:
-        found["drive_effort"] = values["drive_effort"]
-    return found
+        factors["drive_effort"] = values["drive_effort"]
+    return factors
 
 
 N_HEIGHTS, N_BLOCKS = 8, 4
@@ -316,10 +316,11 @@ N_HEIGHTS, N_BLOCKS = 8, 4
 RIDGE, STRAIGHT = 1e-9, 1e-4
 
 
-def dependences(whole: Sequence[Segment]) -> list[Dependence]:
-    pairs = [(v, f) for v in whole[0].variables for f in whole[0].factors if v != f]
-    found = [dependence(whole, port, variable, factor) for port in whole[0].gains for variable, factor in pairs]
-    return sorted(found, key=lambda d: -d.removed)
+def dependences(segments: Sequence[Segment]) -> list[Dependence]:
+    pairs = [(v, f) for v in segments[0].variables for f in segments[0].factors if v != f]
+    dependences = [dependence(segments, port, variable, factor)
+                   for port in segments[0].gains for variable, factor in pairs]  # fmt: skip
+    return sorted(dependences, key=lambda d: -d.removed)
 
 
 def dependence(segments: Sequence[Segment], port: str, variable: str, factor: str) -> Dependence:
@@ -334,17 +335,17 @@ def dependence(segments: Sequence[Segment], port: str, variable: str, factor: st
     if len(np.unique(groups)) == 1:
         groups = np.arange(len(groups)) * N_BLOCKS // len(groups)
     n_free = segments[0].jacobian.shape[1]
-    each = [(design[groups == n], residual[groups == n]) for n in np.unique(groups)]
-    parts = [NormalEquations(d.T @ d, d.T @ r, float(r @ r), n_free) for d, r in each]
-    whole, before, after = reduce(add, parts), 0.0, 0.0
+    blocks = [(design[groups == n], residual[groups == n]) for n in np.unique(groups)]
+    parts = [NormalEquations(d.T @ d, d.T @ r, float(r @ r), n_free) for d, r in blocks]
+    total, before, after = reduce(add, parts), 0.0, 0.0
     for i, left_out in enumerate(parts):
         others = reduce(add, [*parts[:i], *parts[i + 1 :]])
         before += left_out.without_curve.rest(others.without_curve.solution)
         after += left_out.rest(others.solution)
-    free_alone = whole.without_curve.rest(whole.without_curve.solution)
-    removed = 1.0 - whole.rest(whole.solution) / free_alone if free_alone > 0.0 else 0.0
+    free_alone = total.without_curve.rest(total.without_curve.solution)
+    removed = 1.0 - total.rest(total.solution) / free_alone if free_alone > 0.0 else 0.0
     share = 1.0 - after / before if before > 0.0 else 0.0
-    return Dependence(port, variable, factor, removed, share, first, last, whole.solution[n_free:])
+    return Dependence(port, variable, factor, removed, share, first, last, total.solution[n_free:])
 
 
 def hats(values: Array, first: float, last: float, n_knots: int = N_HEIGHTS) -> Array:

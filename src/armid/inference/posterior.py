@@ -54,8 +54,8 @@ class Posterior:
 
     @cached_property
     def weights(self) -> Array:
-        each = np.array([a.log_evidence / self.temperature + a.log_prior for a in self.atoms])
-        return np.asarray(np.exp(each - logsumexp(each)))
+        logs = np.array([a.log_evidence / self.temperature + a.log_prior for a in self.atoms])
+        return np.asarray(np.exp(logs - logsumexp(logs)))
 
     @cached_property
     def means(self) -> Array:
@@ -81,10 +81,10 @@ class Posterior:
     @cached_property
     def sets(self) -> dict[frozenset[tuple[str, str]], float]:
         """Probability of each set of hypotheses, the most probable first."""
-        found: dict[frozenset[tuple[str, str]], float] = {}
+        sets: dict[frozenset[tuple[str, str]], float] = {}
         for atom, weight in zip(self.atoms, self.weights, strict=True):
-            found[atom.names] = found.get(atom.names, 0.0) + float(weight)
-        return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+            sets[atom.names] = sets.get(atom.names, 0.0) + float(weight)
+        return dict(sorted(sets.items(), key=lambda pair: -pair[1]))
 
     def probability(self, kind: str, name: str | None = None, beside_unknown: bool = False) -> float:
         """Return the probability of a hypothesis, or of any of a kind.
@@ -111,8 +111,8 @@ class Posterior:
     def of_kind(self, kind: str, beside_unknown: bool = False) -> dict[str, float]:
         """Return the probabilities of the hypotheses of a kind, the most probable first."""
         names = sorted({n for s in self.sets for k, n in s if k == kind})
-        each = ((n, self.probability(kind, n, beside_unknown)) for n in names)
-        return dict(sorted(each, key=lambda pair: -pair[1]))
+        pairs = ((n, self.probability(kind, n, beside_unknown)) for n in names)
+        return dict(sorted(pairs, key=lambda pair: -pair[1]))
 
     def quantile(self, parameter: str, share: float) -> float:
         """Return the value below which a share of the mixture lies."""
@@ -137,8 +137,8 @@ class Posterior:
         i = self.parameters.index(parameter)
         first = int(np.argmax(self.weights))
         best, means, deviations = self.atoms[first], self.means[:, i], self.deviations[:, i]
-        whole, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), deviations[first] ** 2
-        if max(whole, own) <= 0.0:
+        total, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), deviations[first] ** 2
+        if max(total, own) <= 0.0:
             return []
         away: dict[str, float] = {}
         for j, (atom, weight) in enumerate(zip(self.atoms, self.weights, strict=True)):
@@ -148,30 +148,30 @@ class Posterior:
                 away[name] = away.get(name, 0.0) + float(more) / len(names)
         # Only what widens an interval is a cause; other models share their part of the variance in these proportions.
         away = {name: size for name, size in away.items() if size > 0.0}
-        scale = max(whole - own, 0.0) / max(sum(away.values()), 1e-300)
-        found = {"noise": min(noise**2, own), beside: max(own - noise**2, 0.0)}
-        found |= {name: scale * size for name, size in away.items()}
-        shares = {name: float(size) / max(whole, own) for name, size in found.items() if size > 0.0}
+        scale = max(total - own, 0.0) / max(sum(away.values()), 1e-300)
+        variances = {"noise": min(noise**2, own), beside: max(own - noise**2, 0.0)}
+        variances |= {name: scale * size for name, size in away.items()}
+        shares = {name: float(size) / max(total, own) for name, size in variances.items() if size > 0.0}
         return sorted(shares.items(), key=lambda pair: (-pair[1], pair[0]))
 
 
-def posterior(found: Exploration) -> Posterior:
+def posterior(exploration: Exploration) -> Posterior:
     """Return the mixture of all fitted models, and of the hypotheses that were forecast with the expanded ones."""
-    library, scale = found.library, found.scale()
-    own = tuple(n for n in found.declared.values if library.owner(n) is None)
-    ranked, atoms = found.ranked(), []
+    library, scale = exploration.library, exploration.scale()
+    own = tuple(n for n in exploration.declared.values if library.owner(n) is None)
+    ranked, atoms = exploration.ranked(), []
     top = ranked[0][1]
     # What the best model leaves beyond doubt has a covariance of its own: nobody knows what it is.
-    left = UNSEEN if is_certain(found.fits[ranked[0][0]]) else frozenset()
+    left = UNSEEN if is_certain(exploration.fits[ranked[0][0]]) else frozenset()
     for model, value in ranked:
         if value < top + NEGLIGIBLE:
             continue
-        about = expansion_of(found.fits[model], scale, library)
+        about = expansion_of(exploration.fits[model], scale, library)
         mean, covariance = of_parameters(about, own)
         names = frozenset(h.public for h in model) | left
         atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
-        atoms += beside(found, model, value, about, own, mean, covariance, top, left)
-    fit = found.declared
+        atoms += beside(exploration, model, value, about, own, mean, covariance, top, left)
+    fit = exploration.declared
     known = dict(zip(fit.values, fit.records.span / np.sqrt(12.0), strict=True))
     known |= {name: deviation for name, (_, deviation) in library.known.items()}
     declared, before = (np.array([each[n] for n in own]) for each in (fit.values, known))
@@ -188,7 +188,7 @@ def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
 
 
 def beside(
-    found: Exploration, model: Hypotheses, value: float, about: Expansion, own: Sequence[str], mean: Array,
+    exploration: Exploration, model: Hypotheses, value: float, about: Expansion, own: Sequence[str], mean: Array,
     covariance: Array, top: float, left: frozenset[tuple[str, str]],
 ) -> list[Atom]:  # fmt: skip
     """Return the atoms of an expanded model with one hypothesis that was forecast and not fitted, to first order."""
@@ -196,9 +196,9 @@ def beside(
     places = [list(fit.values).index(n) for n in own]
     span, atoms = fit.records.span[places], []
     names = frozenset(h.public for h in model) | left
-    for ahead in found.forecasts.get(model, ()):
+    for ahead in exploration.forecasts.get(model, ()):
         hypothesis = ahead.proposal.hypothesis
-        if model | {hypothesis} in found.fits or model | {hypothesis} in found.refused:
+        if model | {hypothesis} in exploration.fits or model | {hypothesis} in exploration.refused:
             continue
         weight, prior = value + hypothesis.log_prior, log_prior(model | {hypothesis})
         for i, k in np.argwhere(ahead.log_factor + weight > top + NEGLIGIBLE):

@@ -64,17 +64,17 @@ def continued(fit: Fit, shapes: Set[str]) -> list[Array]:
     for place in np.flatnonzero(is_shape):
         if records.model.parameters[names[place]].unit == "s":
             continue
-        z, found = fit.z.copy(), []
+        z, estimates = fit.z.copy(), []
         low, high = space.low[space.free][place], space.high[space.free][place]
         for value in points_within(low, high, N_HELD)[::-1]:
             z[place] = (value - low) / (high - low)
             values = zip(names[is_shape], records.values(z)[is_shape], strict=True)
             held = reduce(lambda there, shape: there.with_fixed(*shape), values, space)
-            posed = replace(records, space=held)
-            if np.isfinite(posed.chi2(z[~is_shape])[0]):
-                z[~is_shape] = descend(posed, [z[~is_shape]], LEADING)
-            found.append((float(posed.chi2(z[~is_shape])[0]), z.copy()))
-        starts.append(min(found, key=lambda one: one[0])[1])
+            problem = replace(records, space=held)
+            if np.isfinite(problem.chi2(z[~is_shape])[0]):
+                z[~is_shape] = descend(problem, [z[~is_shape]], LEADING)
+            estimates.append((float(problem.chi2(z[~is_shape])[0]), z.copy()))
+        starts.append(min(estimates, key=lambda one: one[0])[1])
     return starts
 
 
@@ -82,13 +82,13 @@ def freed(active: Active, key: EffectKey) -> Active:
     return tuple(replace(k, free_shape=True) if k == key else k for k in active)
 
 
-def with_free_shapes(fit: Fit, key: EffectKey, library: Library, posed: WhiteRecords | None = None) -> Fit:
+def with_free_shapes(fit: Fit, key: EffectKey, library: Library, problem: WhiteRecords | None = None) -> Fit:
     """Return the fit with the fixed shapes of one of its effects free, such as the width over which a sign is smoothed.
 
     A declared shape that is not the machine's leaves a residual that another effect would be taken for.
     """
     active = freed(fit.active, key)
-    records = library.problem(active, fit.values) if posed is None else posed
+    records = library.problem(active, fit.values) if problem is None else problem
     known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
     z = records.shares(np.array([known[n] for n in records.space.free_names]))
     free = np.array([n in library.fixed_shapes(key) for n in records.space.free_names])

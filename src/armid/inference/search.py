@@ -105,8 +105,8 @@ class Exploration:
     def ranked(self) -> list[tuple[Hypotheses, float]]:
         """Return the models with their log posteriors, the best first."""
         scale = self.scale()
-        each = [(model, self.log_posterior(model, scale)) for model in self.fits]
-        return sorted(each, key=lambda pair: -pair[1])
+        ranking = [(model, self.log_posterior(model, scale)) for model in self.fits]
+        return sorted(ranking, key=lambda pair: -pair[1])
 
     def take(self, model: Hypotheses, fit: Fit | None) -> bool:
         """Keep a fit where it is better than the one that is known; tell whether it is."""
@@ -132,93 +132,94 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
 
     declared: its fit. most: models that are expanded, None: as many as the samples allow.
     """
-    found = Exploration(library, effects.hypotheses(library))
-    found.constants = constants_of(declared.records, declared.z, library.tolerances)
-    cost = len(declared.residual) / SAMPLES * (1.0 + len(found.constants) / CONSTANTS)
+    exploration = Exploration(library, effects.hypotheses(library))
+    exploration.constants = constants_of(declared.records, declared.z, library.tolerances)
+    cost = len(declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / CONSTANTS)
     most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
-    found.fits[frozenset()] = declared
-    found.fits[frozenset()] = with_constants(declared, found.constants, found.scale().weight)
-    found.faults = records.hypotheses(declared.records)
-    found.drifts = drifts.hypotheses(declared, library)
+    exploration.fits[frozenset()] = declared
+    exploration.fits[frozenset()] = with_constants(declared, exploration.constants, exploration.scale().weight)
+    exploration.faults = records.hypotheses(declared.records)
+    exploration.drifts = drifts.hypotheses(declared, library)
     in_vain = 0
-    while len(found.forecasts) < most and in_vain < MOST_IN_VAIN:
-        model, best = next_model(found), found.ranked()[0][0]
+    while len(exploration.forecasts) < most and in_vain < MOST_IN_VAIN:
+        model, best = next_model(exploration), exploration.ranked()[0][0]
         if model is None:
-            if not add_unknown(found):
+            if not add_unknown(exploration):
                 break
             continue
-        complete(found, model)
+        complete(exploration, model)
         # Near the noise a second name must not stand for a shape of the first that was held.
-        for less in simpler(found, model) if is_near(found) else []:
-            if has_shapes(found, less):
-                complete(found, less)
-        if next_model(found) == model:
-            expand(found, model)
-            finish(found)
-            in_vain = 0 if found.ranked()[0][0] != best or is_near(found) else in_vain + 1
-    add_unknown(found)
-    finish_all(found)
-    return found
+        for less in simpler(exploration, model) if is_near(exploration) else []:
+            if has_shapes(exploration, less):
+                complete(exploration, less)
+        if next_model(exploration) == model:
+            expand(exploration, model)
+            finish(exploration)
+            in_vain = 0 if exploration.ranked()[0][0] != best or is_near(exploration) else in_vain + 1
+    add_unknown(exploration)
+    finish_all(exploration)
+    return exploration
 
 
-def without_denied(found: Exploration, denied: Hypotheses, standing: Hypotheses) -> Exploration:
+def without_denied(exploration: Exploration, denied: Hypotheses, standing: Hypotheses) -> Exploration:
     """Return what was explored without hypotheses that held-out records deny, and without larger sets than what stands.
 
     What is left over then is something unknown: no other name was judged in place of those.
     """
     gone = {h.public for h in denied}
-    fits = {m: fit for m, fit in found.fits.items()
+    fits = {m: fit for m, fit in exploration.fits.items()
             if len(m) <= len(standing) and not any(h.public in gone for h in m)}  # fmt: skip
-    forecasts = {m: [f for f in several if f.proposal.hypothesis.public not in gone]
-                 for m, several in found.forecasts.items() if m in fits and len(m) < len(standing)}  # fmt: skip
-    left = replace(found, fits=fits, forecasts=forecasts, noise=found.scale(), _evidence=WeakKeyDictionary())
+    forecasts = {m: [f for f in ahead if f.proposal.hypothesis.public not in gone]
+                 for m, ahead in exploration.forecasts.items() if m in fits and len(m) < len(standing)}  # fmt: skip
+    left = replace(exploration, fits=fits, forecasts=forecasts, noise=exploration.scale(),
+                   _evidence=WeakKeyDictionary())  # fmt: skip
     add_signals(left, [m for m, _ in left.ranked()[:N_BESIDE]])
     return left
 
 
-def add_unknown(found: Exploration) -> bool:
+def add_unknown(exploration: Exploration) -> bool:
     """Add a signal without a form to the best models; tell whether there is a new one.
 
     Where the best model leaves noise alone, to those with a name less: several wrong names together can explain an
     effect that the library does not hold.
     """
-    ranked = found.ranked()
-    if any(h.kind == "unknown" for m in found.fits for h in m):
+    ranked = exploration.ranked()
+    if any(h.kind == "unknown" for m in exploration.fits for h in m):
         return False
     best = ranked[0][0]
-    models = [*simpler(found, best)[:N_BESIDE], *([frozenset[Hypothesis]()] if best else [])]
-    if is_significant(found.fits[best]):
+    models = [*simpler(exploration, best)[:N_BESIDE], *([frozenset[Hypothesis]()] if best else [])]
+    if is_significant(exploration.fits[best]):
         models = [*(m for m, _ in ranked[:N_BESIDE]), *models]
-    return add_signals(found, list(dict.fromkeys(models)))
+    return add_signals(exploration, list(dict.fromkeys(models)))
 
 
-def add_signals(found: Exploration, models: Sequence[Hypotheses]) -> bool:
+def add_signals(exploration: Exploration, models: Sequence[Hypotheses]) -> bool:
     """Add signals without a form to some models; return whether a model is new."""
-    library, scale, before = found.library, found.scale(), len(found.fits)
+    library, scale, before = exploration.library, exploration.scale(), len(exploration.fits)
     for model in models:
-        fit = found.fits[model]
+        fit = exploration.fits[model]
         about = expansion_of(fit, scale, library)
         ahead = sorted((forecast(about, p) for p in unknown.propose(fit, library)), key=lambda f: -f.posterior)
         for one in ahead[:N_SIGNALS]:
-            for key, make in trial_of(found, model, about, one, np.inf):
-                found.take(key, make())
-    return len(found.fits) > before
+            for key, make in trial_of(exploration, model, about, one, np.inf):
+                exploration.take(key, make())
+    return len(exploration.fits) > before
 
 
-def next_model(found: Exploration) -> Hypotheses | None:
+def next_model(exploration: Exploration) -> Hypotheses | None:
     """Return the model that is to be expanded next, None where all in the window are.
 
     Where the best model leaves more than noise, the best ones of each smaller size may lead on as well: a strong second
     effect can mislead the choice of the first. Far from the noise these come first, the smallest before all (a beam).
     """
-    ranked = found.ranked()
+    ranked = exploration.ranked()
     best, top = ranked[0]
     near = [m for m, value in ranked if value > top - WINDOW and not is_outdone(m, value, ranked)]
-    if is_significant(found.fits[best]) and found.fits[best].records.data.cover is None:
+    if is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         beam = [m for n in range(1, len(best) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
-        near = [*near, *beam] if is_near(found) else [*beam, *near]
-    return next((m for m in near if m not in found.forecasts and len(m) < MOST_EFFECTS), None)
+        near = [*near, *beam] if is_near(exploration) else [*beam, *near]
+    return next((m for m in near if m not in exploration.forecasts and len(m) < MOST_EFFECTS), None)
 
 
 def is_outdone(model: Hypotheses, value: float, ranked: Sequence[tuple[Hypotheses, float]]) -> bool:
@@ -235,111 +236,114 @@ def with_constants(fit: Fit, constants: Sequence[Unknown], weight: float) -> Fit
     return replace(again or fit, rough=False)
 
 
-def expand(found: Exploration, model: Hypotheses) -> None:
+def expand(exploration: Exploration, model: Hypotheses) -> None:
     """Fit the most promising changes of a model: additions of every kind, pairs, swaps, drops, free shapes."""
-    fit, library, scale = found.fits[model], found.library, found.scale()
+    fit, library, scale = exploration.fits[model], exploration.library, exploration.scale()
     library = library.about(fit.records.replays, fit.misfit) if fit.base is None else library
     library.say(f"expanding {words(model)}")
     about, held = expansion_of(fit, scale, library), expansion_of(fit, scale, library, with_doubts=False)
-    proposals: list[Proposal] = effects.propose(fit, found.known, library)
+    proposals: list[Proposal] = effects.propose(fit, exploration.known, library)
     names = {h.public for h in model}
-    others = [*records.propose(fit, found.faults, library), *drifts.propose(fit, found.drifts)]
+    others = [*records.propose(fit, exploration.faults, library), *drifts.propose(fit, exploration.drifts)]
     others = [p for p in others if p.hypothesis.public not in names]
     ahead = [forecast(about, p) for p in proposals]
     ahead_held = [forecast(held, p) for p in proposals]
     beside = [forecast(about, p) for p in others]
-    found.forecasts[model] = [f.without_columns for f in (*ahead, *beside)]
-    limit = limit_of(found, scale)
+    exploration.forecasts[model] = [f.without_columns for f in (*ahead, *beside)]
+    limit = limit_of(exploration, scale)
     trials: list[Trial] = []
     if is_significant(fit):
-        trials += best_begun(found, model, held, ahead_held, limit, N_ADDED)
+        trials += best_begun(exploration, model, held, ahead_held, limit, N_ADDED)
     else:
         added = [i for i, f in enumerate(ahead) if max(f.posterior, ahead_held[i].posterior) > REFITTED]
         for i in sorted(added, key=lambda i: -max(ahead[i].posterior, ahead_held[i].posterior))[:N_ADDED]:
-            trials += trial_of(found, model, held, ahead_held[i], limit)
-    trials += [t for f in leading(beside) for t in trial_of(found, model, about, f, limit)]
-    ranked = found.ranked()
-    is_far = is_significant(fit) and not is_near(found)
+            trials += trial_of(exploration, model, held, ahead_held[i], limit)
+    trials += [t for f in leading(beside) for t in trial_of(exploration, model, about, f, limit)]
+    ranked = exploration.ranked()
+    is_far = is_significant(fit) and not is_near(exploration)
     if is_far and model == ranked[0][0]:  # before the drops: it fits what it stands on
-        trials += exchanges(found, model, fit, limit)
-    trials += drops(found, model)
-    if not is_far and found.log_posterior(model, scale) > ranked[0][1] - WINDOW:
-        forms = effects.propose_forms(fit, found.known, library)
-        trials += swaps(found, model, fit, scale, [*proposals, *forms], limit)
+        trials += exchanges(exploration, model, fit, limit)
+    trials += drops(exploration, model)
+    if not is_far and exploration.log_posterior(model, scale) > ranked[0][1] - WINDOW:
+        forms = effects.propose_forms(fit, exploration.known, library)
+        trials += swaps(exploration, model, fit, scale, [*proposals, *forms], limit)
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
-        found.take_or_refuse(key, again)
-    for key, again in pairs(found, model, about, ahead):
-        found.take(key, again)
+        exploration.take_or_refuse(key, again)
+    for key, again in pairs(exploration, model, about, ahead):
+        exploration.take(key, again)
 
 
 def best_begun(
-    found: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast], limit: float, n: int
+    exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast], limit: float, n: int
 ) -> list[Trial]:
     """Return the additions whose first steps lead farthest: far from noise a straight line is a poor guess."""
-    fit, library = about.fit, found.library
+    fit, library = about.fit, exploration.library
     begun = library.each(lambda a: effects.first_steps(fit, about, a, library), ahead)
     best = sorted(range(len(ahead)), key=lambda i: begun[i][0])[:n]
-    return [t for i in best for t in trial_of(found, model, about, ahead[i], limit, begun[i][1])]
+    return [t for i in best for t in trial_of(exploration, model, about, ahead[i], limit, begun[i][1])]
 
 
-def exchanges(found: Exploration, model: Hypotheses, fit: Fit, limit: float) -> list[Trial]:
+def exchanges(exploration: Exploration, model: Hypotheses, fit: Fit, limit: float) -> list[Trial]:
     """Return the fits in which another effect takes the place of one of several, by its first steps there.
 
     The effect that explains most alone may be wrong together with the others.
     """
-    scale, trials = found.scale(), []
-    several = [h for h in sorted(model) if h.kind == "effect"]
-    for hypothesis in several if len(several) > 1 else []:
+    scale, trials = exploration.scale(), []
+    hypotheses = [h for h in sorted(model) if h.kind == "effect"]
+    for hypothesis in hypotheses if len(hypotheses) > 1 else []:
         less = model - {hypothesis}
-        if less not in found.fits:
-            found.take(less, unless_diverged(partial(without, fit, hypothesis, found.library, scale.weight)))
-        if less not in found.fits or less in found.forecasts:
+        if less not in exploration.fits:
+            again = unless_diverged(partial(without, fit, hypothesis, exploration.library, scale.weight))
+            exploration.take(less, again)
+        if less not in exploration.fits or less in exploration.forecasts:
             continue
-        about = expansion_of(found.fits[less], scale, found.library, with_doubts=False)
-        proposals = [p for p in effects.propose(about.fit, found.known, found.library)
+        about = expansion_of(exploration.fits[less], scale, exploration.library, with_doubts=False)
+        proposals = [p for p in effects.propose(about.fit, exploration.known, exploration.library)
                      if p.hypothesis.name != hypothesis.name]  # fmt: skip
-        trials += best_begun(found, less, about, [forecast(about, p) for p in proposals], limit, N_EXCHANGED)
+        trials += best_begun(exploration, less, about, [forecast(about, p) for p in proposals], limit, N_EXCHANGED)
     return trials
 
 
-def limit_of(found: Exploration, scale: Scale) -> float:
+def limit_of(exploration: Exploration, scale: Scale) -> float:
     """Return the sum of squares from which on a model is given up: far below the best one's posterior."""
-    best = max(value for _, value in found.ranked()[:1])
+    best = max(value for _, value in exploration.ranked()[:1])
     return scale.reach(min(best - HOPELESS, -1.0)) if np.isfinite(best) else np.inf
 
 
 def leading(forecasts: Sequence[Forecast]) -> list[Forecast]:
     """Return those of each kind that lead and that are not improbable."""
-    found = []
+    leaders = []
     for kind in ("record", "drift"):
         mine = [f for f in forecasts if f.proposal.hypothesis.kind == kind and f.posterior > REFITTED]
-        found += sorted(mine, key=lambda f: -f.posterior)[:N_OTHERS]
-    return found
+        leaders += sorted(mine, key=lambda f: -f.posterior)[:N_OTHERS]
+    return leaders
 
 
 def trial_of(
-    found: Exploration, model: Hypotheses, about: Expansion, ahead: Forecast, limit: float, *begun: Array
+    exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Forecast, limit: float, *begun: Array
 ) -> list[Trial]:
     """Return the fit of a model with one hypothesis more, where it is not known."""
     key = model | {ahead.proposal.hypothesis}
-    if key in found.fits or not np.isfinite(ahead.total):
+    if key in exploration.fits or not np.isfinite(ahead.total):
         return []
     return [(key, partial(ahead.proposal.refit, about.fit, about, ahead, limit, *begun))]
 
 
-def drops(found: Exploration, model: Hypotheses, kinds: Sequence[str] = ("effect", "record", "drift")) -> list[Trial]:
+def drops(
+    exploration: Exploration, model: Hypotheses, kinds: Sequence[str] = ("effect", "record", "drift")
+) -> list[Trial]:
     """Return the fits of a model without one of its effects, faults or drifts.
 
     A fault that imitated an effect keeps its place with a size of 0 when the effect is added.
     """
-    fit, weight, trials = found.fits[model], found.scale().weight, list[Trial]()
+    fit, weight, trials = exploration.fits[model], exploration.scale().weight, list[Trial]()
     sizes = {f.unknown.name for f in fit.others}
     for hypothesis in sorted(h for h in model if h.kind in kinds):
         key = model - {hypothesis}
-        is_known = key in found.fits or key in found.refused
+        is_known = key in exploration.fits or key in exploration.refused
         if not is_known and (hypothesis.kind == "effect" or name_of_size(hypothesis) in sizes):
-            trials.append((key, partial(without, fit, hypothesis, found.library, weight)))
+            trials.append((key, partial(without, fit, hypothesis, exploration.library, weight)))
     return trials
 
 
@@ -360,19 +364,19 @@ def name_of_size(hypothesis: Hypothesis) -> str:
 
 
 def near(
-    fit: Fit, active: tuple[EffectKey, ...], each: Sequence[dict[str, float]], library: Library, weight: float,
+    fit: Fit, active: tuple[EffectKey, ...], guesses: Sequence[dict[str, float]], library: Library, weight: float,
     limit: float = np.inf,
 ) -> Fit | None:  # fmt: skip
     """Return the model with some effects fitted from the best of several values, other unknowns as in a fit."""
-    posed = effects.beside(fit, active, library)
-    starts = [start_of(posed, values) for values in each]
+    problem = effects.beside(fit, active, library)
+    starts = [start_of(problem, values) for values in guesses]
     if len(starts) > 1:
-        starts = [starts[int(np.argmin(projected(fit, posed, weight).chi2(np.array(starts))))]]
-    return effects.fitted(fit, posed, active, starts, library, weight, limit)
+        starts = [starts[int(np.argmin(projected(fit, problem, weight).chi2(np.array(starts))))]]
+    return effects.fitted(fit, problem, active, starts, library, weight, limit)
 
 
 def swaps(
-    found: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal], limit: float
+    exploration: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal], limit: float
 ) -> list[Trial]:
     """Return the fits in which what moves the records most alike takes the place of an effect of a model.
 
@@ -385,18 +389,18 @@ def swaps(
             continue
         # Constants that are free to stand in for either make twins look like strangers.
         none = np.empty((len(fit.residual), 0))
-        about = Expansion(replace(fit, others=()), scale, found.library, none, key)
+        about = Expansion(replace(fit, others=()), scale, exploration.library, none, key)
         others = {k.public for k in fit.active if k != key}
-        wide = effects.propose_with_free_shapes(fit, key, found.known, found.library)
-        each = [likest(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
-        each.sort(key=lambda pair: pair[0])
-        each = list({one[1].hypothesis: one for one in each}.values())[::-1]
-        forms = [one for one in each if one[1].hypothesis.name == hypothesis.name]
-        for _, proposal, variant, strength in [*forms, *each[:N_SWAPPED]]:
+        wide = effects.propose_with_free_shapes(fit, key, exploration.known, exploration.library)
+        ranking = [likest(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
+        ranking.sort(key=lambda pair: pair[0])
+        ranking = list({one[1].hypothesis: one for one in ranking}.values())[::-1]
+        forms = [one for one in ranking if one[1].hypothesis.name == hypothesis.name]
+        for _, proposal, variant, strength in [*forms, *ranking[:N_SWAPPED]]:
             other = model - {hypothesis} | {proposal.hypothesis}
-            if not is_complete(found, other):  # a known rival may have been fitted from afar
+            if not is_complete(exploration, other):  # a known rival may have been fitted from afar
                 start = partial(swapped, fit, key, proposal, variant, strength)
-                trials[other] = partial(start, found.library, scale.weight, limit)
+                trials[other] = partial(start, exploration.library, scale.weight, limit)
     return list(trials.items())
 
 
@@ -434,12 +438,12 @@ def swapped(
     active = (*(k for k in fit.active if k != key), new)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     shares = np.clip(strength * STRENGTHS, 0.01, library.reach)
-    each = [values | proposal.grid[variant].at(float(share)) for share in shares]
-    return near(fit, active, each, library, weight, limit)
+    guesses = [values | proposal.grid[variant].at(float(share)) for share in shares]
+    return near(fit, active, guesses, library, weight, limit)
 
 
 def pairs(
-    found: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast]
+    exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast]
 ) -> Iterable[tuple[Hypotheses, Fit | None]]:
     """Yield the fits with two effects more that promise clearly more than the best single one."""
     lead = sorted((f for f in ahead if np.isfinite(f.total)), key=lambda f: -f.posterior)[:N_LEADING]
@@ -469,80 +473,83 @@ def pairs(
     for total, i, k, first, second in sorted(values, reverse=True)[:N_PAIRS]:
         one, two = lead[i].proposal, lead[k].proposal
         key = model | {one.hypothesis, two.hypothesis}
-        if total <= best_single or key in found.fits or len(key) < len(model) + 2:
+        if total <= best_single or key in exploration.fits or len(key) < len(model) + 2:
             continue
-        values_of = dict(about.fit.values) | one.grid[variants[i]].at(float(np.clip(first, 0.01, found.library.reach)))
-        values_of |= two.grid[variants[k]].at(float(np.clip(second, 0.01, found.library.reach)))
+        library, values_of = exploration.library, dict(about.fit.values)
+        values_of |= one.grid[variants[i]].at(float(np.clip(first, 0.01, library.reach)))
+        values_of |= two.grid[variants[k]].at(float(np.clip(second, 0.01, library.reach)))
         active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
-        yield key, near(about.fit, active, [values_of], found.library, about.scale.weight)
+        yield key, near(about.fit, active, [values_of], library, about.scale.weight)
 
 
-def finish(found: Exploration) -> None:
+def finish(exploration: Exploration) -> None:
     """Bring the leading models of the best size to their estimates: rough fits may stand in the wrong order."""
-    size = len(found.ranked()[0][0])
-    for model in [m for m, _ in found.ranked() if len(m) == size][:BEAM]:
-        complete(found, model)
+    size = len(exploration.ranked()[0][0])
+    for model in [m for m, _ in exploration.ranked() if len(m) == size][:BEAM]:
+        complete(exploration, model)
 
 
-def finish_all(found: Exploration) -> None:
+def finish_all(exploration: Exploration) -> None:
     """Bring all models that may count to their estimates, all unknowns freed."""
     while True:
-        ranked = found.ranked()
-        for key, make in drops(found, ranked[0][0], ("record", "drift")):
-            found.take_or_refuse(key, make())
-        ranked = found.ranked()
-        todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(found, m)
+        ranked = exploration.ranked()
+        for key, make in drops(exploration, ranked[0][0], ("record", "drift")):
+            exploration.take_or_refuse(key, make())
+        ranked = exploration.ranked()
+        todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(exploration, m)
                 and not is_outdone(m, value, ranked)]  # fmt: skip
         best, top = ranked[0]
-        todo += [m for m in simpler(found, best) if not is_complete(found, m) and has_shapes(found, m)]
+        todo += [m for m in simpler(exploration, best)
+                 if not is_complete(exploration, m) and has_shapes(exploration, m)]  # fmt: skip
         # A name must not stand for its twin, whose rough fit may be far from its estimate.
         twins = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
-        todo += [m for m in twins[:N_TWINS] if m not in todo and not is_complete(found, m) and has_shapes(found, m)]
+        todo += [m for m in twins[:N_TWINS]
+                 if m not in todo and not is_complete(exploration, m) and has_shapes(exploration, m)]  # fmt: skip
         if not todo:
             break
         for model in todo:
-            complete(found, model)
-    weight, top = found.scale().weight, found.ranked()[0][1]
-    for model in [m for m, value in found.ranked()[:BEAM] if value > top - WINDOW]:
-        found.fits[model] = polished(found.fits[model], weight)
+            complete(exploration, model)
+    weight, top = exploration.scale().weight, exploration.ranked()[0][1]
+    for model in [m for m, value in exploration.ranked()[:BEAM] if value > top - WINDOW]:
+        exploration.fits[model] = polished(exploration.fits[model], weight)
 
 
-def simpler(found: Exploration, model: Hypotheses) -> list[Hypotheses]:
+def simpler(exploration: Exploration, model: Hypotheses) -> list[Hypotheses]:
     """Return the known models that lack one effect of a model, the most probable first."""
-    less = [model - {h} for h in sorted(model) if h.kind == "effect" and model - {h} in found.fits]
-    return sorted(less, key=lambda m: -found.log_posterior(m))
+    less = [model - {h} for h in sorted(model) if h.kind == "effect" and model - {h} in exploration.fits]
+    return sorted(less, key=lambda m: -exploration.log_posterior(m))
 
 
-def has_shapes(found: Exploration, model: Hypotheses) -> bool:
+def has_shapes(exploration: Exploration, model: Hypotheses) -> bool:
     """Tell whether an effect of a model has a shape that its declaration holds, so that a rough fit says little."""
-    return any(found.library.fixed_shapes(key) for key in found.fits[model].active)
+    return any(exploration.library.fixed_shapes(key) for key in exploration.fits[model].active)
 
 
-def is_complete(found: Exploration, model: Hypotheses) -> bool:
+def is_complete(exploration: Exploration, model: Hypotheses) -> bool:
     """Tell whether a model is at its estimate for about the weight that a square has by now."""
-    known = found.completed.get(model, 0.0)
-    return 0.5 < known / found.scale().weight < 2.0
+    known = exploration.completed.get(model, 0.0)
+    return 0.5 < known / exploration.scale().weight < 2.0
 
 
-def complete(found: Exploration, model: Hypotheses) -> None:
+def complete(exploration: Exploration, model: Hypotheses) -> None:
     """Bring a model to its estimate, with its shapes, its constants and its further unknowns freed.
 
     Where that makes it the best, a square weighs more than before, and constants are freed once more.
     """
     for _ in range(MOST_COMPLETED):
-        if is_complete(found, model):
+        if is_complete(exploration, model):
             return
-        weight = found.completed[model] = found.scale().weight
-        if not (model or found.constants):
+        weight = exploration.completed[model] = exploration.scale().weight
+        if not (model or exploration.constants):
             return
-        fit = found.fits[model]
-        again = unless_diverged(partial(completed, fit, found.library, found.constants, weight))
-        found.fits[model] = again or replace(found.fits[model], rough=False)
+        fit = exploration.fits[model]
+        again = unless_diverged(partial(completed, fit, exploration.library, exploration.constants, weight))
+        exploration.fits[model] = again or replace(exploration.fits[model], rough=False)
 
 
-def is_near(found: Exploration) -> bool:
+def is_near(exploration: Exploration) -> bool:
     """Tell whether the best model is near the noise, so that a few log units count."""
-    return NEAR * found.scale().weight * len(found.declared.residual) > found.scale().n
+    return NEAR * exploration.scale().weight * len(exploration.declared.residual) > exploration.scale().n
 
 
 def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:

@@ -109,15 +109,15 @@ class ProjectedRecords(LeastSquaresProblem):
         return self.cover.white(self.records.signals(Z))
 
 
-def projected(fit: Fit, posed: WhiteRecords, weight: float) -> LeastSquaresProblem:
+def projected(fit: Fit, problem: WhiteRecords, weight: float) -> LeastSquaresProblem:
     """Return a problem whose further unknowns are those of a fit, with the columns that they have there.
 
-    posed: the records with the values that the unknowns have in the fit. weight: of each square, see `evidence.Scale`.
+    problem: with the values that the unknowns have in the fit. weight: of each square, see `evidence.Scale`.
     The problem itself where there are none.
     """
     if not fit.others:
-        return posed
-    return about_known(posed, fit.columns, np.array([f.value for f in fit.others]), weight)
+        return problem
+    return about_known(problem, fit.columns, np.array([f.value for f in fit.others]), weight)
 
 
 def about_known(records: WhiteRecords, columns: Array, values: Array, weight: float) -> ProjectedRecords:
@@ -154,8 +154,8 @@ def freed(
     (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
     damping, columns, is_new = FIRST, columns_about(base.plain, unknowns, values, z, kept), not kept
     for _ in range(MOST_ROUGH if rough else MOST_STEPS):
-        there = moved(base, unknowns, values)
-        here, square, slope = normal_equations(there, residual, columns, values, z, weight)
+        problem = moved(base, unknowns, values)
+        here, square, slope = normal_equations(problem, residual, columns, values, z, weight)
         if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
             break
         dampings = [max(factor * damping, LEAST) for factor in LADDER]
@@ -212,8 +212,8 @@ def polished(fit: Fit, weight: float) -> Fit:
     low, high = np.repeat([0.0, -np.inf], [n, len(unknowns)]), np.repeat([1.0, np.inf], [n, len(unknowns)])
 
     def residuals(X: Array) -> Array:
-        found = residuals_at(base, unknowns, X[:, n:], X[:, :n])
-        return np.asarray(np.hstack([np.sqrt(weight) * found, X[:, n:]]))
+        whitened = residuals_at(base, unknowns, X[:, n:], X[:, :n])
+        return np.asarray(np.hstack([np.sqrt(weight) * whitened, X[:, n:]]))
 
     def slopes(x: Array) -> Array:
         centre = np.clip(x, low + steps, high - steps)
@@ -223,9 +223,9 @@ def polished(fit: Fit, weight: float) -> Fit:
     def residual(x: Array) -> Array:
         return np.asarray(residuals(x[np.newaxis])[0])
 
-    found = least_squares(residual, here, slopes, (low, high), x_scale="jac",
-                          ftol=ARRIVED, xtol=ARRIVED, gtol=ARRIVED, max_nfev=MOST_STEPS)  # fmt: skip
-    z, values = found.x[:n], found.x[n:]
+    solution = least_squares(residual, here, slopes, (low, high), x_scale="jac",
+                             ftol=ARRIVED, xtol=ARRIVED, gtol=ARRIVED, max_nfev=MOST_STEPS)  # fmt: skip
+    z, values = solution.x[:n], solution.x[n:]
     # what came to the edge of the inside is on the bound
     z = np.clip(z + INSIDE * (2.0 * z - 1.0), 0.0, 1.0)
     V, Z = np.array([[f.value for f in fit.others], values]), np.array([fit.z, z])
@@ -243,16 +243,16 @@ def normal_equations(
     slopes = np.empty((len(residual), 0))
     if len(z):
         slopes = forward_slopes(records, [Descent(z, residual, float(residual @ residual))])[0]
-    every = np.hstack([slopes, records.padded(columns)])
+    jacobian = np.hstack([slopes, records.padded(columns)])
     prior = np.concatenate([np.zeros(len(z)), np.full(len(values), 1.0 / weight)])
     here = np.concatenate([z, values])
-    return here, every.T @ every + np.diag(prior), every.T @ residual - prior * here
+    return here, jacobian.T @ jacobian + np.diag(prior), jacobian.T @ residual - prior * here
 
 
 def about_starts(base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array) -> WhiteRecords:
     """Return records before any unknown was moved, from the starts that fit best with some values of the unknowns."""
-    there = moved(base, unknowns, values)
-    started = with_starts(there.replays, there.whole(z[np.newaxis])[0])
+    problem = moved(base, unknowns, values)
+    started = with_starts(problem.replays, problem.whole(z[np.newaxis])[0])
     names = base.model.plant.start_constants.values()
     pieces_of = {r.record.file: r.pieces for r in started}
 
@@ -292,11 +292,11 @@ def residuals_at(base: WhiteRecords, unknowns: Sequence[Unknown], V: Array, Z: A
         forms.append((moved(base, rest, values), np.flatnonzero((V[:, free] == values).all(axis=1))))
     shares = {u.product.names[0]: V[:, i] * u.product.tolerance for i, u in enumerate(unknowns) if u.product}
     signals = signals_of_each([(records.replays, rows) for records, rows in forms], base.whole(Z), shares)
-    found: dict[int, Array] = {}
+    residuals: dict[int, Array] = {}
     for (records, rows), own in zip(forms, signals, strict=True):
         white = records.with_known(records.data.white(own), Z[rows])
-        found |= dict(zip(rows.tolist(), records.measured - white, strict=True))
-    return np.array([found[row] for row in range(len(V))])
+        residuals |= dict(zip(rows.tolist(), records.measured - white, strict=True))
+    return np.array([residuals[row] for row in range(len(V))])
 
 
 def columns_about(
@@ -307,8 +307,8 @@ def columns_about(
     kept: columns that are known.
     """
     stepped = [i for i, u in enumerate(unknowns) if u.name not in kept and u.column is None]
-    there = np.vstack([values, values + STEP * np.eye(len(values))[stepped]])
-    residuals = residuals_at(base, unknowns, there, np.tile(z, (len(there), 1)))
+    points = np.vstack([values, values + STEP * np.eye(len(values))[stepped]])
+    residuals = residuals_at(base, unknowns, points, np.tile(z, (len(points), 1)))
     by_steps = dict(zip(stepped, (residuals[0] - residuals[1:]) / STEP, strict=True))
 
     def column(i: int, unknown: Unknown) -> Array:
@@ -319,5 +319,5 @@ def columns_about(
         rest = moved(base, [u for u in unknowns if u is not unknown], np.delete(values, i))
         return unknown.column(rest, z, float(values[i]))
 
-    found = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), residuals.shape[1])
-    return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, 0.0).T
+    columns = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), residuals.shape[1])
+    return np.where(np.isfinite(columns).all(axis=1, keepdims=True), columns, 0.0).T

@@ -139,7 +139,7 @@ class WhitenedData:
 
         Where the residual is more than noise its own size and correlation in time count (as in `noise_model.level_of`).
         """
-        found = []
+        weights = []
         for level, part in zip(self.levels, self.by_record(residual), strict=True):
             # How well the noise itself is known: its mean square scatters by 2/n.
             doubt = 1.0 + 3.0 * np.sqrt(2.0 / (level.n_slow if level.known else len(part)))
@@ -149,8 +149,8 @@ class WhitenedData:
             elif not level.known:
                 # differences tell the least that the noise can be, and nothing of its colour
                 weight = new_share(part) / max(square, 1.0)
-            found.append(np.full(len(part), weight))
-        return np.concatenate(found)
+            weights.append(np.full(len(part), weight))
+        return np.concatenate(weights)
 
 
 def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | None = None) -> WhitenedData:

@@ -15,14 +15,14 @@ MOST_ADVICE, MOST_RIVALS = 5, 3
 
 
 def advice_on(
-    found: Inference, speed_limit: float | None, threads: int, say: Callable[[str], None]
+    inference: Inference, speed_limit: float | None, threads: int, say: Callable[[str], None]
 ) -> tuple[Advice, ...]:  # fmt: skip
     """Return the manoeuvres that would tell the most probable models apart, best first; none where one stands alone."""
-    rivals = rivals_of(found)
+    rivals = rivals_of(inference)
     if len(rivals) < 2:
         return ()
     say(f"looking for a manoeuvre that tells {' and '.join(r.name for r in rivals)} apart")
-    best = found.found.fits[found.in_force]
+    best = inference.found.fits[inference.in_force]
     replays, levels = best.records.replays, best.records.data.levels
     # of each output the first level, in the order in which `Motions.signals` gives them
     known = dict(sorted(((r.place, level) for r, level in reversed([*zip(replays, levels, strict=True)])),
@@ -36,15 +36,15 @@ def advice_on(
     return advise(rivals, white, None, speed_limit, threads=threads)[:MOST_ADVICE]
 
 
-def rivals_of(found: Inference) -> list[Rival]:
+def rivals_of(inference: Inference) -> list[Rival]:
     """Return the most probable models without faults of records whose effects differ, one for each set of names."""
-    ranked = [(m, p) for m, p in found.found.ranked() if all(h.kind == "effect" for h in m)]
+    ranked = [(m, p) for m, p in inference.found.ranked() if all(h.kind == "effect" for h in m)]
     rivals: dict[str, Rival] = {}
     for model, p in ranked:
         name = words(model)
         if ranked[0][1] - p > WINDOW or len(rivals) == MOST_RIVALS:
             break
-        fit = found.found.fits[model]
+        fit = inference.found.fits[model]
         # What a sample counts, and one of a record like these will: less than 1 where more than noise is left.
         trust = float(np.mean(fit.records.data.trust(fit.residual)))
         rivals.setdefault(name, Rival(name, fit.records, fit.z, -2.0 * p, trust))

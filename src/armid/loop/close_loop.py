@@ -117,42 +117,42 @@ def close_loop(
     # What a whole campaign has wrong needs no search.
     if any(not s.record and s.kind != "input" for s in gross):
         library = replace(library, candidates={}, bundles=())
-    found = infer(library, declared)
-    best = found.found.fits[found.in_force]
+    inference = infer(library, declared)
+    best = inference.found.fits[inference.in_force]
     # One record, or an input, is accused only where the model at which the search ends does not do as well.
     implausible = bool(gross) and not all(does_as_well(best, s) for s in gross)
     issues = tuple(s for s in issues if implausible or s not in gross)
     # Every decision on effects and parameters is made: holdout records are opened here and not before.
     told("judging on the records held out")
-    path = [frozenset[Hypothesis]()] if implausible else path_of(found)
-    judged = [judge(found, each, campaign, within) for each in path]
-    steps = steps_of(found, path, judged)
+    path = [frozenset[Hypothesis]()] if implausible else path_of(inference)
+    judged = [judge(inference, hypotheses, campaign, within) for hypotheses in path]
+    steps = steps_of(inference, path, judged)
     kept = confirmed(judged)
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
     withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
     if kept < len(path) - 1:  # a model of faults alone has no step
-        found, path = found.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
-        judged = rejudged(found, path, judged, within)
-        steps = steps_of(found, path, judged)
+        inference, path = inference.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
+        judged = rejudged(inference, path, judged, within)
+        steps = steps_of(inference, path, judged)
     after, before = judged[kept], judged[0]
-    accused = [h for h in path[kept] if found.posterior.probability(*h.public) >= MENTIONED]
-    suspects = [*record_faults_of(accused, path[kept], found), *broken_records(campaign.records)]
+    accused = [h for h in path[kept] if inference.posterior.probability(*h.public) >= MENTIONED]
+    suspects = [*record_faults_of(accused, path[kept], inference), *broken_records(campaign.records)]
     verdicts = (
-        (IMPLAUSIBLE, UNEXPLAINED) if implausible else verdicts_of(found, accused, after, steps[:kept], withdrawn)
+        (IMPLAUSIBLE, UNEXPLAINED) if implausible else verdicts_of(inference, accused, after, steps[:kept], withdrawn)
     )
     if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
         assert after.holdout is not None
-        found = found.after_holdout(over_noise(after.train, after.holdout))
-        judged = rejudged(found, path, judged, within)
+        inference = inference.after_holdout(over_noise(after.train, after.holdout))
+        judged = rejudged(inference, path, judged, within)
         after, before = judged[kept], judged[0]
-        steps = tuple(replace(step, claimed=False) for step in steps_of(found, path, judged))
-    every = {
+        steps = tuple(replace(step, claimed=False) for step in steps_of(inference, path, judged))
+    errors = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
     }  # fmt: skip
-    in_force = found.found.fits[path[kept]]
-    missing = missing_of(in_force, found.found.library, told) if curve and not implausible else None
-    advice = advice_on(found, campaign.gyro_range, threads, told) if TOO_ALIKE in verdicts else ()
+    in_force = inference.found.fits[path[kept]]
+    missing = missing_of(in_force, inference.found.library, told) if curve and not implausible else None
+    advice = advice_on(inference, campaign.gyro_range, threads, told) if TOO_ALIKE in verdicts else ()
     # Other issues rest on the declared model: they are reported where nothing better was found.
     at_a_loss = not {UNEXPLAINED, CARRIES_NOT, PARTLY}.isdisjoint(verdicts) and not any(s.claimed for s in steps)
     issues = (*issues, *given_twice(campaign.records))
@@ -160,7 +160,7 @@ def close_loop(
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     said = (*told_first, *missed_sentences(after.missed), *limits_of(after), *dict.fromkeys(again))
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, said,
-                      known_together(in_force, found.found.library), tuple(suspects), every, found,
+                      known_together(in_force, inference.found.library), tuple(suspects), errors, inference,
                       missing)  # fmt: skip
 
 
@@ -174,52 +174,53 @@ def does_as_well(fit: Fit, issue: DataIssue) -> bool:
     return bool(np.sqrt(np.mean(shares)) <= AS_GOOD * issue.after) if shares else False
 
 
-def path_of(found: Inference) -> list[Hypotheses]:
+def path_of(inference: Inference) -> list[Hypotheses]:
     """Return the declared model, then the models that lead to the one in force by one effect at a time.
 
     Each is the most probable one without an effect of the next. Faults of records are undone with the first effect.
     """
-    model, path = found.in_force, [found.in_force] if found.in_force else []
+    exploration, model = inference.found, inference.in_force
+    path = [model] if model else []
     while sum(h.kind == "effect" for h in model) > 1:
         less = [model - {h} for h in sorted(model) if h.kind == "effect"]
-        for one in (m for m in less if m not in found.found.fits):
+        for one in (m for m in less if m not in exploration.fits):
             (gone,) = model - one
             again = unless_diverged(
-                partial(without, found.found.fits[model], gone, found.found.library, found.found.scale().weight)
+                partial(without, exploration.fits[model], gone, exploration.library, exploration.scale().weight)
             )
-            found.found.take(one, again)
-        model = max((m for m in less if m in found.found.fits), key=found.found.log_posterior)
+            exploration.take(one, again)
+        model = max((m for m in less if m in exploration.fits), key=exploration.log_posterior)
         path.insert(0, model)
     return [frozenset(), *path]
 
 
-def judge(found: Inference, model: Hypotheses, campaign: Campaign, within: float) -> Judgement:
+def judge(inference: Inference, model: Hypotheses, campaign: Campaign, within: float) -> Judgement:
     """Return errors, parameters and tests of a model on train and holdout."""
-    library, fit = found.found.library, with_standard_accuracy(found.found.fits[model])
+    library, fit = inference.found.library, with_standard_accuracy(inference.found.fits[model])
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
     remains = any(r.diagnosis.significant for r in (seen, unseen) if r is not None)
     effects = (library.candidates[k.declared] for k in fit.active)
     extended = Model(library.declared.plant, (*library.declared.effects, *effects))
-    return Judgement(fit, extended, estimates(found, model, fit, remains, within), seen, unseen)
+    return Judgement(fit, extended, estimates(inference, model, fit, remains, within), seen, unseen)
 
 
 def rejudged(
-    found: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement], within: float
+    inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement], within: float
 ) -> list[Judgement]:  # fmt: skip
     """Return the models of a path with the estimates that an inference gives them; the errors stay."""
     pairs = zip(path, judged, strict=False)  # after a withdrawal the path is shorter
-    return [replace(j, estimates=estimates(found, m, j.fit, j.significant, within)) for m, j in pairs]
+    return [replace(j, estimates=estimates(inference, m, j.fit, j.significant, within)) for m, j in pairs]
 
 
-def steps_of(found: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement]) -> tuple[Step, ...]:
+def steps_of(inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement]) -> tuple[Step, ...]:
     """Return a step for each effect of the model in force; a model of faults alone is a step without an effect."""
-    steps, candidates, fit = [], found.found.library.candidates, found.found.fits[found.in_force]
+    steps, candidates, fit = [], inference.found.library.candidates, inference.found.fits[inference.in_force]
     for model, last, after in zip(path[1:], path, judged[1:], strict=False):
         hypothesis = next((h for h in sorted(model - last) if h.kind == "effect"), None)
         if hypothesis is None:
             continue
-        p = found.posterior.probability("effect", hypothesis.name)
-        names = tuple(found.partners(found.in_force, hypothesis))
+        p = inference.posterior.probability("effect", hypothesis.name)
+        names = tuple(inference.partners(inference.in_force, hypothesis))
         settled = fit.has_arrived and not fit.is_at_a_limit(hypothesis.means)
         port = ", ".join(candidates[hypothesis.means].adds)
         steps.append(Step(hypothesis.name, port, names, False, p >= CLAIMED and settled, p, after))
@@ -244,11 +245,11 @@ def is_denied(before: Judgement, after: Judgement) -> bool:
 
 
 def verdicts_of(
-    found: Inference, accused: Sequence[Hypothesis], after: Judgement, steps: Sequence[Step],
+    inference: Inference, accused: Sequence[Hypothesis], after: Judgement, steps: Sequence[Step],
     withdrawn: Withdrawn | None,
 ) -> tuple[str, ...]:  # fmt: skip
     """Return the verdicts that hold, each in one word, the most important first."""
-    post = found.posterior
+    post = inference.posterior
     unknown = post.probability("unknown") >= MENTIONED
     verdicts = [CARRIES_NOT] if withdrawn is not None or after.fails_to_carry_over else []
     verdicts += [DISAGREES] if any(h.kind in ("record", "drift") for h in accused) else []

@@ -40,8 +40,8 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
     if not own:
         return tuple(doubles)
     basis, _ = decomposed(np.column_stack(strengths))
-    found = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
-    return (*common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), found), *doubles)
+    products = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
+    return (*common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), products), *doubles)
 
 
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:

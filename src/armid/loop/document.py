@@ -115,10 +115,10 @@ def loop_document(
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
     parameters = parameter_table(report)
-    each = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
+    rows = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
             for model in ("before", "after")]  # fmt: skip
-    note = records_note(len(each) // 2, details["n_records"])
-    by_record = error_table("Errors of each record", ["record", "role", "model"], each, unit, note)
+    note = records_note(len(rows) // 2, details["n_records"])
+    by_record = error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
     shifts = (*details["suspects"], *details["shifts"])
     together = tuple(f"{said[0].upper()}{said[1:]}." for said in report["known_together"])
@@ -140,9 +140,9 @@ def loop_document(
         sections.insert(2, Section("Motion", figures["motion"]))
     last = ("diagnosis", "against", "autocorrelation", "missing")
     drawn = tuple(f for name in last for f in figures.get(name, ()))
-    told = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
-            for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
-    tests = [Sentences(tuple(sentences), title) for title, sentences in told if sentences]
+    titled = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
+              for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
+    tests = [Sentences(tuple(sentences), title) for title, sentences in titled if sentences]
     unnamed = [Sentences(missing, "What is missing, without a name")] if missing else []
     sections.append(Section("Is what remains noise?", (*tests, *unnamed, *drawn)))
     sections.append(Section("Models that were fitted", (log_table(report["log"]),)))
@@ -164,8 +164,8 @@ def loop_document(
 def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what is probable, the verdict, error before and after, and which parameters are to be trusted."""
     second = f"{VERDICTS[report['verdict']]}: {details['conclusion']}"
-    found = report["parameters"]["after"]
-    sure = [f"{name} = {value_text(p)}" for name, p in found.items() if p["trusted"]]
+    parameters = report["parameters"]["after"]
+    sure = [f"{name} = {value_text(p)}" for name, p in parameters.items() if p["trusted"]]
     exact = report["taken_as_exact"]
     names = ", ".join(exact[:MOST_EXACT]) + (f" and {len(exact) - MOST_EXACT} more" if exact[MOST_EXACT:] else "")
     given = f", with {names} taken as exact (no tolerance is declared)" if exact else ""
@@ -204,10 +204,10 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     of_those = report["noise_rms_holdout"] if which == "holdout" else None
     noise, unit = shown(of_those or report["noise_rms"], report["unit"])
     alone = "" if which == "holdout" else "; no record was held out"
-    told, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
+    text, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
     if not report["effects"]:
-        told, errors = f"{now} {unit} RMSE,", [after[which]]
-    return f"Error on {on}: {told} the noise is {noise:.3g} {unit}{alone}.{others_text(*errors)}"
+        text, errors = f"{now} {unit} RMSE,", [after[which]]
+    return f"Error on {on}: {text} the noise is {noise:.3g} {unit}{alone}.{others_text(*errors)}"
 
 
 def step_table(report: Mapping[str, Any]) -> Table:
@@ -304,17 +304,17 @@ def equations_section(equations: Mapping[str, str]) -> Section:
                                                   listing("After, alone", after, folded=True)))  # fmt: skip
 
 
-def parts_of(found: ClosedLoop) -> Parts:
-    report, details = report_of(found), details_of(found)
-    return Parts(report, details, figures_of(found, report, details))
+def parts_of(loop: ClosedLoop) -> Parts:
+    report, details = report_of(loop), details_of(loop)
+    return Parts(report, details, figures_of(loop, report, details))
 
 
-def details_of(found: ClosedLoop) -> dict[str, Any]:
+def details_of(loop: ClosedLoop) -> dict[str, Any]:
     """Return details as JSON can hold them, SI; the command adds `made_by`, its line and options.
 
     Of long records each curve keeps the samples that `thinned` chooses.
     """
-    before, after = found.before, found.after
+    before, after = loop.before, loop.after
     records = [*record_entries(before.train, after.train), *record_entries(before.holdout, after.holdout)]
     diagnoses = {
         name: {role: None if seen is None else diagnosis_sentences(seen)
@@ -323,95 +323,95 @@ def details_of(found: ClosedLoop) -> dict[str, Any]:
     }  # fmt: skip
     return plain({
         "versions": versions_of(PACKAGES),
-        "conclusion": conclusion(found),
-        "shifts": shift_sentences(before, after) if found.steps else [],
+        "conclusion": conclusion(loop),
+        "shifts": shift_sentences(before, after) if loop.steps else [],
         "doubts": doubt_sentences(after),
-        "suspects": [fault_sentence(s) for s in found.suspects],
-        "diagnosis": diagnoses if found.steps else diagnoses | {"after": None},
-        "missing": missing_sentences(found.missing) if found.missing is not None else [],
+        "suspects": [fault_sentence(s) for s in loop.suspects],
+        "diagnosis": diagnoses if loop.steps else diagnoses | {"after": None},
+        "missing": missing_sentences(loop.missing) if loop.missing is not None else [],
         "equations": {"before": str(before.model), "after": str(after.model)},
         "records": records[:MOST_RECORDS],
         "n_records": len(records),
-        "n_files": len(found.campaign.records),
-        "models": models_of(found.inference),
-        "advice": [a.words for a in found.advice],
+        "n_files": len(loop.campaign.records),
+        "models": models_of(loop.inference),
+        "advice": [a.words for a in loop.advice],
     })  # fmt: skip
 
 
-def models_of(found: Inference) -> list[dict[str, Any]]:
+def models_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the most probable models with the parameters of the declared model, were each true."""
-    told: dict[str, dict[str, Any]] = {}
-    for model, _ in found.found.ranked():
-        probability = found.posterior.sets.get(frozenset(h.public for h in model), 0.0)
-        if words(model) not in told and len(told) < MOST_DRAWN and (probability >= LISTED or not told):
-            own = {n: i for n, i in found.of_fit(model).items() if n in found.posterior.parameters}
-            values = found.found.fits[model].values
-            told[words(model)] = {
+    entries: dict[str, dict[str, Any]] = {}
+    for model, _ in inference.found.ranked():
+        probability = inference.posterior.sets.get(frozenset(h.public for h in model), 0.0)
+        if words(model) not in entries and len(entries) < MOST_DRAWN and (probability >= LISTED or not entries):
+            own = {n: i for n, i in inference.of_fit(model).items() if n in inference.posterior.parameters}
+            values = inference.found.fits[model].values
+            entries[words(model)] = {
                 "model": words(model), "probability": probability,
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in own.items()},
             }  # fmt: skip
-    return list(told.values())
+    return list(entries.values())
 
 
-def conclusion(found: ClosedLoop) -> str:
+def conclusion(loop: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
-    if found.verdict == IMPLAUSIBLE:
-        return f"Nothing is named, as the records look wrong. {found.next_steps[0]}"
+    if loop.verdict == IMPLAUSIBLE:
+        return f"Nothing is named, as the records look wrong. {loop.next_steps[0]}"
     of_verdict = {DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful}
-    if found.verdict in of_verdict:
-        return of_verdict[found.verdict](found)
-    names = " + ".join(found.effects)
+    if loop.verdict in of_verdict:
+        return of_verdict[loop.verdict](loop)
+    names = " + ".join(loop.effects)
     return {
-        NO_DISCREPANCY: nothing_missing(found),
-        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(found)}.",
-        PARTLY: partly(found),
+        NO_DISCREPANCY: nothing_missing(loop),
+        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(loop)}.",
+        PARTLY: partly(loop),
         UNEXPLAINED: "The declared model lacks something that the library does not hold.",
-    }[found.verdict]
+    }[loop.verdict]
 
 
-def partly(found: ClosedLoop) -> str:
-    names, unknown = " + ".join(found.effects), found.inference.posterior.probability("unknown")
+def partly(loop: ClosedLoop) -> str:
+    names, unknown = " + ".join(loop.effects), loop.inference.posterior.probability("unknown")
     lacks = "something that the library does not hold"
     if unknown < MENTIONED:
-        return f"With {names} the declared model does better, but it lacks {lacks}{unclaimed(found)}"
+        return f"With {names} the declared model does better, but it lacks {lacks}{unclaimed(loop)}"
     best = "the declared model predicts parts left out of the fit best"
-    return f"The declared model lacks {lacks}. Without it, but with {names}, {best}{unclaimed(found)}"
+    return f"The declared model lacks {lacks}. Without it, but with {names}, {best}{unclaimed(loop)}"
 
 
-def nothing_missing(found: ClosedLoop) -> str:
-    if not found.after.significant:
+def nothing_missing(loop: ClosedLoop) -> str:
+    if not loop.after.significant:
         return "What the declared model leaves is noise: nothing is missing that these records could show."
     return ("What the declared model leaves on the train records is noise: nothing is missing that they could show. "
             f"Those held out are missed by more than noise, but by less than {OVER_NOISE:g} times, as a prediction may "
             "be.")  # fmt: skip
 
 
-def unclaimed(found: ClosedLoop) -> str:
-    names = [s.effect for s in found.steps if not s.claimed]
+def unclaimed(loop: ClosedLoop) -> str:
+    names = [s.effect for s in loop.steps if not s.claimed]
     if not names:
         return "."
     verb = "is" if len(names) == 1 else "are"
-    which = "no name is" if len(names) == len(found.steps) else f"{' and '.join(names)} {verb} not"
+    which = "no name is" if len(names) == len(loop.steps) else f"{' and '.join(names)} {verb} not"
     return f": {which} claimed."
 
 
-def remains(found: ClosedLoop) -> str:
-    return f"what remains is {'more than ' if found.after.significant else ''}noise"
+def remains(loop: ClosedLoop) -> str:
+    return f"what remains is {'more than ' if loop.after.significant else ''}noise"
 
 
-def judged_on(found: ClosedLoop) -> str:
-    return "train and holdout" if found.campaign.holdout else "train; no record was held out to judge it"
+def judged_on(loop: ClosedLoop) -> str:
+    return "train and holdout" if loop.campaign.holdout else "train; no record was held out to judge it"
 
 
-def disagreeing_sentence(found: ClosedLoop) -> str:
-    said = [fault_sentence(s) for s in found.suspects if s.role == "train"]
-    added = f"with {' + '.join(found.effects)} " if found.effects else ""
-    return f"{' '.join(said)} Apart from that {added}{remains(found)}."
+def disagreeing_sentence(loop: ClosedLoop) -> str:
+    said = [fault_sentence(s) for s in loop.suspects if s.role == "train"]
+    added = f"with {' + '.join(loop.effects)} " if loop.effects else ""
+    return f"{' '.join(said)} Apart from that {added}{remains(loop)}."
 
 
-def carried_sentence(found: ClosedLoop) -> str:
+def carried_sentence(loop: ClosedLoop) -> str:
     """Say which record held out denies what the train records showed, and by how much."""
-    judged = found.after if found.withdrawn is None else found.withdrawn.judged
+    judged = loop.after if loop.withdrawn is None else loop.withdrawn.judged
     unseen = judged.holdout
     assert unseen is not None
     factors = [float(np.sqrt(np.mean(raw**2))) / level.rms for raw, level in zip(unseen.raw, unseen.data.levels,
@@ -420,31 +420,31 @@ def carried_sentence(found: ClosedLoop) -> str:
     missed = f"{unseen.data.each[worst].file} is missed by {factors[worst]:.3g} times its noise"
     if not np.isfinite(factors[worst]):
         missed = f"{unseen.data.each[worst].file} makes the simulation diverge"
-    if found.withdrawn is None and judged.diagnosis.significant:
-        named = f"With {' + '.join(found.effects)} the declared model" if found.effects else "The declared model"
+    if loop.withdrawn is None and judged.diagnosis.significant:
+        named = f"With {' + '.join(loop.effects)} the declared model" if loop.effects else "The declared model"
         return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}"
-    if found.withdrawn is None:
+    if loop.withdrawn is None:
         return (f"Only noise remains on the train records, but of the held-out records {missed}: something acts there "
                 "that the train records do not show.")  # fmt: skip
-    last = found.after.holdout
+    last = loop.after.holdout
     assert last is not None
     worse = unseen.errors.joint_nrmse / last.errors.joint_nrmse - 1.0
-    names = " + ".join(s.effect for s in found.withdrawn.steps)
-    stands = f"the model with {' + '.join(found.effects)}" if found.effects else "the declared model"
+    names = " + ".join(s.effect for s in loop.withdrawn.steps)
+    stands = f"the model with {' + '.join(loop.effects)}" if loop.effects else "the declared model"
     return (f"The train records ask for {names}, but the records held out are simulated {worse:.0%} worse with it "
             f"({missed}): it is withdrawn, and {stands} stands.")  # fmt: skip
 
 
-def doubtful(found: ClosedLoop) -> str:
+def doubtful(loop: ClosedLoop) -> str:
     """Say between what these records cannot decide."""
-    if not found.steps:
+    if not loop.steps:
         return "No single answer is probable: these records tell too little."
-    said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in found.steps if s.alternatives]
-    said += [f"{s.effect} has a probability of {s.probability:.2f}" for s in found.steps
+    said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in loop.steps if s.alternatives]
+    said += [f"{s.effect} has a probability of {s.probability:.2f}" for s in loop.steps
              if not (s.claimed or s.alternatives)]  # fmt: skip
-    rest = "a significant discrepancy remains, and" if found.after.significant else "what remains is noise, but"
-    judged = "" if found.campaign.holdout else " No record was held out to judge it."
-    return f"With {' + '.join(found.effects)} {rest} on these records {'; '.join(said)}.{judged}"
+    rest = "a significant discrepancy remains, and" if loop.after.significant else "what remains is noise, but"
+    judged = "" if loop.campaign.holdout else " No record was held out to judge it."
+    return f"With {' + '.join(loop.effects)} {rest} on these records {'; '.join(said)}.{judged}"
 
 
 def missing_sentences(missing: Missing) -> list[str]:
@@ -466,8 +466,8 @@ def diagnosis_sentences(seen: Residuals) -> list[str]:
 
     def significant(kind: str) -> list[Finding]:
         """Return the significant findings of one kind, the largest first."""
-        found = [f for f in diagnosis.of_kind(kind) if f.p * len(diagnosis.findings) < SIGNIFICANCE]
-        return sorted(found, key=lambda f: -f.ratio)[:MOST_TOLD]
+        findings = [f for f in diagnosis.of_kind(kind) if f.p * len(diagnosis.findings) < SIGNIFICANCE]
+        return sorted(findings, key=lambda f: -f.ratio)[:MOST_TOLD]
 
     said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST else ''}"
             f"{max(diagnosis.p, LEAST):.2g})."]  # fmt: skip

@@ -26,36 +26,34 @@ MOST_PARTS, LEAST_RATIO = 30, 1e-3
 PARAMETERS_A_ROW = 4
 
 
-def figures_of(
-    found: ClosedLoop, report: Mapping[str, Any], details: Mapping[str, Any]
-) -> dict[str, Callable[[], Any]]:
+def figures_of(loop: ClosedLoop, report: Mapping[str, Any], details: Mapping[str, Any]) -> dict[str, Callable[[], Any]]:
     """Return name -> what draws a figure: that of a missing signal only where one was sought.
 
     report, details: what is stored of the loop, see `report_of` and `details_of`.
     """
     made: dict[str, Callable[[], Any]] = {
-        "motion": partial(motion_figure, found),
-        "residuals": partial(residual_figure, found),
-        "diagnosis": partial(diagnosis_figure, found),
+        "motion": partial(motion_figure, loop),
+        "residuals": partial(residual_figure, loop),
+        "diagnosis": partial(diagnosis_figure, loop),
         "probabilities": partial(probability_figure, report["campaign"], report["probabilities"]),
         "intervals": partial(interval_figure, report["campaign"], details["models"], report["parameters"]["after"]),
-        "parameters": partial(parameter_figure, report["campaign"], report["parameters"], found.campaign.truth),
-        "autocorrelation": partial(autocorrelation_figure, found),
+        "parameters": partial(parameter_figure, report["campaign"], report["parameters"], loop.campaign.truth),
+        "autocorrelation": partial(autocorrelation_figure, loop),
     }
-    made |= {"against": partial(against_figure, found)} if moved(found) else {}
-    return made if found.missing is None else made | {"missing": partial(missing_figure, found, found.missing)}
+    made |= {"against": partial(against_figure, loop)} if moved(loop) else {}
+    return made if loop.missing is None else made | {"missing": partial(missing_figure, loop, loop.missing)}
 
 
-def shown_records(found: ClosedLoop) -> list[tuple[Replay, Array, Array]]:
+def shown_records(loop: ClosedLoop) -> list[tuple[Replay, Array, Array]]:
     """Return the records that are drawn, each with its residual before and after."""
-    views = ((found.before.train, found.after.train), (found.before.holdout, found.after.holdout))
+    views = ((loop.before.train, loop.after.train), (loop.before.holdout, loop.after.holdout))
     return [row for old, new in views if old is not None and new is not None
             for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS:]  # fmt: skip
 
 
-def motion_figure(found: ClosedLoop) -> Any:
+def motion_figure(loop: ClosedLoop) -> Any:
     """Draw the measured motion of each record, and the motion simulated before and after."""
-    rows = shown_records(found)
+    rows = shown_records(loop)
     figure, axes = record_axes(len(rows), 2.9)
     for (axis,), (replay, *residuals) in zip(axes, rows, strict=True):
         factor, unit = shown(1.0, replay.record.unit)
@@ -66,27 +64,27 @@ def motion_figure(found: ClosedLoop) -> Any:
         axis.margins(x=0.01)
         axis.set_title(f"{replay.name} ({replay.record.role})", fontsize="medium")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
-    names = " + ".join(found.effects) or "no effect added"
-    entitle(figure, f"{found.campaign.name}: measured and simulated, before and after ({names})")
+    names = " + ".join(loop.effects) or "no effect added"
+    entitle(figure, f"{loop.campaign.name}: measured and simulated, before and after ({names})")
     return figure
 
 
-def residual_figure(found: ClosedLoop) -> Any:
+def residual_figure(loop: ClosedLoop) -> Any:
     """Draw measured minus simulated of each record, before and after, with the noise as a band."""
-    rows = shown_records(found)
+    rows = shown_records(loop)
     figure, axes = record_axes(len(rows), 2.9)
     for (axis,), (replay, before, after) in zip(axes, rows, strict=True):
         curves = {"before": (replay.times, before), "after": (replay.times, after)}
         factor, unit = shown(1.0, replay.record.unit)
-        noise = found.outputs.get(replay.record.output, {"noise_rms": found.noise_rms})["noise_rms"]
+        noise = loop.outputs.get(replay.record.output, {"noise_rms": loop.noise_rms})["noise_rms"]
         draw_residuals(axis, curves, noise, replay.record.unit)
         errors = [factor * float(np.sqrt(np.mean(x**2))) for x in (before, after)]
         record = replay.record
         title = f"{replay.name} ({record.role}), RMSE {errors[0]:.3g} to {errors[1]:.3g} {unit}"
         axis.set_title(title, fontsize="medium")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
-    names = " + ".join(found.effects) or "no effect added"
-    entitle(figure, f"{found.campaign.name}: residual before and after ({names})")
+    names = " + ".join(loop.effects) or "no effect added"
+    entitle(figure, f"{loop.campaign.name}: residual before and after ({names})")
     return figure
 
 
@@ -110,9 +108,9 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
     axis.margins(x=0.01)
 
 
-def diagnosis_figure(found: ClosedLoop) -> Any:
+def diagnosis_figure(loop: ClosedLoop) -> Any:
     """Draw a bar for each part of the residual, from 1, which is noise, to its mean square; the largest come first."""
-    before, after = found.before.diagnosis, found.after.diagnosis
+    before, after = loop.before.diagnosis, loop.after.diagnosis
     kinds = {k: sorted(before.of_kind(k), key=lambda f: -f.ratio) for k in KINDS if before.of_kind(k)}
     heights = [len(findings) + 1 for findings in kinds.values()]
     size = (7.6, 0.34 * sum(heights) + 1.4)
@@ -132,14 +130,14 @@ def diagnosis_figure(found: ClosedLoop) -> Any:
     of = "noise" if before.noise_known else "the residual"
     axes[-1, 0].set_xlabel(f"mean square / that of {of}")
     legend_below(figure, 2)
-    entitle(figure, f"{found.campaign.name}: where the discrepancy is (1 is noise)")
+    entitle(figure, f"{loop.campaign.name}: where the discrepancy is (1 is noise)")
     return figure
 
 
-def against_figure(found: ClosedLoop) -> Any:
+def against_figure(loop: ClosedLoop) -> Any:
     """Draw the residual of the train records against speed and position, with its mean over equally many samples."""
-    seen, model = (found.before.train, found.after.train), found.before.train.model
-    names, places = moved(found), sorted({r.place for r in seen[0].replays})
+    seen, model = (loop.before.train, loop.after.train), loop.before.train.model
+    names, places = moved(loop), sorted({r.place for r in seen[0].replays})
     figure, axes = panels(len(names) * len(places), len(names), 5.6, 3.6)
     for axis, (place, name) in zip(axes, product(places, names), strict=True):
         factor, unit = shown(1.0, unit_of(name, model))
@@ -152,7 +150,7 @@ def against_figure(found: ClosedLoop) -> Any:
         axis.axhline(0.0, color=GREY, lw=0.8)
         axis.set(xlabel=f"{name} [{unit}]", ylabel=f"residual [{signal_unit}]")
     legend_below(figure, 2)
-    entitle(figure, f"{found.campaign.name}: residual against speed and position")
+    entitle(figure, f"{loop.campaign.name}: residual against speed and position")
     return figure
 
 
@@ -164,9 +162,9 @@ def sorted_by(seen: Residuals, name: str, place: int) -> tuple[Array, Array]:
     return seen.variables[name][order], np.concatenate(seen.raw)[order]
 
 
-def moved(found: ClosedLoop) -> list[str]:
+def moved(loop: ClosedLoop) -> list[str]:
     """Return the names of the speed and the position of the plant, those that it has and that move."""
-    seen = found.before.train
+    seen = loop.before.train
     names = (seen.model.plant.aliases.get(a, a) for a in ("omega", "theta"))
     return [n for n in names if np.ptp(seen.variables.get(n, 0.0)) > 0.0]
 
@@ -200,8 +198,8 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
     labels = [fill(f"{m['model']} ({m['probability']:.2f})", 34) for m in models] + ["all models"]
     for axis, name in zip(axes.flat, names, strict=False):
         factor, unit = shown(1.0, averaged[name]["unit"])
-        each = [*(m["parameters"][name] for m in models), averaged[name]]
-        for i, p in enumerate(each):
+        entries = [*(m["parameters"][name] for m in models), averaged[name]]
+        for i, p in enumerate(entries):
             axis.errorbar([factor * p["value"]], [i], xerr=ends_of(p, factor), fmt="o", capsize=4,
                           color=AFTER if i == len(models) else GREY)  # fmt: skip
         axis.set_yticks(range(len(labels)), labels, fontsize="small")
@@ -228,10 +226,10 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]],
     parameters: of `report.json`; one whose value is 0 has no share. truth: true values that are known, SI.
     """
     before, after = parameters["before"], parameters["after"]
-    each = [(name, before.get(name), p) for name, p in after.items() if p["value"]
-            and (p["low"] is not None or (name in before and before[name]["low"] is not None))]  # fmt: skip
-    figure, axes = panels(max(len(each), 1), PARAMETERS_A_ROW, 2.8, 3.0)
-    for axis, (name, *pair) in zip(axes, each, strict=False):
+    entries = [(name, before.get(name), p) for name, p in after.items() if p["value"]
+               and (p["low"] is not None or (name in before and before[name]["low"] is not None))]  # fmt: skip
+    figure, axes = panels(max(len(entries), 1), PARAMETERS_A_ROW, 2.8, 3.0)
+    for axis, (name, *pair) in zip(axes, entries, strict=False):
         value, factor = pair[1]["value"], 100.0 / abs(pair[1]["value"])
         for place, (p, (_, colour)) in enumerate(zip(pair, LOOKS, strict=True)):
             if p is None:
@@ -243,25 +241,25 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]],
         axis.set_xticks([0, 1], ["before", "after"])
         axis.set(xlim=(-0.6, 1.6), ylabel="deviation [%]")
         axis.set_title(f"{name}, {value_text(pair[1] | {'low': None})}", fontsize="small")
-    if not each:
+    if not entries:
         axes[0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
         axes[0].set_axis_off()
-    known = "; dashed: true" if any(name in truth for name, *_ in each) else ""
+    known = "; dashed: true" if any(name in truth for name, *_ in entries) else ""
     title = f"{campaign}: deviation from the value after, 95 % intervals (open: not trusted{known})"
     entitle(figure, title)
     return figure
 
 
-def autocorrelation_figure(found: ClosedLoop) -> Any:
+def autocorrelation_figure(loop: ClosedLoop) -> Any:
     figure, axis = pyplot().subplots(figsize=(6.8, 3.6), layout="constrained")
-    interval = found.campaign.train[0].spacing
-    for judged, (name, colour) in zip((found.before, found.after), LOOKS, strict=True):
+    interval = loop.campaign.train[0].spacing
+    for judged, (name, colour) in zip((loop.before, loop.after), LOOKS, strict=True):
         values = correlation(judged.train)
         axis.plot(1e3 * interval * np.arange(len(values)), values, color=colour, lw=1.6, label=name)
-    band = 1.96 / np.sqrt(len(found.after.train.residual))
+    band = 1.96 / np.sqrt(len(loop.after.train.residual))
     axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="white noise, 95 %")
     axis.set(xlabel="lag [ms]", ylabel="autocorrelation")
-    axis.set_title(f"{found.campaign.name}: whitened residual of the train records", fontsize="medium")
+    axis.set_title(f"{loop.campaign.name}: whitened residual of the train records", fontsize="medium")
     axis.legend(frameon=False)
     axis.margins(x=0.01)
     return figure
@@ -276,7 +274,7 @@ def correlation(residuals: Residuals) -> Array:
     return np.asarray(total / total[0])
 
 
-def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
+def missing_figure(loop: ClosedLoop, missing: Missing) -> Any:
     best = missing.dependences[0]
     variables = [best.variable, *(v for v in missing.segments[0].variables if v != best.variable)][:MOST_VARIABLES]
     columns = (len(variables) + 2) // 2
@@ -287,7 +285,7 @@ def missing_figure(found: ClosedLoop, missing: Missing) -> Any:
         signal_panel(axis, missing, best, variable)
     for axis in axes.flat[1 + len(variables) :]:
         axis.set_axis_off()
-    figure.suptitle(f"{found.campaign.name}: the missing signal, recovered without a form at port {best.port}\n"
+    figure.suptitle(f"{loop.campaign.name}: the missing signal, recovered without a form at port {best.port}\n"
                     "(less what the free parameters can take up)", fontsize="medium")  # fmt: skip
     return figure
 

@@ -46,19 +46,20 @@ class RecordFault:
     parameter: str = ""
 
 
-def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, found: Inference) -> list[RecordFault]:
+def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, inference: Inference) -> list[RecordFault]:
     """Return the faults of records, and the drifts, among some hypotheses of a model."""
-    fit = found.found.fits[model]
-    return [fault_of(h.means, h.name, fit, found) if h.kind == "record" else drift_of(h.means, h.name, fit, found)
+    fit = inference.found.fits[model]
+    return [fault_of(h.means, h.name, fit, inference) if h.kind == "record" else
+            drift_of(h.means, h.name, fit, inference)
             for h in sorted(accused) if h.kind in ("record", "drift")]  # fmt: skip
 
 
-def fault_of(what: OfRecord, name: str, fit: Fit, found: Inference) -> RecordFault:
-    record, fault, plant = fit.records.data.each[what.index], what.fault, found.found.library.declared.plant
+def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> RecordFault:
+    record, fault, plant = fit.records.data.each[what.index], what.fault, inference.found.library.declared.plant
     if fault.kind == "label":
-        told = record.constants[fault.constant]
-        return RecordFault(record.file, record.role, "label", FREED, 1.0 - told, fault.unit(record, plant))
-    value, half = size_of(name, fit, found)
+        constant = record.constants[fault.constant]
+        return RecordFault(record.file, record.role, "label", FREED, 1.0 - constant, fault.unit(record, plant))
+    value, half = size_of(name, fit, inference)
     output = record.output if fault.kind in OF_SENSOR and len(plant.outputs) > 1 else ""
     low, high = what.largest * (value - half), what.largest * (value + half)
     unit = fault.unit(record, plant)
@@ -67,23 +68,23 @@ def fault_of(what: OfRecord, name: str, fit: Fit, found: Inference) -> RecordFau
     )
 
 
-def drift_of(what: OfParameter, name: str, fit: Fit, found: Inference) -> RecordFault:
-    value, half = size_of(f"drift of {name}", fit, found)
+def drift_of(what: OfParameter, name: str, fit: Fit, inference: Inference) -> RecordFault:
+    value, half = size_of(f"drift of {name}", fit, inference)
     last, factor, unit = fit.records.data.records[-1], LARGEST, "1"
     if what.product is None:
         place = list(fit.values).index(what.name)
         factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit
     low, high = factor * (value - half), factor * (value + half)
-    others = [n for n, p in found.posterior.of_kind("drift").items() if n != name and p >= AS_WELL]
+    others = [n for n, p in inference.posterior.of_kind("drift").items() if n != name and p >= AS_WELL]
     return RecordFault(
         last.file, last.role, "trend", FREED, factor * value, unit, low, high, parameter=", ".join([name, *others])
     )
 
 
-def size_of(name: str, fit: Fit, found: Inference) -> tuple[float, float]:
+def size_of(name: str, fit: Fit, inference: Inference) -> tuple[float, float]:
     """Return a further unknown of a fit and half its 95 % interval, in prior deviations."""
     place = next(i for i, f in enumerate(fit.others) if f.unknown.name == name)
-    covariance = expansion_of(fit, found.found.scale(), found.found.library).covariance
+    covariance = expansion_of(fit, inference.found.scale(), inference.found.library).covariance
     at = fit.n_free + place
     return fit.others[place].value, NORMAL_95 * float(np.sqrt(covariance[at, at]))
 

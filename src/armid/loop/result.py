@@ -193,8 +193,8 @@ class ClosedLoop(Result):
         """Output -> its unit and the noise of its train records."""
         train = self.before.train
         pairs = [(r.place, level.rms) for r, level in zip(train.replays, train.data.levels, strict=True)]
-        each = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
-        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in each if rms}
+        levels = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
+        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in levels if rms}
 
     @property
     def noise_rms(self) -> float:
@@ -208,33 +208,33 @@ class ClosedLoop(Result):
 
 
 def estimates(
-    found: Inference, model: Hypotheses, fit: Fit, discrepancy: bool, within: float
+    inference: Inference, model: Hypotheses, fit: Fit, discrepancy: bool, within: float
 ) -> tuple[Estimate, ...]:  # fmt: skip
     """Return the parameters of the declared model and of the effects added, under their public names.
 
     model: one of the inference; fit: it, as it is judged. Of the declared model's own parameters the interval of the
     model in force counts all others. discrepancy: whether a significant one remains.
     """
-    library, own = found.found.library, found.of_fit(model)
-    known = {**own, **found.intervals} if model == found.in_force else own
+    library, own = inference.found.library, inference.of_fit(model)
+    known = {**own, **inference.intervals} if model == inference.in_force else own
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
-    is_unknown = found.posterior.probability("unknown") >= MENTIONED
-    told = []
+    is_unknown = inference.posterior.probability("unknown") >= MENTIONED
+    estimates = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)
         if name not in library.declared.parameters and owner not in active:
             continue
         public = name if owner is None else f"{owner.public}.{name.partition('.')[2]}"
         if name not in known:
-            told.append(Estimate(public, value, unit, None, None, (NOT_IDENTIFIED,)))
+            estimates.append(Estimate(public, value, unit, None, None, (NOT_IDENTIFIED,)))
             continue
         one = known[name]
         low, high = min(one.low, value), max(one.high, value)
         seen = [(cause, share) for cause, share in one.causes[:MOST_CAUSES] if round(share, 2)]
         causes = tuple(f"{words_of(cause)}, {share:.0%}" for cause, share in seen)
-        doubts = [REMAINS] if discrepancy and (model != found.in_force or is_unknown) else []
-        if owner is not None and found.posterior.probability("effect", owner.public) < CLAIMED:
+        doubts = [REMAINS] if discrepancy and (model != inference.in_force or is_unknown) else []
+        if owner is not None and inference.posterior.probability("effect", owner.public) < CLAIMED:
             doubts.append(f"{owner.public} is not certain")
         if held[space.free_names.index(name)]:
             doubts.append(SEARCHED if owner is not None and name in library.fixed_shapes(owner) else HELD)
@@ -242,8 +242,8 @@ def estimates(
             wide = f"its interval reaches further than {within:.0%} from the value"
             doubts.append(f"{wide} ({'; '.join(causes)})" if causes else wide)
         ends, of_noise = shown_ends(low, high), shown_ends(one.noise_low, one.noise_high)
-        told.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))
-    return tuple(told)
+        estimates.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))
+    return tuple(estimates)
 
 
 def shown_ends(low: float, high: float) -> tuple[float | None, float | None]:
@@ -256,12 +256,12 @@ def words_of(cause: str) -> str:
     return cause if " " in cause or cause == "noise" else f"{cause}, which these records cannot show"
 
 
-def report_of(found: ClosedLoop) -> dict[str, Any]:
+def report_of(loop: ClosedLoop) -> dict[str, Any]:
     """Return the result as JSON can hold it, SI throughout, always with these keys.
 
     Parameters
     ----------
-    found : ClosedLoop
+    loop : ClosedLoop
         What `close_loop` returns.
 
     Returns
@@ -271,35 +271,35 @@ def report_of(found: ClosedLoop) -> dict[str, Any]:
     """
     return plain({
         "version": VERSION,
-        "campaign": found.campaign.name,
-        "plant": found.campaign.plant.name,
-        "unit": found.campaign.unit,
-        "noise_rms": found.noise_rms,
-        "noise_rms_holdout": None if found.before.holdout is None else found.before.holdout.noise_rms,
-        "outputs": found.outputs,
-        "verdict": found.verdict,
-        "also": found.also,
-        "probabilities": found.inference.probabilities | {"among": among(found.inference.found.library)},
-        "effects": found.effects,
-        "error": {"before": errors_of(found.before), "after": errors_of(found.after)},
+        "campaign": loop.campaign.name,
+        "plant": loop.campaign.plant.name,
+        "unit": loop.campaign.unit,
+        "noise_rms": loop.noise_rms,
+        "noise_rms_holdout": None if loop.before.holdout is None else loop.before.holdout.noise_rms,
+        "outputs": loop.outputs,
+        "verdict": loop.verdict,
+        "also": loop.also,
+        "probabilities": loop.inference.probabilities | {"among": among(loop.inference.found.library)},
+        "effects": loop.effects,
+        "error": {"before": errors_of(loop.before), "after": errors_of(loop.after)},
         "error_all_records": {
-            when: dict(zip(("train", "holdout"), told, strict=True))
-            for when, told in found.error_all_records.items()
+            when: dict(zip(("train", "holdout"), errors, strict=True))
+            for when, errors in loop.error_all_records.items()
         },
-        "suspects": found.suspects,
-        "parameters": {"before": found.before.entries, "after": found.after.entries},
-        "steps": [step_entry(s) for s in found.steps],
-        "withdrawn": None if found.withdrawn is None else {
-            "effects": [s.effect for s in found.withdrawn.steps],
-            "error": {"before": errors_of(found.before), "after": errors_of(found.withdrawn.judged)},
-            "parameters": found.withdrawn.judged.entries,
-            "steps": [step_entry(s) for s in found.withdrawn.steps],
+        "suspects": loop.suspects,
+        "parameters": {"before": loop.before.entries, "after": loop.after.entries},
+        "steps": [step_entry(s) for s in loop.steps],
+        "withdrawn": None if loop.withdrawn is None else {
+            "effects": [s.effect for s in loop.withdrawn.steps],
+            "error": {"before": errors_of(loop.before), "after": errors_of(loop.withdrawn.judged)},
+            "parameters": loop.withdrawn.judged.entries,
+            "steps": [step_entry(s) for s in loop.withdrawn.steps],
         },
-        "advice": found.advice,
-        "next_steps": found.next_steps,
-        "known_together": found.known_together,
-        "taken_as_exact": found.campaign.taken_as_exact,
-        "log": log_of(found.inference),
+        "advice": loop.advice,
+        "next_steps": loop.next_steps,
+        "known_together": loop.known_together,
+        "taken_as_exact": loop.campaign.taken_as_exact,
+        "log": log_of(loop.inference),
     })  # fmt: skip
 
 
@@ -343,11 +343,11 @@ def of_output(replay: Replay, candidate: Array) -> JointErrors:
     return JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)
 
 
-def log_of(found: Inference) -> list[dict[str, Any]]:
+def log_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the models that were fitted, the most probable first, with what they leave."""
-    ranked = found.found.ranked()
+    ranked = inference.found.ranked()
     return [
         {"hypotheses": sorted(words([h]) for h in model), "log_probability": value - ranked[0][1],
-         "chi2_per_sample": found.found.fits[model].chi2 / len(found.found.fits[model].residual)}
+         "chi2_per_sample": inference.found.fits[model].chi2 / len(inference.found.fits[model].residual)}
         for model, value in ranked[:MOST_LISTED]
     ]  # fmt: skip

@@ -117,7 +117,7 @@ class Effect:
         if not self.adds:
             raise ModelError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
         own = (self.parameters, self.states, self.guards, self.delays)
-        names = [one.name for several in own for one in several]
+        names = [one.name for group in own for one in group]
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ModelError(f"effect '{self.name}' declares '{twice[0]}' twice: each name once is expected")

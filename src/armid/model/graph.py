@@ -82,10 +82,10 @@ class Graph:
 
     def values(self, wanted: Iterable[str], known: Mapping[str, Any]) -> dict[str, Any]:
         """Return key -> value of what is known and of all that leads to the wanted nodes, by their plain functions."""
-        found = dict(known)
+        values = dict(known)
         for node in self.order(wanted):
-            found[node.key] = node.value(found)
-        return found
+            values[node.key] = node.value(values)
+        return values
 
     def is_static(self, key: str) -> bool:
         """Tell whether a node depends on parameters and constants alone."""
@@ -195,13 +195,13 @@ def switched_at_start(guard: float) -> Any:
 
 def leaves(plant: Plant, effects: tuple[Effect, ...]) -> list[tuple[str, str]]:
     """Return key and kind of what no equation gives."""
-    found = [(p.name, "parameter") for p in plant.parameters] + [(s.name, "state") for s in plant.states]
+    leaves = [(p.name, "parameter") for p in plant.parameters] + [(s.name, "state") for s in plant.states]
     for e in effects:
-        found += [(f"{e.name}__{p.name}", "parameter") for p in e.parameters]
-        found += [(f"{e.name}__{s.name}", "state") for s in e.states]
-        found += [(f"{e.name}__{g.name}", "latch") for g in e.guards if g.latch]
-    found += [(c.name, "constant") for c in plant.constants] + [(i.name, "input") for i in plant.inputs]
-    return [*found, *((g.name, "latch") for g in plant.guards if g.latch), ("time", "time")]
+        leaves += [(f"{e.name}__{p.name}", "parameter") for p in e.parameters]
+        leaves += [(f"{e.name}__{s.name}", "state") for s in e.states]
+        leaves += [(f"{e.name}__{g.name}", "latch") for g in e.guards if g.latch]
+    leaves += [(c.name, "constant") for c in plant.constants] + [(i.name, "input") for i in plant.inputs]
+    return [*leaves, *((g.name, "latch") for g in plant.guards if g.latch), ("time", "time")]
 
 
 def add_equations(graph: Graph, plant: Plant, effect: Effect | None) -> None:
@@ -381,12 +381,12 @@ def lambda_definition(function: LambdaType) -> ast.FunctionDef:
     module = inspect.getmodule(function)
     lines = inspect.findsource(function)[0] if module is None else inspect.getsourcelines(module)[0]
     nodes = ast.walk(ast.parse("".join(lines)))
-    found = [n for n in nodes if isinstance(n, ast.Lambda) and is_code_of(n, function)]
-    if not found:
+    lambdas = [n for n in nodes if isinstance(n, ast.Lambda) and is_code_of(n, function)]
+    if not lambdas:
         arguments = ", ".join(inspect.signature(function).parameters)
         raise ModelError(f"the source of a lambda with the arguments {arguments} cannot be found: write it as a def")
     # The innermost: a lambda may stand inside another.
-    innermost = max(found, key=lambda n: (n.lineno, n.col_offset))
+    innermost = max(lambdas, key=lambda n: (n.lineno, n.col_offset))
     return make_definition("<lambda>", innermost.args, [ast.Return(innermost.body)])
 
 

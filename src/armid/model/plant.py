@@ -68,8 +68,8 @@ class Manoeuvre:
 
     def likeness(self) -> tuple[object, ...]:
         """Return what two manoeuvres have in common when a machine answers both alike, hashable; not the start time."""
-        each = [*sorted(self.inputs.items()), *sorted(self.before.items())]
-        inputs = tuple((name, values.tobytes()) for name, values in each)
+        signals = [*sorted(self.inputs.items()), *sorted(self.before.items())]
+        inputs = tuple((name, values.tobytes()) for name, values in signals)
         return self.interval, self.n_samples, self.hold, tuple(sorted(self.constants.items())), inputs
 
 

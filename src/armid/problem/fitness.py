@@ -162,10 +162,10 @@ def mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
 
 
 def relative_mean_square(measured: ArrayLike, simulated: ArrayLike) -> Array:
-    sums, whole = square_sums(measured, simulated), float(np.square(measured).sum())
-    if whole == 0.0:
+    sums, total = square_sums(measured, simulated), float(np.square(measured).sum())
+    if total == 0.0:
         raise ArmidError("the measured series is zero throughout, expected an rms above 0 to divide by")
-    return sums / whole
+    return sums / total
 
 
 def chi_square(measured: ArrayLike, simulated: ArrayLike, noise: float) -> Array:

@@ -209,19 +209,19 @@ def signals_of_each(
 
     A record that differs in what was measured alone is simulated once for all forms, its candidates side by side.
     """
-    found: dict[int, dict[ReadyRecord, list[Simulation]]] = {i: {} for i in range(len(forms))}
+    simulations: dict[int, dict[ReadyRecord, list[Simulation]]] = {i: {} for i in range(len(forms))}
     for alike in zip(*(by_record(form) for form, _ in forms), strict=True):
         groups: dict[tuple[int, ...], list[int]] = {}
         for i, ready in enumerate(alike):
             groups.setdefault(ready.simulates, []).append(i)
         for members in groups.values():
             rows = np.concatenate([forms[i][1] for i in members])
-            runs = alike[members[0]].simulated(candidates[rows], {n: several[rows] for n, several in shares.items()})
+            runs = alike[members[0]].simulated(candidates[rows], {n: share[rows] for n, share in shares.items()})
             edges = np.cumsum([0, *(len(forms[i][1]) for i in members)])
             for i, (first, end) in zip(members, pairwise(edges), strict=True):
                 own = [replace(run, outputs=run.outputs[:, first:end]) for run in runs]
-                found[i][alike[i]] = alike[i].corrected(own)
-    return [[replay.seen(found[i][replay.ready]) for replay in form] for i, (form, _) in enumerate(forms)]
+                simulations[i][alike[i]] = alike[i].corrected(own)
+    return [[replay.seen(simulations[i][replay.ready]) for replay in form] for i, (form, _) in enumerate(forms)]
 
 
 def residuals(replays: Sequence[Replay], space: Space, X: ArrayLike, weights: ArrayLike) -> Array:

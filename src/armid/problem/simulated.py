@@ -34,7 +34,8 @@ class SimulatedCampaign(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the parameters and the columns of each record, SI."""
-        records = {file: {key: values.tolist() for key, values in each.items()} for file, each in self.tables.items()}
+        records = {file: {key: values.tolist() for key, values in columns.items()}
+                   for file, columns in self.tables.items()}  # fmt: skip
         return {"campaign": self.campaign.name, "parameters": self.parameters, "records": records}
 
     @property
@@ -47,14 +48,15 @@ class SimulatedCampaign(Shown):
         """All records below each other, SI, with the file of each row."""
         from pandas import DataFrame, concat
 
-        return concat([DataFrame({"record": file, **each}) for file, each in self.tables.items()], ignore_index=True)
+        frames = [DataFrame({"record": file, **columns}) for file, columns in self.tables.items()]
+        return concat(frames, ignore_index=True)
 
     def document(self) -> Document:
         """Return the parameters and the size of each record."""
         model = " + ".join([self.model.plant.name, *(e.name for e in self.model.effects)])
         outputs = [si_header(output)[0] for output in self.model.plant.outputs]
-        rows = [(file, str(len(each["time_s"])), *(f"{np.abs(each[o]).max():.4g}" for o in outputs))
-                for file, each in self.tables.items()]  # fmt: skip
+        rows = [(file, str(len(columns["time_s"])), *(f"{np.abs(columns[o]).max():.4g}" for o in outputs))
+                for file, columns in self.tables.items()]  # fmt: skip
         values = listed([f"{name} = {value:.6g} {self.model.parameters[name].unit}".removesuffix(" 1")
                          for name, value in self.parameters.items()])  # fmt: skip
         answer = f"{model} simulated through {len(rows)} records of {self.campaign.name} with {values}."
@@ -65,10 +67,10 @@ class SimulatedCampaign(Shown):
 
     def plot(self) -> Any:
         """Draw the signal of each record over what was measured, and return matplotlib's figure."""
-        each = [one for record in self.campaign.records for one in record.each]
+        records = [one for record in self.campaign.records for one in record.each]
         outputs = {o.name: o for o in self.model.plant.outputs}
-        figure, cells = record_axes(len(each), 2.9)
-        for (axis,), record in zip(cells, each, strict=True):
+        figure, cells = record_axes(len(records), 2.9)
+        for (axis,), record in zip(cells, records, strict=True):
             output = outputs.get(record.output, self.model.plant.outputs[0])
             header, factor = si_header(output)
             columns = self.tables[record.file]
@@ -87,8 +89,8 @@ class SimulatedCampaign(Shown):
             raise DataError(f"{quoted(str(folder))} is the folder of the campaign, whose records would be lost: "
                              "another one is expected")  # fmt: skip
         with NewFiles(Path(folder)) as files:
-            for file, each in self.tables.items():
-                write_table(files.path(file), each)
+            for file, columns in self.tables.items():
+                write_table(files.path(file), columns)
         return files.names
 
 
@@ -121,8 +123,8 @@ def simulated_piece(
 ) -> dict[str, Array]:
     wanted = accuracy or accuracy_against(record.noises, model)
     calibration = calibrate(model, piece.manoeuvre, candidate[np.newaxis], wanted, spans=False)
-    found = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
-    if found.failed[0]:
+    simulation = simulate(model, piece.manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
+    if simulation.failed[0]:
         raise ModelError(f"record '{record.file}': the simulation diverges with these parameters")
     if not calibration.reached:
         off = f"the engine is off by up to {calibration.error:.2g} {model.plant.output_unit} even at its finest steps"
@@ -134,16 +136,16 @@ def simulated_piece(
     speed = model.plant.aliases.get("omega", "omega")
     columns = {"time_s": piece.manoeuvre.times()}
     recorded = {
-        si_header(o)[0]: y[0] / si_header(o)[1] for o, y in zip(model.plant.outputs, found.outputs, strict=True)
+        si_header(o)[0]: y[0] / si_header(o)[1] for o, y in zip(model.plant.outputs, simulation.outputs, strict=True)
     }
     for name, state in model.states.items():
         if name == speed and model.plant.records_one_speed:
             columns |= recorded
         elif state.column:
-            columns[state.column] = found.states[name][0]
+            columns[state.column] = simulation.states[name][0]
     columns |= recorded
     if speed in model.states and any("output" in e.adds for e in model.effects):
-        columns[model.states[speed].column or f"{speed}_state"] = found.states[speed][0]
+        columns[model.states[speed].column or f"{speed}_state"] = simulation.states[speed][0]
     return columns
 
 

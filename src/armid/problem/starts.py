@@ -125,9 +125,9 @@ class Start:
     def signals(self, starts: Array, population: Array) -> Array:
         """Return the outputs of the file, each candidate from its own start, (n_outputs, n_candidates, n_samples)."""
         prepared = self.ready.prepared[self.index]
-        whole, order = np.tile(prepared.constants, (len(starts), 1)), list(self.ready.model.constants)
-        whole[:, [order.index(name) for name in self.names]] = starts
-        outputs = prepared.run(population, self.ready.threads, whole).outputs
+        constants, order = np.tile(prepared.constants, (len(starts), 1)), list(self.ready.model.constants)
+        constants[:, [order.index(name) for name in self.names]] = starts
+        outputs = prepared.run(population, self.ready.threads, constants).outputs
         return np.asarray(outputs[list(self.places)])
 
     def seen(self, signals: Array) -> Array:
@@ -142,9 +142,9 @@ class Start:
         """Return signals and d signal / d constant about one start, all in one population, by central differences."""
         n, moves = len(constants), MOVE * self.size * np.eye(len(constants))
         starts = np.concatenate([constants[np.newaxis], constants + moves, constants - moves])
-        found = self.signals(np.repeat(starts, len(population), axis=0), np.tile(population, (len(starts), 1)))
-        each = found.reshape(len(found), len(starts), len(population), -1).swapaxes(0, 1)
-        return each[0], (each[1 : 1 + n] - each[1 + n :]) / (2.0 * MOVE * self.size)
+        signals = self.signals(np.repeat(starts, len(population), axis=0), np.tile(population, (len(starts), 1)))
+        by_start = signals.reshape(len(signals), len(starts), len(population), -1).swapaxes(0, 1)
+        return by_start[0], (by_start[1 : 1 + n] - by_start[1 + n :]) / (2.0 * MOVE * self.size)
 
     @cached_property
     def shown(self) -> tuple[Array, Array]:

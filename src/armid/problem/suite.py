@@ -150,8 +150,8 @@ def suite(
     for what, given, known in (("objectives", objectives, OBJECTIVES), ("units", units, UNITS)):
         if given not in known:
             raise ArmidError(f"{what} is {given!r}, {nearest(str(given), known)}")
-    several = [name for name, d in DEFINITIONS.items() if objectives == "one" or len(d.strokes) > 1]
-    keys = [(name, i) for name in several for i in range(1, N_INSTANCES + 1)]
+    names = [name for name, d in DEFINITIONS.items() if objectives == "one" or len(d.strokes) > 1]
+    keys = [(name, i) for name in names for i in range(1, N_INSTANCES + 1)]
     measured: dict[str, Campaign] = {}
     for one in [campaigns] if isinstance(campaigns, Campaign | str | Path) else campaigns:
         campaign = one if isinstance(one, Campaign) else read_campaign(one)
@@ -238,8 +238,8 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         """Return the value of a candidate, (n_var,), or those of several, (n_candidates, n_var)."""
         X = np.asarray(x, dtype=np.float64)
         values = self.evaluate(np.atleast_2d(X), return_values_of=["F"])
-        found = values[:, 0] if self.n_obj == 1 else values
-        return found if X.ndim > 1 else (float(found[0]) if self.n_obj == 1 else found[0])
+        objectives = values[:, 0] if self.n_obj == 1 else values
+        return objectives if X.ndim > 1 else (float(objectives[0]) if self.n_obj == 1 else objectives[0])
 
     def _evaluate(self, X: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
         problem, candidates = self.identification, self.si(X)
@@ -323,8 +323,8 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         def vector(u: Array) -> Array:
             return np.asarray(self._residuals(u)[0])
 
-        found = least_squares(vector, self._cube(start), bounds=(0.0, 1.0), xtol=1e-12, ftol=1e-14)
-        return np.asarray(self._low + found.x * (self._high - self._low))
+        solution = least_squares(vector, self._cube(start), bounds=(0.0, 1.0), xtol=1e-12, ftol=1e-14)
+        return np.asarray(self._low + solution.x * (self._high - self._low))
 
     @cached_property
     def optimum_value(self) -> float | None:

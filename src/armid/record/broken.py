@@ -145,19 +145,19 @@ def neighbours(values: Array) -> Array:
 
 def after_sudden(values: Array) -> Mask:
     """Return the rows at which an input has just jumped; values: of the input, (n_rows,)."""
-    found = np.zeros(values.size, dtype=np.bool_)
+    mask = np.zeros(values.size, dtype=np.bool_)
     change = np.abs(np.diff(values))
     if change.size:
         least = max(SUDDEN * float(np.quantile(change, USUAL)), SUDDEN_SHARE * float(np.ptp(values)))
         for place in np.flatnonzero(change > least):
-            found[place : place + AFTER_SUDDEN] = True
-    return found
+            mask[place : place + AFTER_SUDDEN] = True
+    return mask
 
 
 def in_runs(true: Mask, shortest: int) -> Mask:
     """Return the runs of a mask that are so long or longer."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
-    found = np.zeros(true.size, dtype=np.bool_)
+    mask = np.zeros(true.size, dtype=np.bool_)
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        found[begin:end] = end - begin >= shortest
-    return found
+        mask[begin:end] = end - begin >= shortest
+    return mask

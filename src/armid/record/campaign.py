@@ -71,9 +71,9 @@ class Campaign(Shown):
 
     def __repr__(self) -> str:
         named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
-        told = "; ".join(f"{len(files)} {role}: {', '.join(files[:MOST_NAMED])}{', ...' * (len(files) > MOST_NAMED)}"
-                         for role, files in named.items())  # fmt: skip
-        return f"<Campaign {self.name} of {self.plant.name} [{self.unit}]; {told}>"
+        records = "; ".join(f"{len(files)} {role}: {', '.join(files[:MOST_NAMED])}{', ...' * (len(files) > MOST_NAMED)}"
+                            for role, files in named.items())  # fmt: skip
+        return f"<Campaign {self.name} of {self.plant.name} [{self.unit}]; {records}>"
 
     def document(self) -> "Document":
         """Return what a notebook shows of it: one line for each output of each record."""
@@ -383,20 +383,20 @@ def tolerances_of(
     for name in told:
         if name not in declared and name != DEFAULT:
             raise unknown_name("constant", name, [*declared, DEFAULT], f"{where}, tolerances")
-    of_records, found = set_by_records(plant), {}
+    of_records, tolerances = set_by_records(plant), {}
     for name, usual in declared.items():
         otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT, usual or 0.0)
-        found[name] = told.get(name, otherwise)
-    return {name: tolerance for name, tolerance in found.items() if tolerance > 0.0}
+        tolerances[name] = told.get(name, otherwise)
+    return {name: tolerance for name, tolerance in tolerances.items() if tolerance > 0.0}
 
 
 def priors_of(
-    told: Mapping[str, Any], plant: Plant, effects: Mapping[str, Effect], where: str
+    priors: Mapping[str, Any], plant: Plant, effects: Mapping[str, Effect], where: str
 ) -> tuple[dict[str, float], dict[str, Known]]:
     """Return the probabilities of effects, and what is known of parameters and constants, before the records."""
     chances, known = dict[str, float](), dict[str, Known]()
     values = {*(p.name for p in plant.parameters), *(c.name for c in plant.constants)}
-    for name, prior in told.items():
+    for name, prior in priors.items():
         place = f"{where}, priors.{name}"
         if isinstance(prior, float):
             if name not in effects:

@@ -104,12 +104,12 @@ def memory_of(parts: Sequence[Array]) -> float:
     differences = [np.diff(p, n=2) for p in parts]
     size = OUTLYING * 1.4826 * float(np.median(np.abs(np.concatenate(differences))))
     kept = [np.clip(d, -size, size) for d in differences]
-    whole, n = sum(float(d @ d) for d in kept), sum(len(d) for d in kept)
-    if not whole > 0.0:
+    total, n = sum(float(d @ d) for d in kept), sum(len(d) for d in kept)
+    if not total > 0.0:
         return 0.0
     # covariances of second differences of rho^|k|, at lags 0 and 1
     lags = [6.0 - 8.0 * MEMORIES + 2.0 * MEMORIES**2, -4.0 + 7.0 * MEMORIES - 4.0 * MEMORIES**2 + MEMORIES**3]
-    seen = sum(float(d[1:] @ d[:-1]) for d in kept) / whole
+    seen = sum(float(d[1:] @ d[:-1]) for d in kept) / total
     rho = float(np.interp(seen, lags[1] / lags[0], MEMORIES))
     return rho if 2.0 * DISTINCT / np.sqrt(n) < rho <= LONGEST_MEMORY else 0.0
 

@@ -39,7 +39,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     is not data, of uneven times with IrregularSamplingWarning.
     """
     times = time_column(table)
-    plant, found = output_columns(table, plant)
+    plant, outputs = output_columns(table, plant)
     timing = timing_of(times, plant.from_rest, table.file)
     sources = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where)
     driven = [table.numbers(header) for header in sources.values()]
@@ -48,10 +48,10 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
         most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
         return signal_of(table, header, unit, factor, times, timing, driven, campaign.unwrap, most_lost, output)
 
-    measured = [read(header, o.factors[header], o.unit, o.name) for o, header in found.items()]
+    measured = [read(header, o.factors[header], o.unit, o.name) for o, header in outputs.items()]
     if campaign.gyro_range_deg_s is not None:
         check_range(measured, campaign.gyro_range_deg_s, table)
-    others = {name: values for name, values in table.columns.items() if name not in (TIME, *found.values())}
+    others = {name: values for name, values in table.columns.items() if name not in (TIME, *outputs.values())}
     columns = {name: onto_grid(values, times, timing) for name, values in others.items() if np.isfinite(values).all()}
     manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, sources, where=where)
     record = Record(
@@ -269,11 +269,11 @@ def record_path(folder: Path, file: str, where: str) -> Path:
         raise ArmidError(f"{where}: file {quoted(file)} is not a CSV file, a name that ends in {SUFFIX} is expected")
     path = os.path.join(folder, file)
     if not os.path.isfile(path):
-        there = sorted(p.name for p in folder.glob(f"*{SUFFIX}") if p.is_file())
+        files = sorted(p.name for p in folder.glob(f"*{SUFFIX}") if p.is_file())
         if os.path.lexists(path):
             raise ArmidError(f"{where}: file {quoted(file)} does not exist: a folder or a dead link has that name, a "
                              "CSV file is expected")  # fmt: skip
-        raise ArmidError(f"{where}: file {quoted(file)} does not exist, {nearest(file, there)}")
+        raise ArmidError(f"{where}: file {quoted(file)} does not exist, {nearest(file, files)}")
     real = Path(os.path.realpath(path))
     if not real.is_relative_to(os.path.realpath(folder)):
         raise ArmidError(f"{where}: file {quoted(file)} links out of the campaign's folder, a file inside is expected")

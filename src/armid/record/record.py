@@ -77,10 +77,10 @@ class StartCorrection:
         seen = np.concatenate([outputs[place][:, samples] for place, samples in pairs], axis=1)
         # no matrix product: its rounding of one candidate may depend on how many others there are
         lacking = np.einsum("cn,sn->cs", self.measured - seen, self.gain) + self.offset
-        found = outputs.copy()
+        signals = outputs.copy()
         for place, slopes in zip(self.places, self.slopes.swapaxes(0, 1), strict=True):
-            found[place] += np.einsum("cs,sn->cn", lacking, slopes[:, : outputs.shape[2]])
-        return found
+            signals[place] += np.einsum("cs,sn->cn", lacking, slopes[:, : outputs.shape[2]])
+        return signals
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +194,8 @@ class Record:
 
     def with_pieces(self, change: Callable[[Piece], Piece]) -> "Record":
         """Return the record with each of its pieces changed."""
-        pieces, whole = (tuple(map(change, some)) for some in (self.pieces, self.whole_pieces))
-        return replace(self, pieces=pieces, whole_pieces=whole)
+        pieces, whole_pieces = (tuple(map(change, some)) for some in (self.pieces, self.whole_pieces))
+        return replace(self, pieces=pieces, whole_pieces=whole_pieces)
 
     def until_window_end(self) -> "Record":
         """Return the record with its pieces cut: what an identification has to simulate."""

@@ -77,9 +77,9 @@ def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
     """Return a kind of fewer values; schema: how JSON Schema says the test, nothing where it cannot."""
 
     def both(value: object) -> Any:
-        found = kind(value)
-        if test(found):
-            return found
+        accepted = kind(value)
+        if test(accepted):
+            return accepted
         raise KindError(value)
 
     return Kind(both, {**kind.schema, **schema})
@@ -201,15 +201,15 @@ def json_schema(
         return [json_schema(each, registered, keys, "") for each in schema]
     if not isinstance(schema, Mapping):
         return schema
-    whole: dict[str, Any] = {"$schema": draft} if draft else {}
+    document: dict[str, Any] = {"$schema": draft} if draft else {}
     for name, inner in schema.items():
         if name == REGISTERED:
-            whole["anyOf"] = [{"enum": sorted(registered[inner])}, {}]
+            document["anyOf"] = [{"enum": sorted(registered[inner])}, {}]
         elif name != OF_PLANTS:
-            whole[name] = json_schema(inner, registered, keys, "")
+            document[name] = json_schema(inner, registered, keys, "")
     if OF_PLANTS in schema:
-        whole["properties"] |= keys
-    return whole
+        document["properties"] |= keys
+    return document
 
 
 # Bytes of a file: tables that are nested 8 deep take 350 times as much memory.

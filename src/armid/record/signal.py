@@ -48,13 +48,13 @@ def signal_of(
     if sensor.hold > 1:
         warn(table, f"{header} is renewed every {sensor.hold} rows: one sample of each renewal counts")
     check_number(table, header, rows, timing)
-    n_new, found = int(rows.sum()), {}
+    n_new, masks = int(rows.sum()), {}
     jumps = np.cumsum(np.any([after_sudden(x) for x in inputs], axis=0)) if inputs else np.zeros(values.size)
     new = New(values, rows, times, timing)
     wild = wild_samples(new.values, max(difference_rms(new.motion, new.uneven), sensor.step / np.sqrt(12.0)))
-    found["spikes"] = rows.copy()
+    masks["spikes"] = rows.copy()
     rows[new.at[wild & ~new.since(jumps)]] = False
-    found["spikes"] &= ~rows
+    masks["spikes"] &= ~rows
     new = New(values, rows, times, timing)
     rest, noise = rest_and_noise(new, inputs, is_speed)
     moves = not is_constant(new.motion)
@@ -62,10 +62,10 @@ def signal_of(
         repeated_samples(new.values, noise.rms, noise.source == "rest", sensor, new.since(jumps)) if moves else {}
     )
     for kind, broken in repeated.items():
-        found[kind] = np.zeros(rows.size, dtype=np.bool_)
-        found[kind][new.at[broken]] = True
+        masks[kind] = np.zeros(rows.size, dtype=np.bool_)
+        masks[kind][new.at[broken]] = True
         rows[new.at[broken]] = False
-    faults = [lost(table, header, kind, mask, times, timing.first) for kind, mask in found.items() if mask.any()]
+    faults = [lost(table, header, kind, mask, times, timing.first) for kind, mask in masks.items() if mask.any()]
     check_lost(table, header, faults, n_new, most_lost)
     check_number(table, header, rows, timing)
     measured, data = moved_onto_grid(values, times, timing, rows)
@@ -117,11 +117,11 @@ def warn(table: CsvTable, said: str) -> None:
 def check_empty(table: CsvTable, header: str, present: Mask) -> None:
     empty = np.flatnonzero(~present)
     if empty.size:
-        found = f"{header} has no number in {empty.size} of {present.size} rows, the first on line "
-        found += str(table.line_of(int(empty[0])))
+        fault = f"{header} has no number in {empty.size} of {present.size} rows, the first on line "
+        fault += str(table.line_of(int(empty[0])))
         if empty.size > MOST_EMPTY * present.size:
-            raise ArmidError(f"{table.file}: {found}, at most half of the rows without one are expected")
-        warn(table, f"{found}: these are no data")
+            raise ArmidError(f"{table.file}: {fault}, at most half of the rows without one are expected")
+        warn(table, f"{fault}: these are no data")
 
 
 def check_number(table: CsvTable, header: str, rows: Mask, timing: Timing) -> None:
@@ -186,6 +186,6 @@ def without_turns(table: CsvTable, header: str, raw: Array, unwrap: bool) -> Arr
         line = table.line_of(int(rows[fast[0] + 1]))
         raise ArmidError(f"{table.file}, line {line}: {header} moves by half a turn or more from row to row, so that "
                          "its turns cannot be counted: faster sampling is expected")  # fmt: skip
-    whole = raw.copy()
-    whole[present] = raw[present] - turn * np.append(0.0, np.cumsum(turns))
-    return whole
+    unwrapped = raw.copy()
+    unwrapped[present] = raw[present] - turn * np.append(0.0, np.cumsum(turns))
+    return unwrapped

@@ -38,9 +38,9 @@ def track_of(signal: Signal) -> Track:
 
 def state_at(tracks: Mapping[str, Track], index: int) -> State:
     """Return constants (`start_position`, `start_speed`) and their standard deviations (SI) at one sample."""
-    found = {name: smoothed(t.values, index, t.noise) for name, t in tracks.items()}
-    deviations = {name: float(max(d, tracks[name].step / np.sqrt(12.0))) for name, (_, d) in found.items()}
-    return {name: value for name, (value, _) in found.items()}, deviations
+    estimates = {name: smoothed(t.values, index, t.noise) for name, t in tracks.items()}
+    deviations = {name: float(max(d, tracks[name].step / np.sqrt(12.0))) for name, (_, d) in estimates.items()}
+    return {name: value for name, (value, _) in estimates.items()}, deviations
 
 
 def n_spent(n_samples: int, interval: float) -> int:
@@ -151,10 +151,10 @@ def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tu
         n = degree + HIGHER + 2
         while n <= min(values.size, LONGEST):
             low = window_at(index, n, values.size)
-            found = fitted(values[low : low + n], index - low, degree, noise, slope)
-            if found is None:
+            estimate = fitted(values[low : low + n], index - low, degree, noise, slope)
+            if estimate is None:
                 break
-            best = min(best, found, key=lambda pair: pair[1])
+            best = min(best, estimate, key=lambda pair: pair[1])
             n = int(n * GROWTH) + 1
     return best
 

@@ -72,8 +72,8 @@ class CsvTable:
     def numbers(self, header: str, gaps: bool = False) -> Array:
         """Return a column, (n_rows,); refuse one with a cell that is not a number; gaps: but for empty ones, NaN."""
         if header in self.texts:
-            line, found = self.texts[header]
-            raise ArmidError(f"{self.file}, line {line}: {header} is {found} is expected")
+            line, text = self.texts[header]
+            raise ArmidError(f"{self.file}, line {line}: {header} is {text} is expected")
         values = self.columns[header]
         empty = np.flatnonzero(np.isnan(values))
         if empty.size and not gaps:
@@ -90,11 +90,11 @@ class CsvTable:
                              "campaign.toml")  # fmt: skip
         return TURN / self.counts_per_turn
 
-    def only_one_of(self, found: Sequence[str], expected: str) -> str | None:
+    def only_one_of(self, headers: Sequence[str], expected: str) -> str | None:
         """Return the one header that was found, None without any; refuse several with ArmidError."""
-        if len(found) > 1:
-            raise ArmidError(f"{self.where}: {' and '.join(found)} are both there, {expected}")
-        return found[0] if found else None
+        if len(headers) > 1:
+            raise ArmidError(f"{self.where}: {' and '.join(headers)} are both there, {expected}")
+        return headers[0] if headers else None
 
 
 def read_table(path: Path, file: str, counts_per_turn: float | None = None) -> CsvTable:
@@ -120,31 +120,31 @@ def read_table(path: Path, file: str, counts_per_turn: float | None = None) -> C
     cells = cells_of(text, wide, file)
     if cells.assumed:
         warnings.warn(f"{file}: read with {', '.join(cells.assumed)}", RecordWarning, stacklevel=2)
-    found = columns_of(cells) if cells.rows else ()
-    return table_with(found, file, path, cells.lines, cells.header_line, counts_per_turn)
+    columns = columns_of(cells) if cells.rows else ()
+    return table_with(columns, file, path, cells.lines, cells.header_line, counts_per_turn)
 
 
 def table_of(frame: "DataFrame", file: str, counts_per_turn: float | None = None) -> CsvTable:
     """Return a table of pandas as if it were read from the CSV file that holds its columns."""
     names, lines = [str(name).strip() for name in frame.columns], tuple(range(2, len(frame) + 2))
     check_names(names, 1, file)
-    found: list[tuple[str, Array | tuple[int, str]]] = []
+    columns: list[tuple[str, Array | tuple[int, str]]] = []
     for name, (_, column) in zip(names, frame.items(), strict=True):
         if column.dtype in ("float64", "int64"):
-            found.append((name, column.to_numpy(dtype=np.float64)))
+            columns.append((name, column.to_numpy(dtype=np.float64)))
         else:
             cells = ["" if empty else str(cell).strip() for cell, empty in zip(column, column.isna(), strict=True)]
-            found += columns_of(Cells((name,), tuple((cell,) for cell in cells), lines, 1, ()))
-    return table_with(found if lines else (), file, Path(file), lines, 1, counts_per_turn)
+            columns += columns_of(Cells((name,), tuple((cell,) for cell in cells), lines, 1, ()))
+    return table_with(columns if lines else (), file, Path(file), lines, 1, counts_per_turn)
 
 
 def table_with(
-    found: Iterable[tuple[str, Array | tuple[int, str]]], file: str, path: Path, lines: tuple[int, ...],
+    columns: Iterable[tuple[str, Array | tuple[int, str]]], file: str, path: Path, lines: tuple[int, ...],
     header_line: int, counts_per_turn: float | None,
 ) -> CsvTable:  # fmt: skip
     """Return a table of columns: numbers, or line and text of a cell that holds text. Refuse one without columns."""
     table = CsvTable(file, path, {}, {}, lines, header_line, counts_per_turn)
-    for name, values in found:
+    for name, values in columns:
         if isinstance(values, tuple):
             table.texts[name] = values[0], f"{quoted(values[1])}, a finite number"
             continue
@@ -192,8 +192,8 @@ def time_column(table: CsvTable) -> Array:
     wrong = np.flatnonzero(np.diff(times) <= 0)
     if wrong.size:
         before, row = float(times[wrong[0]]), int(wrong[0]) + 1
-        found = "is there twice" if times[row] == before else f"comes after {before:.12g}"
-        raise ArmidError(f"{table.file}, line {table.line_of(row)}: time_s {float(times[row]):.12g} {found}"
+        fault = "is there twice" if times[row] == before else f"comes after {before:.12g}"
+        raise ArmidError(f"{table.file}, line {table.line_of(row)}: time_s {float(times[row]):.12g} {fault}"
                          f"{why_back(table, times, row)}, increasing times are expected")  # fmt: skip
     return times
 
@@ -248,8 +248,8 @@ def speed_column(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, str
 
 def position_of(table: CsvTable, unit: str) -> str | None:
     """Return the header of the position that belongs to a speed in `unit`, None where there is none."""
-    found = [name for name in table.headers if name in POSITIONS and POSITIONS[name][0] == unit]
-    return table.only_one_of(found, "at most one position column is expected")
+    headers = [name for name in table.headers if name in POSITIONS and POSITIONS[name][0] == unit]
+    return table.only_one_of(headers, "at most one position column is expected")
 
 
 def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where: str) -> dict[str, str]:
@@ -264,16 +264,16 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
         if header not in table.headers:
             raise ArmidError(f"{where}: input '{name}' names the column {quoted(header)}, which {table.file} does not "
                              f"have, {nearest(header, table.headers)}")  # fmt: skip
-    found = dict(named)
+    columns = dict(named)
     for wanted in plant.inputs:
         if wanted.name not in named:
             expected = f"one column for input '{wanted.name}' is expected, or its name under [records.inputs]"
             column = table.only_one_of([name for name in wanted.columns if name in table.headers], expected)
             if column is not None:
-                found[wanted.name] = column
+                columns[wanted.name] = column
             elif wanted.required:
                 raise missing(table, f"column for input '{wanted.name}'", wanted.columns)
-    return found
+    return columns
 
 
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:

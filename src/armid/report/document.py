@@ -124,9 +124,9 @@ def cell(value: Any, column: Column) -> Cell:
     if column.digits and not isinstance(value, str):
         # + 0.0 takes the sign off a zero
         return Cell(format(column.factor * float(value) + 0.0, column.digits), float(value))
-    found = FIRST_NUMBER.match(str(value))
+    match = FIRST_NUMBER.match(str(value))
     text = value if isinstance(value, Struck) else str(value)
-    return Cell(text, float(found.group(1)) if found else None)
+    return Cell(text, float(match.group(1)) if match else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,13 +240,13 @@ def listing(title: str, text: str, folded: bool = False) -> Listing:
 def changed(before: str, after: str) -> tuple[Line, ...]:
     """Return the lines of two texts as one, marked where they differ."""
     old, new = before.splitlines(), after.splitlines()
-    found: list[Line] = []
+    lines: list[Line] = []
     for what, i, j, k, m in SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
         if what == "equal":
-            found += [Line(t) for t in old[i:j]]
+            lines += [Line(t) for t in old[i:j]]
             continue
-        found += [Line(t, "-") for t in old[i:j]] + [Line(t, "+") for t in new[k:m]]
-    return tuple(found)
+        lines += [Line(t, "-") for t in old[i:j]] + [Line(t, "+") for t in new[k:m]]
+    return tuple(lines)
 
 
 def slug(*texts: str) -> str:
@@ -256,11 +256,11 @@ def slug(*texts: str) -> str:
 
 def unlike(names: list[str]) -> list[str]:
     """Return the names with a number behind those that are there already."""
-    found: list[str] = []
+    distinct: list[str] = []
     for name in names:
-        again = sum(re.fullmatch(rf"{re.escape(name)}(_\d+)?", f) is not None for f in found)
-        found.append(f"{name}_{again + 1}" if again else name)
-    return found
+        again = sum(re.fullmatch(rf"{re.escape(name)}(_\d+)?", f) is not None for f in distinct)
+        distinct.append(f"{name}_{again + 1}" if again else name)
+    return distinct
 
 
 # Curves of more records than this would make a page that nobody scrolls through.
@@ -431,10 +431,10 @@ def record_axes(n: int, height: float, heights: Sequence[float] = (1,)) -> tuple
     rows = -(-n // columns)
     # as for `small_axes` margins are given, in inches: a layout engine takes longer than all the drawing
     width, above, below, gap, between = 6.8 * columns, 0.95, 1.0, 0.85, 1.1
-    whole = height * rows + above + below - gap
-    figure = pyplot().figure(figsize=(width, whole))
+    total = height * rows + above + below - gap
+    figure = pyplot().figure(figsize=(width, total))
     grid = figure.add_gridspec(
-        rows, columns, left=between / width, right=1.0 - 0.15 / width, bottom=below / whole, top=1.0 - above / whole,
+        rows, columns, left=between / width, right=1.0 - 0.15 / width, bottom=below / total, top=1.0 - above / total,
         wspace=between / (6.8 - between), hspace=gap / (height - gap),
     )  # fmt: skip
     cells = []

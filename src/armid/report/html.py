@@ -102,13 +102,13 @@ def local(name: str) -> str:
 
 
 def referenced(root: ElementTree.Element) -> set[str]:
-    found: set[str] = set()
+    ids: set[str] = set()
     for element in root.iter():
         for name, value in element.attrib.items():
-            found |= set(REFERENCE.findall(value))
+            ids |= set(REFERENCE.findall(value))
             if local(name) == "href" and value.startswith("#"):
-                found.add(value[1:])
-    return found
+                ids.add(value[1:])
+    return ids
 
 
 def cleaned(element: ElementTree.Element, prefix: str, used: set[str]) -> ElementTree.Element:

@@ -70,10 +70,10 @@ def form(column: Column, texts: Sequence[str]) -> str:
     """Return the type of a column: `S` for numbers, with their digits; long text has a width."""
     if not column.digits:
         return f"p{{{BROKEN}pt}}" if max(map(len, texts), default=0) > LONG else "l"
-    found = [m for m in (NUMBER.fullmatch(text.replace(",", "")) for text in texts) if m]
-    if not found:
+    matches = [m for m in (NUMBER.fullmatch(text.replace(",", "")) for text in texts) if m]
+    if not matches:
         return "r"
-    sign, whole, part, power = (max(len((m[i] or "").lstrip("-+" if i == 4 else "")) for m in found)
+    sign, whole, part, power = (max(len((m[i] or "").lstrip("-+" if i == 4 else "")) for m in matches)
                                 for i in (1, 2, 3, 4))  # fmt: skip
     return f"S[table-format={'-' * sign}{whole}.{part}{f'e-{power}' if power else ''}]"
 
@@ -101,11 +101,11 @@ def heading_text(text: str) -> str:
 
 def symbol(name: str) -> str:
     """Return the symbol of a parameter such as "eta3", or a word as it is."""
-    found = SYMBOL.fullmatch(name)
-    if found is None:
+    match = SYMBOL.fullmatch(name)
+    if match is None:
         return latex_text(name)
-    letter = rf"\{found[1]}" if found[1] in GREEK else found[1]
-    return f"${letter}_{{{found[2]}}}$" if found[2] else f"${letter}$"
+    letter = rf"\{match[1]}" if match[1] in GREEK else match[1]
+    return f"${letter}_{{{match[2]}}}$" if match[2] else f"${letter}$"
 
 
 def latex_text(text: str) -> str:

@@ -70,8 +70,8 @@ class Kind:
             made: Document = getattr(import_module(self.module), self.function)(result, *others)
         return replace(made, angle=result.get("angle", DEG))
 
-    def parts_of(self, found: object) -> Parts:
-        made: Parts = import_module(self.module).parts_of(found)
+    def parts_of(self, result: object) -> Parts:
+        made: Parts = import_module(self.module).parts_of(result)
         return made
 
 

@@ -324,8 +324,8 @@ def draw_intervals(axis: Any, x: Array, y: Array, low: Array, high: Array, k: in
 
 
 def write_name(axis: Any, name: str, place: float, number: int) -> None:
-    there = {"transform": axis.transAxes, "clip_on": False}
-    axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], **there, **line_look(number))
+    style = {"transform": axis.transAxes, "clip_on": False}
+    axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], **style, **line_look(number))
     axis.text(BESIDE + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
 
 

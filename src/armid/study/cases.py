@@ -188,10 +188,10 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
 def _with_records(campaign: Campaign, files: Sequence[str] | None, where: str) -> Campaign:
     if files is None:
         return campaign
-    there = [r.file for r in campaign.records]
+    known = [r.file for r in campaign.records]
     for file in files:
-        if file not in there:
-            raise unknown_name("record", file, there, where)
+        if file not in known:
+            raise unknown_name("record", file, known, where)
     some = replace(campaign, records=tuple(r for r in campaign.records if r.file in files))
     if not some.train:
         raise ArmidError(f"{where}: none of the records {', '.join(files)} has the role 'train'")

@@ -55,20 +55,20 @@ def report_of(
     answer: tuple[str, ...]
     if closes_loops:
         runs = loop_runs(results.loops)
-        found = [Section("Verdicts", (verdicts(runs),)), Section("Campaigns", (campaigns(runs),))]
+        sections = [Section("Verdicts", (verdicts(runs),)), Section("Campaigns", (campaigns(runs),))]
         facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
     else:
         with angles_in(angle):
             evidence = Evidence(results)
             analyses = OF_SUITES if evidence.is_suite else ANALYSES
-            found = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
-            facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, found[0].parts[0])
-    sections = (*(s for s in found if s.parts), *own_sections(own, runs), made_section(results, again))
+            sections = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
+            facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, sections[0].parts[0])
+    shown = (*(s for s in sections if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)
-    whole = state.startswith("Complete")
+    is_complete = state.startswith("Complete")
     return Document(
-        study["name"], "Study", str(study.get("question", "")), (*answer, state) if whole else answer, sections,
-        warning="" if whole else state, facts=facts, main=sections[0].parts, angle=angle,
+        study["name"], "Study", str(study.get("question", "")), (*answer, state) if is_complete else answer, shown,
+        warning="" if is_complete else state, facts=facts, main=shown[0].parts, angle=angle,
     )  # fmt: skip
 
 

@@ -29,13 +29,13 @@ LARGEST_INSTANCE = 65_535
 
 def export_ioh(results: StudyResults, path_of: Callable[[str], Path]) -> int:
     """Write one .json and one .dat for each algorithm and function; return how many runs they hold."""
-    found = outcomes(results.runs, results.parameters)
-    found["function"] = found["case"] + ", " + found["setting"] + ", " + found["fitness"]
-    ids = {name: i for i, name in enumerate(dict.fromkeys(found["function"]), 1)}
-    variants = list(dict.fromkeys(found["variant"]))
+    runs = outcomes(results.runs, results.parameters)
+    runs["function"] = runs["case"] + ", " + runs["setting"] + ", " + runs["fitness"]
+    ids = {name: i for i, name in enumerate(dict.fromkeys(runs["function"]), 1)}
+    variants = list(dict.fromkeys(runs["variant"]))
     folders = dict(zip(variants, unlike([slug(v) or "identifier" for v in variants]), strict=True))
-    instances = instance_numbers(found)
-    rows = {row.run: row for row in found.itertuples()}
+    instances = instance_numbers(runs)
+    rows = {row.run: row for row in runs.itertuples()}
     pairs: dict[tuple[str, str], tuple[dict[str, Any], Path]] = {}
     for trace in results.iter_traces():
         row: Any = rows.get(trace.run)
@@ -81,9 +81,9 @@ def _description(row: Any, function_id: int, names: tuple[str, ...]) -> dict[str
     }
 
 
-def instance_numbers(found: DataFrame) -> dict[int, int]:
+def instance_numbers(runs: DataFrame) -> dict[int, int]:
     """Return seed -> instance: the seed itself, or its place among the seeds where one is too large."""
-    seeds = sorted({int(s) for s in found["seed"]})
+    seeds = sorted({int(s) for s in runs["seed"]})
     fits = not seeds or seeds[-1] <= LARGEST_INSTANCE
     return {seed: seed if fits else i for i, seed in enumerate(seeds, 1)}
 

@@ -141,5 +141,5 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
 
 def _files(folder: Path) -> list[str]:
     """Return campaign.toml and all records of a campaign: runs on others are other runs."""
-    found = (f for f in folder.rglob("*") if f.suffix.lower() == SUFFIX and f.is_file())
-    return sorted([NAME, *(f.relative_to(folder).as_posix() for f in found)])
+    files = (f for f in folder.rglob("*") if f.suffix.lower() == SUFFIX and f.is_file())
+    return sorted([NAME, *(f.relative_to(folder).as_posix() for f in files)])

@@ -71,8 +71,8 @@ class StudyResults(Shown):
 
     def document(self) -> "Document":
         """Return the answer and the main table; no trace is read."""
-        found: Document = documents().summary_of(self)
-        return found
+        document: Document = documents().summary_of(self)
+        return document
 
     def to_dict(self) -> dict[str, Any]:
         """Return the answer, how far the study is, and one entry a run, SI; what is not known is None."""
@@ -115,8 +115,8 @@ class StudyResults(Shown):
     def loops(self) -> pd.DataFrame:
         """One row a campaign that was closed: run, case, verdict, seconds, cpu_seconds, report (a dict)."""
         with _reading(self.path) as connection:
-            found = frame_of(connection, LOOPS)
-            return found.assign(report=[json.loads(text) for text in found["report"]])
+            loops = frame_of(connection, LOOPS)
+            return loops.assign(report=[json.loads(text) for text in loops["report"]])
 
     def settings_of(self, run: str) -> dict[str, Any]:
         """Return all that decided a run."""
@@ -145,9 +145,9 @@ class StudyResults(Shown):
         """Return a trace as a table with a column for every parameter of the study, None: one without rows."""
         if trace is None:
             trace = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
-        found = pd.DataFrame({"run": trace.run, "evaluation": trace.evaluations, "value": trace.values})
+        frame = pd.DataFrame({"run": trace.run, "evaluation": trace.evaluations, "value": trace.values})
         candidates = pd.DataFrame(trace.X, columns=list(trace.names)).reindex(columns=self.study["parameters"])
-        return found.join(candidates.add_prefix("x_"))
+        return frame.join(candidates.add_prefix("x_"))
 
 
 def documents() -> Any:
@@ -217,26 +217,26 @@ def _with_parameters(runs: pd.DataFrame, parameters: pd.DataFrame) -> pd.DataFra
 
 
 def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.DataFrame:
-    found = frame_of(connection, PARAMETERS)
+    parameters = frame_of(connection, PARAMETERS)
     truths = {(case["name"], name): v for case in study["cases"] for name, v in case["truth"].items()}
-    keys = zip(found.pop("case"), found["parameter"], strict=True)
+    keys = zip(parameters.pop("case"), parameters["parameter"], strict=True)
     truth = np.array([truths.get(key, np.nan) for key in keys], dtype=np.float64)
     for name in ("value", "low", "high", "deviation", "correlation_max"):
-        found[name] = found[name].astype(np.float64)
+        parameters[name] = parameters[name].astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        error = np.abs(found["value"] - truth) / np.abs(truth)
-    found.insert(4, "truth", truth)
-    found.insert(7, "relative_error", error)
-    return found.astype({"at_bound": bool})
+        error = np.abs(parameters["value"] - truth) / np.abs(truth)
+    parameters.insert(4, "truth", truth)
+    parameters.insert(7, "relative_error", error)
+    return parameters.astype({"at_bound": bool})
 
 
 def _versions(connection: sqlite3.Connection) -> dict[str, str]:
     query = "SELECT DISTINCT t.text FROM plan JOIN runs r USING (run) JOIN texts t ON t.hash = r.versions"
-    found: dict[str, list[str]] = {}
+    versions: dict[str, list[str]] = {}
     for (text,) in connection.execute(query):
         for package, version in json.loads(text).items():
-            found.setdefault(package, []).append(version)
-    return {package: ", ".join(sorted(set(those))) for package, those in found.items()}
+            versions.setdefault(package, []).append(version)
+    return {package: ", ".join(sorted(set(those))) for package, those in versions.items()}
 
 
 @contextmanager

@@ -86,7 +86,7 @@ def one_or_more(kind: Kind) -> Kind:
                 {"anyOf": [kind.schema, several.schema]})  # fmt: skip
 
 
-rising_counts = tested(one_or_more(count), lambda found: list(found) == sorted(set(found)))
+rising_counts = tested(one_or_more(count), lambda counts: list(counts) == sorted(set(counts)))
 
 
 @kind(type="number", minimum=0)
@@ -111,13 +111,13 @@ def option(value: object) -> float | int | str | bool:
 @kind(type="object", additionalProperties={"anyOf": [option.schema, table_of(option).schema]})
 def options(value: object) -> dict[str, float | int | str | bool]:
     """Return an identifier's options by name; those of a part of a chain, which TOML nests, as `pso.velocity_limit`."""
-    found: dict[str, float | int | str | bool] = {}
+    options: dict[str, float | int | str | bool] = {}
     for name, inner in any_table(value).items():
         if isinstance(inner, dict):
-            found |= {f"{name}.{key}": part(option, v, f".{name}.{key}") for key, v in inner.items()}
+            options |= {f"{name}.{key}": part(option, v, f".{name}.{key}") for key, v in inner.items()}
         else:
-            found[name] = part(option, inner, f".{name}")
-    return found
+            options[name] = part(option, inner, f".{name}")
+    return options
 
 
 EFFECT_NAMES = list_of(name_in("effects"), 1)
@@ -419,7 +419,7 @@ def imported_beside(plugin: Path) -> list[Path]:
     return sorted(f for name, f in loaded if f.parent == plugin.parent and not name.startswith(PLUGIN_PREFIX))
 
 
-def lookup(there: Mapping[str, Any], name: str, what: str, where: str) -> Any:
-    if name not in there:
-        raise unknown_name(what, name, there, where)
-    return there[name]
+def lookup(entries: Mapping[str, Any], name: str, what: str, where: str) -> Any:
+    if name not in entries:
+        raise unknown_name(what, name, entries, where)
+    return entries[name]

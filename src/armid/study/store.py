@@ -157,9 +157,9 @@ class Store:
             cursor = self._connection.execute("INSERT OR IGNORE INTO runs VALUES (?, ?, ?, ?, ?, ?, ?)", row)
             is_new = cursor.rowcount == 1
             for table, rows in outcome.rows.items() if is_new else ():
-                for each in rows:
-                    marks = ", ".join("?" * (1 + len(each)))
-                    self._connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", (outcome.run, *each))
+                for values in rows:
+                    marks = ", ".join("?" * (1 + len(values)))
+                    self._connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", (outcome.run, *values))
         return is_new
 
     def _text(self, text: str) -> str:
@@ -260,16 +260,17 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
     try:
         # first: another runner may make the tables meanwhile, and they come in one transaction with the two numbers
         is_empty = not connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        found = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
+        numbers = [connection.execute(f"PRAGMA {word}").fetchone()[0] for word in ("application_id", "user_version")]
     except sqlite3.DatabaseError as error:
         if error.sqlite_errorname != "SQLITE_NOTADB":
             raise
         raise ArmidError(f"{path} is not a store of a study: another file has its name") from error
-    if found == [APPLICATION, FORMAT] or (may_be_new and is_empty):
+    if numbers == [APPLICATION, FORMAT] or (may_be_new and is_empty):
         return
-    if found[0] != APPLICATION:
+    if numbers[0] != APPLICATION:
         raise ArmidError(f"{path} is not a store of a study: another program's data, or nothing, is in it")
-    raise ArmidError(f"{path} is a store of format {found[1]}, {FORMAT} is expected: another version of armid wrote it")
+    raise ArmidError(f"{path} is a store of format {numbers[1]}, {FORMAT} is expected: another version of armid "
+                     "wrote it")  # fmt: skip
 
 
 @contextmanager

@@ -172,7 +172,7 @@ class Entry:
         return max(self.several)
 
     def budgets(self, n_free: int) -> list[int]:
-        return sorted({min(self.budget, each * n_free) for each in self.per_parameter}) or [*self.several]
+        return sorted({min(self.budget, factor * n_free) for factor in self.per_parameter}) or [*self.several]
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,11 +215,11 @@ class Study:
         cases = cases_of(spec, model, registry, folder, where)
         for entry in entries:
             _check_noise(entry, cases, registry, where)
-        found = cls(spec, text, folder, cases, entries, registry)
-        if found.n_runs > MOST_RUNS:
-            raise ArmidError(f"{where}: {found.n_runs:,} runs are asked for (cases, identifiers, seeds, windows, "
+        study = cls(spec, text, folder, cases, entries, registry)
+        if study.n_runs > MOST_RUNS:
+            raise ArmidError(f"{where}: {study.n_runs:,} runs are asked for (cases, identifiers, seeds, windows, "
                              f"noises, fitnesses and budgets), at most {MOST_RUNS:,} are expected")  # fmt: skip
-        return found
+        return study
 
     def check(self, performed: Performer) -> None:
         """Simulate each case's truth once: the model is compiled and the machine moves; build identifiers of the user.
@@ -348,18 +348,19 @@ class Study:
         model, fitness = train[0].model, fitness_of_name(settings["fitness"], cache.registry.fitness)
         records = tuple(ready.record for ready in by_record(replays))
         campaign = Campaign(settings["case"], cache.folder, model.plant, (), records, {}, {})
-        found = identified(
+        identification = identified(
             campaign, train, holdout, case.space, fitness, identifier, settings["budget"], settings["seed"]
         )
-        if found.stopped == INTERRUPTED:
+        if identification.stopped == INTERRUPTED:
             # not what was asked for: the worker ends, and the run is given back
             raise KeyboardInterrupt
-        near, far = found.train, found.holdout
+        near, far = identification.train, identification.holdout
         errors = (near.rmse, near.s, near.s1, near.s2, None if far is None else far.rmse)
-        return Performed(found.used, case.equations, {
-            "identified": [(found.used, found.n_failed, found.value, found.stopped, *errors)],
-            "parameters": _parameter_rows(found),
-            "traces": [(json.dumps(case.space.free_names), packed(*found.trace, found.improved))],
+        return Performed(identification.used, case.equations, {
+            "identified": [(identification.used, identification.n_failed, identification.value, identification.stopped,
+                            *errors)],
+            "parameters": _parameter_rows(identification),
+            "traces": [(json.dumps(case.space.free_names), packed(*identification.trace, identification.improved))],
         })  # fmt: skip
 
 
@@ -464,12 +465,12 @@ def window_text(window: Sequence[float] | str) -> str:
     return window if isinstance(window, str) else f"{window[0]:g}-{window[1]:g} s"
 
 
-def _parameter_rows(found: Identification) -> list[tuple[Any, ...]]:
+def _parameter_rows(identification: Identification) -> list[tuple[Any, ...]]:
     """Return value, bounds, standard deviation, largest correlation and flag of each free parameter."""
-    information, free = found.information, found.space.only(found.space.free_names)
-    x, sizes = found.candidate[found.space.free], np.abs(information.correlation)
+    information, space = identification.information, identification.space
+    free, x, sizes = space.only(space.free_names), identification.candidate[space.free], np.abs(information.correlation)
     known = np.isfinite(sizes) & ~np.eye(len(sizes), dtype=bool)
-    largest = [float(row[there].max()) if there.any() else None for row, there in zip(sizes, known, strict=True)]
+    largest = [float(row[mask].max()) if mask.any() else None for row, mask in zip(sizes, known, strict=True)]
     columns = (free.names, free.units, x.tolist(), free.low.tolist(), free.high.tolist(),
-               information.deviation.tolist(), largest, found.at_bound[found.space.free].tolist())  # fmt: skip
+               information.deviation.tolist(), largest, identification.at_bound[space.free].tolist())  # fmt: skip
     return list(zip(*columns, strict=True))

@@ -29,7 +29,7 @@ from armid.study.tasks import Entry, Study
 
 
 def ranges_of(identifier: Identifier) -> dict[str, tuple[float, float]]:
-    options = ((each.name, each.metadata["option"].tune) for each in options_in(identifier.algorithm))
+    options = ((option.name, option.metadata["option"].tune) for option in options_in(identifier.algorithm))
     return {name: tune for name, tune in options if tune is not None}
 
 
@@ -68,23 +68,23 @@ def tune(
     for i in range(n):
         for entry in first.entries:
             own = tried[entry.label]
-            known = [(each.options, areas[each.label]) for each in own[1:]]
+            known = [(trial.options, areas[trial.label]) for trial in own[1:]]
             options = proposed(entry.name, known, (entry.seeds[0], i)) if i else {}
             # the same once more would tell nothing new
-            if all(each.options != options for each in own):
+            if all(trial.options != options for trial in own):
                 own.append(replace(entry, label=f"{entry.label} {i}", options=options))
-        study = replace(first, entries=tuple(each for own in tried.values() for each in own))
+        study = replace(first, entries=tuple(trial for own in tried.values() for trial in own))
         later = (n - 1 - i) * len(first.entries) * len(first.cases)
         endings.append(run(study, file, jobs, dask, out, progress=_with_later(progress, later)))
         if endings[-1].interrupted:
             return [], _together(endings, later)
         areas = scores(study, load_study(out))
-    found = []
+    tunings = []
     for label, own in tried.items():
         # the first of the best: nothing is returned where nothing surpasses the defaults
-        best = max(own, key=lambda each: areas[each.label])
-        found.append(Tuned(label, best.options, areas[own[0].label], areas[best.label]))
-    return found, _together(endings, 0)
+        best = max(own, key=lambda trial: areas[trial.label])
+        tunings.append(Tuned(label, best.options, areas[own[0].label], areas[best.label]))
+    return tunings, _together(endings, 0)
 
 
 def training(study: Study, seed: int) -> Study:
@@ -112,12 +112,12 @@ def training(study: Study, seed: int) -> Study:
 
 def tunable(study: Study) -> list[Entry]:
     """Return the identifiers whose options can be tuned, those of one label or of one budget once."""
-    found: list[Entry] = []
+    entries: list[Entry] = []
     for entry in study.entries:
-        same = any(e.label == entry.label or (e.name, e.budget) == (entry.name, entry.budget) for e in found)
+        same = any(e.label == entry.label or (e.name, e.budget) == (entry.name, entry.budget) for e in entries)
         if entry.name in RANGES and not entry.options and not same:
-            found.append(entry)
-    return found
+            entries.append(entry)
+    return entries
 
 
 def proposed(name: str, known: Iterable[tuple[Mapping[str, Any], float]], seed: Sequence[int]) -> dict[str, Any]:
@@ -146,17 +146,17 @@ def scores(study: Study, results: StudyResults) -> dict[str, float]:
     return {str(label): float(mean) for label, mean in means.items()} | dict.fromkeys(failed, 0.0)
 
 
-def tuned_study(study: Study, found: list[Tuned]) -> str:
+def tuned_study(study: Study, tunings: list[Tuned]) -> str:
     """Return the text of the study with the tuned identifiers behind the others, on the same budgets and seeds."""
     entries, spec = {entry.label: entry for entry in reversed(study.entries)}, study.spec
     # the study's own name comes before those in any table
     text = re.sub(r"(?m)^[ \t]*name[ \t]*=.*$", f'name = "{study.name}_tuned"', study.text.rstrip(), count=1)
-    for each in found:
-        if each.options:
-            entry = entries[each.label]
-            options = ", ".join(f"{name} = {value!r}" for name, value in each.options.items())
+    for tuning in tunings:
+        if tuning.options:
+            entry = entries[tuning.label]
+            options = ", ".join(f"{name} = {value!r}" for name, value in tuning.options.items())
             text += f'\n\n[[identifiers]]\nname = "{entry.name}"\n'
-            label = f"{each.label}, tuned"
+            label = f"{tuning.label}, tuned"
             while label in entries:  # of a study that was tuned before
                 label += " again"
             text += f"label = {json.dumps(label, ensure_ascii=False)}\n"
@@ -168,15 +168,15 @@ def tuned_study(study: Study, found: list[Tuned]) -> str:
     return f"{text}\n"
 
 
-def tuned_document(study: Study, found: Sequence[Tuned]) -> Document:
+def tuned_document(study: Study, tunings: Sequence[Tuned]) -> Document:
     """Return the answer in a sentence and the table of what was found; study: the one that is tuned."""
-    better = [each for each in found if each.options]
-    answer = f"of {len(found)} identifiers {len(better) or 'none'} {'are' if len(better) > 1 else 'is'} better tuned"
+    better = [tuning for tuning in tunings if tuning.options]
+    answer = f"of {len(tunings)} identifiers {len(better) or 'none'} {'are' if len(better) > 1 else 'is'} better tuned"
     if better:
-        most = max(better, key=lambda each: each.tuned - each.default)
+        most = max(better, key=lambda tuning: tuning.tuned - tuning.default)
         answer += f"; the largest gain is {most.label}, area {most.default:.3f} to {most.tuned:.3f}"
     rows = [(e.label, e.default, e.tuned, ", ".join(f"{name} = {value:.3g}" for name, value in e.options.items()))
-            for e in found]  # fmt: skip
+            for e in tunings]  # fmt: skip
     columns = ("identifier", Column("default", "area as it is", ".3f"), Column("tuned", "area tuned", ".3f"), "options")
     caption = ("Area over the convergence curve at the largest budget, mean over the training instances. The best of "
                "several is better on these by chance too: what it is worth the tuned study tells.")  # fmt: skip

@@ -61,11 +61,11 @@ class Undone:
     changes: tuple[tuple[int, tuple[Array, ...]], ...]
 
     def __call__(self, records: WhiteRecords, value: float) -> WhiteRecords:
-        share, found = value / self.size, records
+        share, undone = value / self.size, records
         weights = np.array([4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)])
         for index, changes in self.changes:
-            found = with_measured(found, index, [weights @ change for change in changes])
-        return found
+            undone = with_measured(undone, index, [weights @ change for change in changes])
+        return undone
 
 
 def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
@@ -82,7 +82,7 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
     if not known:
         return []
     held = {f.unknown.name for f in fit.others}
-    order, names, found = order_of(fit.records), list(fit.values), []
+    order, names, proposals = order_of(fit.records), list(fit.values), []
     for hypothesis in known:
         what: OfParameter = hypothesis.means
         if name_of(hypothesis) in held or (what.product is None and what.name not in names):
@@ -90,8 +90,8 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
         slope = what.product.slope if what.product is not None else fit.jacobian[:, names.index(what.name)]
         column = LARGEST * slope * order
         if column.any():
-            found.append(Proposal(hypothesis, column[np.newaxis], SCALES, np.zeros(1), partial(refit, hypothesis)))
-    return found
+            proposals.append(Proposal(hypothesis, column[np.newaxis], SCALES, np.zeros(1), partial(refit, hypothesis)))
+    return proposals
 
 
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:

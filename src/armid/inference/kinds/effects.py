@@ -72,14 +72,14 @@ def propose_with_free_shapes(
 def proposals(
     fit: Fit, keys: list[EffectKey], known: dict[EffectKey, Hypothesis], library: Library
 ) -> list[Proposal]:  # fmt: skip
-    each = library.each(lambda key: proposal(fit, known[key.declared], key, library), keys)
-    return [p for p in each if p is not None]
+    proposed = library.each(lambda key: proposal(fit, known[key.declared], key, library), keys)
+    return [p for p in proposed if p is not None]
 
 
 def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library) -> Proposal | None:
     records = beside(fit, (*fit.active, key), library)
-    every, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
-    grid = [replace(a, share=share) for a in every if a.share == every[0].share for share in SHARES]
+    activations, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
+    grid = [replace(a, share=share) for a in activations if a.share == activations[0].share for share in SHARES]
     moved = responses(fit, records, grid)
     good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
     if not len(good):
@@ -97,8 +97,8 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
     Viscous friction is the damping of a machine that has one: records cannot tell two shares of one quantity, and its
     interval would reach from none of it to all. Effect and parameter are moved side by side.
     """
-    found = library.each(lambda key: double(fit, key, library), library.joinable(()))
-    return {key: name for key, name in zip(library.joinable(()), found, strict=True) if name}
+    names = library.each(lambda key: double(fit, key, library), library.joinable(()))
+    return {key: name for key, name in zip(library.joinable(()), names, strict=True) if name}
 
 
 def double(fit: Fit, key: EffectKey, library: Library) -> str:
@@ -125,10 +125,10 @@ def double(fit: Fit, key: EffectKey, library: Library) -> str:
 
 def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
     """Return the problem with other effects on the records as a fit has them: its constants, faults and cover."""
-    posed = library.problem(active, fit.values)
+    problem = library.problem(active, fit.values)
     if fit.records.data.cover is not None:
-        posed = replace(posed, data=fit.records.data)
-    return moved(posed, [f.unknown for f in fit.others], [f.value for f in fit.others])
+        problem = replace(problem, data=fit.records.data)
+    return moved(problem, [f.unknown for f in fit.others], [f.value for f in fit.others])
 
 
 def refit(
@@ -140,34 +140,34 @@ def refit(
     begun: where its first steps led; the fit goes on from there.
     """
     active = (*fit.active, key)
-    posed = beside(fit, active, library)
+    problem = beside(fit, active, library)
     if begun is None:
-        starts = np.array(starts_of(fit, about, ahead, posed, library))
-        order = np.argsort(projected(fit, posed, about.scale.weight).chi2(starts), kind="stable")
+        starts = np.array(starts_of(fit, about, ahead, problem, library))
+        order = np.argsort(projected(fit, problem, about.scale.weight).chi2(starts), kind="stable")
         best = starts[order[:2]]
     else:
         best = begun[np.newaxis]
-    return fitted(fit, posed, active, list(best), library, about.scale.weight, limit)
+    return fitted(fit, problem, active, list(best), library, about.scale.weight, limit)
 
 
 def fitted(
-    fit: Fit, posed: WhiteRecords, active: tuple[EffectKey, ...], starts: list[Array], library: Library,
+    fit: Fit, problem: WhiteRecords, active: tuple[EffectKey, ...], starts: list[Array], library: Library,
     weight: float, limit: float = np.inf,
 ) -> Fit | None:  # fmt: skip
     """Return a model with other effects fitted roughly, its further unknowns those of a fit, free to move from there.
 
     Held where they are, constants that stand in for the new effect would leave nothing for it to explain.
-    posed: the problem with the values that the further unknowns have in the fit.
+    problem: with the values that the further unknowns have in the fit.
     """
     if not fit.others:
-        return unless_diverged(lambda: fit_from(posed, active, starts, rough=True, limit=limit))
+        return unless_diverged(lambda: fit_from(problem, active, starts, rough=True, limit=limit))
     base = base_of(fit, active, library)
     assert base is not None
-    chi2 = projected(fit, posed, weight).chi2(np.array(starts))
+    chi2 = projected(fit, problem, weight).chi2(np.array(starts))
     if not np.isfinite(chi2).any():
         return None
     z = starts[int(np.argmin(chi2))]
-    near = Fit(active, posed, z, posed.plain.residuals(z)[0], base=base, others=fit.others)
+    near = Fit(active, problem, z, problem.plain.residuals(z)[0], base=base, others=fit.others)
     return unless_diverged(lambda: freed(near, base, [f.unknown for f in fit.others], weight, limit, rough=True))
 
 
@@ -179,10 +179,10 @@ def base_of(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteR
 def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -> tuple[float, Array]:
     """Return where the first steps of a fit from the best start lead: the sum of squares, and the candidate."""
     key = ahead.proposal.hypothesis.means
-    posed = beside(fit, (*fit.active, key), library)
+    problem = beside(fit, (*fit.active, key), library)
     starts, projection = (
-        np.array(starts_of(fit, about, ahead, posed, library)),
-        projected(fit, posed, about.scale.weight),
+        np.array(starts_of(fit, about, ahead, problem, library)),
+        projected(fit, problem, about.scale.weight),
     )
     chi2 = projection.chi2(starts)
     best = starts[int(np.argmin(chi2))]
@@ -193,7 +193,7 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
 
 
 def starts_of(
-    fit: Fit, about: Expansion, ahead: Forecast, posed: WhiteRecords, library: Library
+    fit: Fit, about: Expansion, ahead: Forecast, problem: WhiteRecords, library: Library
 ) -> list[Array]:  # fmt: skip
     """Return extended candidates at expected and tried strengths, with the linear answer of the parameters."""
     starts, grid = [], ahead.proposal.grid
@@ -201,5 +201,5 @@ def starts_of(
         for share in dict.fromkeys((float(np.clip(strength, 0.01, library.reach)), grid[variant].share)):
             z = np.clip(fit.z - share * ahead.answer[: fit.n_free, variant], 0.01, 0.99)
             values = dict(zip(fit.values, fit.records.values(z), strict=True)) | grid[variant].at(share)
-            starts.append(np.clip(posed.shares(free_values(posed, values)), 1e-3, 1.0 - 1e-3))
+            starts.append(np.clip(problem.shares(free_values(problem, values)), 1e-3, 1.0 - 1e-3))
     return starts

@@ -164,23 +164,23 @@ def of_file(base: WhiteRecords, index: int) -> list[int]:
     return [i for i, r in enumerate(base.replays) if r.ready is base.replays[index].ready]
 
 
-def residual_of(posed: WhiteRecords, index: int, z: Array) -> Array:
+def residual_of(problem: WhiteRecords, index: int, z: Array) -> Array:
     """Return the whitened residual of the file of one record, the others' at 0, (n_samples,)."""
-    left = [np.zeros(r.record.n_samples) for r in posed.replays]
-    for i, simulated in zip(of_file(posed, index), simulated_file(posed, index, z), strict=True):
-        left[i] = posed.replays[i].measured - simulated[0]
-    return posed.data.white(left)
+    left = [np.zeros(r.record.n_samples) for r in problem.replays]
+    for i, simulated in zip(of_file(problem, index), simulated_file(problem, index, z), strict=True):
+        left[i] = problem.replays[i].measured - simulated[0]
+    return problem.data.white(left)
 
 
 def simulated_file(
-    posed: WhiteRecords, index: int, Z: Array, shares: Mapping[str, Array] | None = None
+    problem: WhiteRecords, index: int, Z: Array, shares: Mapping[str, Array] | None = None
 ) -> list[Array]:  # fmt: skip
     """Return the simulated signals of the outputs of the file of one record, each (n_candidates, n_samples of it).
 
     shares: see `ReadyRecord.runs`.
     """
-    replays = [posed.replays[i] for i in of_file(posed, index)]
-    return signals_of(replays, posed.whole(np.atleast_2d(Z)), shares)
+    replays = [problem.replays[i] for i in of_file(problem, index)]
+    return signals_of(replays, problem.whole(np.atleast_2d(Z)), shares)
 
 
 def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Array]:
@@ -188,14 +188,14 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
 
     From the simulated slope: that of the measured signal is mostly noise.
     """
-    found = []
+    changes = []
     for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
         replay, record = base.replays[i], base.data.each[i]
         step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
                                   for p, own in zip(replay.pieces, replay.record.samples, strict=True)])  # fmt: skip
-        found.append(-np.gradient(simulated[0], record.spacing) * (1.0 if fault.kind == "late" else step * samples))
-    return found
+        changes.append(-np.gradient(simulated[0], record.spacing) * (1.0 if fault.kind == "late" else step * samples))
+    return changes
 
 
 def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: float) -> Array:
@@ -214,9 +214,9 @@ def moved_by(base: WhiteRecords, index: int, z: Array, fault: Fault, value: floa
     if fault.kind in OF_TIMES:
         changes = [value * change for change in delayed(base, index, z, fault)]
     else:
-        there = with_record(base, index, fault, value)
-        before, after = (simulated_file(posed, index, z) for posed in (base, there))
-        changes = [there.replays[i].measured - base.replays[i].measured - y[0] + x[0]
+        faulty = with_record(base, index, fault, value)
+        before, after = (simulated_file(problem, index, z) for problem in (base, faulty))
+        changes = [faulty.replays[i].measured - base.replays[i].measured - y[0] + x[0]
                    for i, x, y in zip(inside, before, after, strict=True)]  # fmt: skip
     levels = [base.data.levels[i].rms for i in inside]
     return max(float(np.sqrt(np.mean(c**2))) / rms for c, rms in zip(changes, levels, strict=True))

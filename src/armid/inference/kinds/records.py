@@ -50,14 +50,16 @@ def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
     """Return what may be wrong in one of several records; a single record has nothing to compare it with."""
     if len(records.data.records) < 2:
         return []
-    found = []
+    faults = []
     for index, record in enumerate(records.data.each):
         for fault in faults_of(records, index):
             largest = 1.0 if fault.kind == "label" else fault.largest(record)
             place = f"{record.file}:{record.output}" if fault.kind in ("offset", "drift", "gain") else record.file
             name = f"{fault.kind}{'_' if fault.constant else ''}{fault.constant}@{place}"
-            found.append((name, OfRecord(index, fault, largest)))
-    return [Hypothesis("record", name, "", calibration().log_odds("record", len(found)), what) for name, what in found]
+            faults.append((name, OfRecord(index, fault, largest)))
+    return [
+        Hypothesis("record", name, "", calibration().log_odds("record", len(faults)), what) for name, what in faults
+    ]
 
 
 def propose(fit: Fit, known: list[Hypothesis], library: Library) -> list[Proposal]:
@@ -98,5 +100,5 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
 
 def relabelled(fit: Fit, what: OfRecord, limit: float) -> Fit:
     """Return the model with another load, or key, of a record than its file says."""
-    posed = what.moved(fit.records, 1.0)
-    return fit_from(posed, fit.active, [fit.z, np.full(fit.n_free, 0.5)], limit=limit)
+    problem = what.moved(fit.records, 1.0)
+    return fit_from(problem, fit.active, [fit.z, np.full(fit.n_free, 0.5)], limit=limit)

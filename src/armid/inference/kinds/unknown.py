@@ -41,11 +41,11 @@ class Signals:
 def signals_without_form(fit: Fit, library: Library) -> Signals:
     """Return the columns of signals at every port, scaled so that each moves all records by the noise rms."""
     records, n = fit.records, len(fit.residual)
-    whole = segments_about(records, fit.values, library)
-    if sum(len(s.residual) for s in whole) != n:
+    segments = segments_about(records, fit.values, library)
+    if sum(len(s.residual) for s in segments) != n:
         return Signals({})
     level = np.repeat([level.rms for level in records.data.levels], [sum(lengths) for lengths in records.data.lengths])
-    order = places_of(whole, fit)
+    order = places_of(segments, fit)
 
     def white(column: Array) -> Array:
         placed = np.empty_like(column)
@@ -53,32 +53,32 @@ def signals_without_form(fit: Fit, library: Library) -> Signals:
         parts = records.data.by_record((placed * level[:, np.newaxis]).T)
         return replace(records.data, cover=None).white(parts).T
 
-    found: dict[tuple[str, str], Array] = {}
-    duration = float(np.median([s.knots[-1] - s.knots[0] for s in whole]))
-    for port in whole[0].gains:
+    columns: dict[tuple[str, str], Array] = {}
+    duration = float(np.median([s.knots[-1] - s.knots[0] for s in segments]))
+    for port in segments[0].gains:
         for share in LENGTHS:
-            found[port, f"{TIME} ({share:g} of a record)"] = white(block_diag(*(
-                s.gains[port] @ process(s.knots, share * duration, MOST_IN_TIME) for s in whole)))  # fmt: skip
-        for variable in whole[0].variables:
-            for factor in whole[0].factors:
+            columns[port, f"{TIME} ({share:g} of a record)"] = white(block_diag(*(
+                s.gains[port] @ process(s.knots, share * duration, MOST_IN_TIME) for s in segments)))  # fmt: skip
+        for variable in segments[0].variables:
+            for factor in segments[0].factors:
                 if variable not in (factor, TIME):
                     name = variable if factor == "1" else f"{variable} x {factor}"
-                    found[port, name] = white(over_variable(whole, port, variable, factor))
-    sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in found.items()}
-    return Signals({key: column / sizes[key] for key, column in found.items()
+                    columns[port, name] = white(over_variable(segments, port, variable, factor))
+    sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in columns.items()}
+    return Signals({key: column / sizes[key] for key, column in columns.items()
                     if np.isfinite(sizes[key]) and sizes[key] > 0.0})  # fmt: skip
 
 
-def places_of(whole: list[Segment], fit: Fit) -> Array:
+def places_of(segments: list[Segment], fit: Fit) -> Array:
     """Return where the samples of the segments, outputs of a piece one behind the other, stand in the residual."""
     data = fit.records.data
     start = {replay: int(edge) for replay, edge in zip(fit.records.replays, data.edges, strict=False)}
-    found = []
-    for segment in whole:
+    places = []
+    for segment in segments:
         for replay in segment.replays:
             first = start[replay] + sum(replay.record.lengths[: segment.index])
-            found.append(first + np.arange(replay.record.lengths[segment.index]))
-    return np.concatenate(found)
+            places.append(first + np.arange(replay.record.lengths[segment.index]))
+    return np.concatenate(places)
 
 
 def process(times: Array, length: float, most: int) -> Array:
@@ -89,13 +89,13 @@ def process(times: Array, length: float, most: int) -> Array:
     return np.asarray(vectors[:, -n:] * np.sqrt(np.maximum(values[-n:], 0.0)))
 
 
-def over_variable(whole: list[Segment], port: str, variable: str, factor: str) -> Array:
+def over_variable(segments: list[Segment], port: str, variable: str, factor: str) -> Array:
     """Return the columns of a curve over a variable of the motion, (n_samples, n)."""
-    every = np.concatenate([s.variables[variable] for s in whole])
-    low, high = float(every.min()), float(every.max())
+    values = np.concatenate([s.variables[variable] for s in segments])
+    low, high = float(values.min()), float(values.max())
     curve = process(np.linspace(0.0, 1.0, N_KNOTS), LENGTH_OF_CURVE, N_CURVE)
     columns = []
-    for s in whole:
+    for s in segments:
         place = np.clip((s.variables[variable] - low) / (high - low), 0.0, 1.0) * (N_KNOTS - 1)
         hats = np.maximum(0.0, 1.0 - np.abs(place[:, np.newaxis] - np.arange(N_KNOTS)))
         columns.append(s.gains[port] @ (hats * s.factors[factor][:, np.newaxis]) @ curve)
@@ -120,19 +120,19 @@ def refit(
     """Return the model with a signal without a form: fitted with its covariance, taken about its own estimate."""
     again, scale = fit, ahead.best(1)[0][1]
     for _ in range(2):
-        every = signals_without_form(with_cover(again, None), library).columns
-        columns = every.get(which)
+        signals = signals_without_form(with_cover(again, None), library).columns
+        columns = signals.get(which)
         if columns is None:
             return None
         cover = Cover.of(scale * columns)
-        posed = with_cover(again, cover)
-        tried = unless_diverged(lambda: fitted(posed, fit.others, about.scale.weight))  # noqa: B023
+        problem = with_cover(again, cover)
+        tried = unless_diverged(lambda: fitted(problem, fit.others, about.scale.weight))  # noqa: B023
         if tried is None:
             return None
         again = tried
     # The likeliest variable is a guess, and by a wrong one a model with wrong parameters can leave noise alone: its
     # variance once more, spread evenly over the curves of all variables at all ports.
-    curves = [column for (_, variable), column in every.items() if not variable.startswith(TIME)]
+    curves = [column for (_, variable), column in signals.items() if not variable.startswith(TIME)]
     if not curves:
         return again
     return with_cover(again, cover.with_elsewhere(scale / np.sqrt(len(curves)) * np.hstack(curves)))

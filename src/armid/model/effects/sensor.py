@@ -17,30 +17,30 @@ def sensor_effects(plant: Plant) -> dict[str, Effect]:
 
     Scale, delay and lag need what the sensor sees: the signal is that and the port, and of a lag it is a state.
     """
-    found = [e for o in plant.outputs if o.port not in ("", "output") for e in effects_at(o, plant)]
-    return {e.name: e for e in found}
+    effects = [e for o in plant.outputs if o.port not in ("", "output") for e in effects_at(o, plant)]
+    return {e.name: e for e in effects}
 
 
 def effects_at(output: Output, plant: Plant) -> list[Effect]:
     of, source = f"of {output.name}", "Doebelin, Measurement Systems, chapter 3"
     bias = Parameter("bias", SCALES.get(output.unit, output.unit), -0.1, 0.1, null=0.0)
-    found = [Effect(f"{output.name}_bias", (bias,), {output.port: bias_error}, note=f"constant error {of}",
-                    source=source)]  # fmt: skip
+    effects = [Effect(f"{output.name}_bias", (bias,), {output.port: bias_error}, note=f"constant error {of}",
+                      source=source)]  # fmt: skip
     asked = signature(plant.quantities[output.signal]).parameters if output.signal in plant.quantities else ()
     seen = [plant.aliases.get(name, name) for name in asked if name != output.port]
     if len(seen) != 1:
-        return found
+        return effects
     binds = {"omega": seen[0]}
-    found.append(Effect(f"{output.name}_scale", gyro_scale.parameters, {output.port: scale_error}, binds=binds,
-                        note=f"error {of} in proportion to it", source=source))  # fmt: skip
-    found.append(Effect(f"{output.name}_delay", output_delay.parameters, {output.port: delay_error}, binds=binds,
-                        delays=output_delay.delays, note=f"{output.name} is recorded late by a dead time",
-                        source=source))  # fmt: skip
+    effects.append(Effect(f"{output.name}_scale", gyro_scale.parameters, {output.port: scale_error}, binds=binds,
+                          note=f"error {of} in proportion to it", source=source))  # fmt: skip
+    effects.append(Effect(f"{output.name}_delay", output_delay.parameters, {output.port: delay_error}, binds=binds,
+                          delays=output_delay.delays, note=f"{output.name} is recorded late by a dead time",
+                          source=source))  # fmt: skip
     if seen[0] in {s.name for s in plant.states}:
         states = (State("lagging", output.unit, lagging_rate, start_speed),)
-        found.append(Effect(f"{output.name}_lag", output_lag.parameters, {output.port: lag_error}, states, binds=binds,
-                            note=f"{output.name} lags, first order", source=source))  # fmt: skip
-    return found
+        effects.append(Effect(f"{output.name}_lag", output_lag.parameters, {output.port: lag_error}, states,
+                              binds=binds, note=f"{output.name} lags, first order", source=source))  # fmt: skip
+    return effects
 
 
 def lag_error(time_constant, lagging, omega):

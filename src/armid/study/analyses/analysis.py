@@ -60,8 +60,8 @@ def histories(
     # ends at the best fitness that any of them found with the same seed, that is on the same noise, or at the truth's
     problem = ["case", "setting", "fitness"]
     starts = runs.assign(first=firsts).groupby(problem)["first"].transform("median").to_numpy()
-    found = runs.groupby([*problem, "seed"])["value"].transform("min")
-    bests = runs["case"].map(floors).astype(float).fillna(found).to_numpy()
+    minima = runs.groupby([*problem, "seed"])["value"].transform("min")
+    bests = runs["case"].map(floors).astype(float).fillna(minima).to_numpy()
     cases = runs["case"].to_numpy()
     kept = Histories(grid, *(np.full((len(place), n), np.inf, np.float32)
                              for n in (TARGETS.size, TARGETS.size, grid.size, grid.size)))  # fmt: skip
@@ -162,25 +162,25 @@ class Evidence:
             budgets = self.runs["budget"].map("{:,}".format)
             self.runs["setting"] += ", " + budgets + " simulations"
         noise = self.runs["noise_deg_s"].map(partial(noise_text, unit=self.unit))
-        whole = self.runs.assign(noise=noise, budget=budgets)
-        self._apart = whole.drop_duplicates("setting").set_index("setting")[list(APART)]
+        runs = self.runs.assign(noise=noise, budget=budgets)
+        self._apart = runs.drop_duplicates("setting").set_index("setting")[list(APART)]
         keys = ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]
         done = self.runs.loc[self.runs["status"] == "done", keys]
         self.estimates = done.merge(self.parameters, on="run", how="inner", sort=False)
 
     def apart(self, part: P) -> P:
         """Return a table in which noise, window and budget have columns of their own, as far as they differ."""
-        several = [key for key in APART if self._apart[key].nunique() > 1]
-        if not isinstance(part, Table) or not isinstance(part.frame, DataFrame) or not several:
+        keys = [key for key in APART if self._apart[key].nunique() > 1]
+        if not isinstance(part, Table) or not isinstance(part.frame, DataFrame) or not keys:
             return part
         place = next((i for i, column in enumerate(part.columns) if column.key == "setting"), None)
         if place is None:
             return part
         settings = part.frame["setting"]
-        columns = {f"setting_{key}": settings.map(self._apart[key]).fillna("") for key in several}
+        columns = {f"setting_{key}": settings.map(self._apart[key]).fillna("") for key in keys}
         # a row of no run of ours, such as the paper's, says itself where it comes from
-        columns[f"setting_{several[0]}"] += settings.where(~settings.isin(self._apart.index), "")
-        own = tuple(Column(f"setting_{key}", key) for key in several)
+        columns[f"setting_{keys[0]}"] += settings.where(~settings.isin(self._apart.index), "")
+        own = tuple(Column(f"setting_{key}", key) for key in keys)
         kept = (*part.columns[:place], *own, *part.columns[place + 1 :])
         return replace(part, frame=part.frame.assign(**columns), columns=kept)
 
@@ -200,8 +200,8 @@ class Evidence:
 
     @cached_property
     def cases(self) -> list[str]:
-        there = set(self.runs["case"])
-        return [str(c["name"]) for c in self.study["cases"] if c["name"] in there]
+        names = set(self.runs["case"])
+        return [str(c["name"]) for c in self.study["cases"] if c["name"] in names]
 
     @property
     def knows_truth(self) -> bool:
@@ -266,8 +266,8 @@ class Evidence:
         """Return what a function makes of the runs at a setting; section and answer share it."""
         if (make, setting) not in self._made:
             self._made[make, setting] = make(self, setting)
-        found: T = self._made[make, setting]
-        return found
+        outcome: T = self._made[make, setting]
+        return outcome
 
 
 def is_swarm(variant: str) -> bool:

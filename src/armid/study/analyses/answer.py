@@ -116,8 +116,8 @@ def own(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     """Return where the identifiers of plug-ins stand."""
     said = []
     for setting in noisy_first(evidence)[:MOST_SETTINGS]:
-        there = frame[(frame["setting"] == setting) & (frame["variant"] != PAPER)]
-        medians = there.set_index("variant")["largest_median"]
+        rows = frame[(frame["setting"] == setting) & (frame["variant"] != PAPER)]
+        medians = rows.set_index("variant")["largest_median"]
         for variant in medians.index:
             if variant in evidence.own:
                 place = 1 + int((medians < medians[variant]).sum())

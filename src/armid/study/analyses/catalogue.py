@@ -37,30 +37,30 @@ def own_sections(own: OwnAnalyses, runs: DataFrame) -> tuple[Section, ...]:
     pyplot()
     sections = []
     for name, function in own.items():
-        found = parts_of(name, function(runs.copy()))
-        files = unlike([slug("own", name, title if title != name else "") for title in found])
-        parts = [part(file, title, one) for file, (title, one) in zip(files, found.items(), strict=True)]
+        contents = parts_of(name, function(runs.copy()))
+        files = unlike([slug("own", name, title if title != name else "") for title in contents])
+        parts = [part(file, title, one) for file, (title, one) in zip(files, contents.items(), strict=True)]
         if parts:
             sections.append(Section(name.replace("_", " ").capitalize(), tuple(parts)))
     return tuple(sections)
 
 
-def parts_of(name: str, found: Any) -> dict[str, Any]:
+def parts_of(name: str, output: Any) -> dict[str, Any]:
     """Return title -> DataFrame or matplotlib figure of what an analysis returned.
 
-    found: a DataFrame, a figure (or what carries one, such as axes), or a dict, tuple or list of these; None: nothing.
+    output: a DataFrame, a figure (or what carries one, such as axes), or a dict, tuple or list of these; None: nothing.
     """
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    if found is None:
+    if output is None:
         return {}
-    if isinstance(found, Mapping):
-        titled = {str(title): part for title, part in found.items()}
-    elif isinstance(found, tuple | list):
-        titled = {f"{name} {i}": part for i, part in enumerate(found, 1)}
+    if isinstance(output, Mapping):
+        titled = {str(title): part for title, part in output.items()}
+    elif isinstance(output, tuple | list):
+        titled = {f"{name} {i}": part for i, part in enumerate(output, 1)}
     else:
-        titled = {name: found}
+        titled = {name: output}
     parts = {title: part if isinstance(part, DataFrame) else getattr(part, "figure", part)
              for title, part in titled.items()}  # fmt: skip
     for title, part in parts.items():
@@ -75,10 +75,10 @@ def parts_of(name: str, found: Any) -> dict[str, Any]:
     return parts
 
 
-def part(file: str, title: str, found: Any) -> Part:
-    if not isinstance(found, DataFrame):
-        return Figure(file, title, "", lambda: found)
-    frame = found if isinstance(found.index, RangeIndex) else found.reset_index()
+def part(file: str, title: str, content: Any) -> Part:
+    if not isinstance(content, DataFrame):
+        return Figure(file, title, "", lambda: content)
+    frame = content if isinstance(content.index, RangeIndex) else content.reset_index()
     frame = frame.set_axis([" ".join(map(str, c)).strip() if isinstance(c, tuple) else str(c) for c in frame], axis=1)
     columns = tuple(Column(str(c), str(c), digits(frame[c].dtype)) for c in frame)
     # what is missing in a column of a pandas type of its own is not a number

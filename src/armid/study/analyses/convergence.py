@@ -31,8 +31,8 @@ def parts(evidence: Evidence) -> Sequence[Part]:
         return ()
     kept, figures = evidence.histories, []
     if evidence.knows_truth:
-        every = np.ones(len(evidence.runs), bool)
-        draw = partial(convergence_figure, evidence, every, 100.0 * kept.errors, ERROR_LABEL, LEAST_PERCENT)
+        mask = np.ones(len(evidence.runs), bool)
+        draw = partial(convergence_figure, evidence, mask, 100.0 * kept.errors, ERROR_LABEL, LEAST_PERCENT)
         figures.append(Figure("convergence_error", "Convergence of the parameters", ERROR_CAPTION, draw))
     names = list(dict.fromkeys(map(str, evidence.runs["fitness"])))
     for name in names:
@@ -50,8 +50,8 @@ CONVERGENCE = Analysis("convergence", "Convergence", parts, "error and fitness a
 
 def median(held_values: Array) -> Array:
     """Return the median at each count of simulations, (n_grid,), a value that a run had."""
-    found: Array = np.quantile(held_values, 0.5, axis=0, method="inverted_cdf").astype(float)
-    return found
+    medians: Array = np.quantile(held_values, 0.5, axis=0, method="inverted_cdf").astype(float)
+    return medians
 
 
 def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array, label: str, floor: float) -> Any:
@@ -64,12 +64,12 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
     for setting, variants in evidence.groups.items():
         for variant, rows in variants.items():
             if own[rows].any():
-                found = median(values[rows[own[rows]]])
+                medians = median(values[rows[own[rows]]])
                 spent = grid > evidence.runs["budget"].to_numpy()[rows[own[rows]]].max()
-                shown = np.where(np.isfinite(found) & ~spent, np.maximum(found, floor), np.nan)
+                shown = np.where(np.isfinite(medians) & ~spent, np.maximum(medians, floor), np.nan)
                 curves.setdefault(setting, {})[variant] = shown
-    every = np.concatenate([line[np.isfinite(line)] for lines in curves.values() for line in lines.values()])
-    limits = (float(every.min()) / 1.6, float(every.max()) * 1.6) if every.size else (0.1, 1.0)
+    finite = np.concatenate([line[np.isfinite(line)] for lines in curves.values() for line in lines.values()])
+    limits = (float(finite.min()) / 1.6, float(finite.max()) * 1.6) if finite.size else (0.1, 1.0)
     figure = line_panels([(setting, grid, lines) for setting, lines in curves.items()], evidence.colours,
                          xscale="log", yscale="log", xlim=(1, max(grid[-1], 2)), ylim=limits, xlabel="simulations",
                          ylabel=label)  # fmt: skip
@@ -110,8 +110,8 @@ def area_over_curve(hits: Array, budget: Array) -> Array:
 
 
 def areas(evidence: Evidence) -> Table:
-    found = area_over_curve(evidence.histories.value_hits, evidence.runs["budget"].to_numpy(float))
-    groups = evidence.runs.assign(area=found).groupby(["setting", "variant"], sort=False)["area"]
+    area = area_over_curve(evidence.histories.value_hits, evidence.runs["budget"].to_numpy(float))
+    groups = evidence.runs.assign(area=area).groupby(["setting", "variant"], sort=False)["area"]
     frame = groups.describe()[["count", "mean", "25%", "50%", "75%"]].reset_index()
     place = {setting: i for i, setting in enumerate(evidence.settings)}
     frame = frame.assign(_at=frame["setting"].map(place)).sort_values(["_at", "mean"], ascending=[True, False])

@@ -93,10 +93,10 @@ def efficiencies(estimates: DataFrame) -> DataFrame:
     for key, group in usable.groupby(keys, sort=False):
         if len(group) >= LEAST_REALISATIONS:
             bound, truth = float(group["deviation"].median()), float(group["truth"].iloc[0])
-            found = efficiency(group["value"], truth, bound)
-            verdict = "yes" if EFFICIENT[0] <= found["ratio"] <= EFFICIENT[1] else "no"
+            statistics = efficiency(group["value"], truth, bound)
+            verdict = "yes" if EFFICIENT[0] <= statistics["ratio"] <= EFFICIENT[1] else "no"
             more = {"n_at_bound": int(group["at_bound"].sum()), "verdict": verdict}
-            rows.append(dict(zip(keys, key, strict=True)) | found | more)
+            rows.append(dict(zip(keys, key, strict=True)) | statistics | more)
     return DataFrame(rows)
 
 

@@ -49,8 +49,8 @@ ERRORS = Analysis("errors", "Where the errors are", parts, "largest error by ide
 
 def error_map(runs: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
     medians = runs.groupby(["variant", "case"], sort=False)["largest_error"].median().unstack("case")
-    there = [v for v in variants if v in medians.index]
-    return medians.reindex(index=there, columns=[c for c in cases if c in medians.columns])
+    shown = [v for v in variants if v in medians.index]
+    return medians.reindex(index=shown, columns=[c for c in cases if c in medians.columns])
 
 
 def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
@@ -115,11 +115,11 @@ def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
     names = [c for c in ends.columns if c not in ("variant", "setting")]
     chosen = [v for v in sorted(colours, key=lambda v: colours[v]) if colours[v] < MOST_NAMED]
     shown = thinned(ends.assign(shown=ends["variant"].where(ends["variant"].isin(chosen), OTHERS)))
-    there = [v for v in (OTHERS, *chosen) if v in set(shown["shown"])]
-    palette = {v: PALE if v == OTHERS else COLOURS[colours[v]] for v in there}
-    marks = ["." if v == OTHERS else MARKERS[colours[v]] for v in there]
+    hues = [v for v in (OTHERS, *chosen) if v in set(shown["shown"])]
+    palette = {v: PALE if v == OTHERS else COLOURS[colours[v]] for v in hues}
+    marks = ["." if v == OTHERS else MARKERS[colours[v]] for v in hues]
     with no_formulas():
-        grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=there, palette=palette, corner=True, height=2.9,
+        grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=hues, palette=palette, corner=True, height=2.9,
                             hue_kws={"marker": marks})  # fmt: skip
         grid.map_lower(scatter)
         grid.map_diag(histogram)

@@ -24,13 +24,13 @@ CAMPAIGNS_COLUMNS = (
 def loop_runs(loops: DataFrame) -> DataFrame:
     """Return one row a campaign that was closed: verdict, effects, error on the records held out over the noise."""
     reports = loops["report"]
-    found = loops[["case", "verdict"]].assign(
+    runs = loops[["case", "verdict"]].assign(
         plant=[report["plant"] for report in reports],
         effects=[" + ".join(report["effects"]) or "nothing" for report in reports],
         before=[over_noise(report, "before") for report in reports],
         after=[over_noise(report, "after") for report in reports],
     )
-    return found.join(loops[["cpu_seconds", "seconds"]])
+    return runs.join(loops[["cpu_seconds", "seconds"]])
 
 
 def over_noise(report: Mapping[str, Any], when: str) -> float:

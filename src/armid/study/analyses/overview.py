@@ -53,8 +53,9 @@ def main_table(evidence: Evidence) -> Table:
 
 OVERVIEW = Analysis("overview", "Overview", lambda evidence: (main_table(evidence),),
                     "errors of all identifiers, without truths their values")  # fmt: skip
-RUNS = Analysis("runs", "Runs", lambda found: (runs_table(found.runs, found.parameters), reasons(found.runs)),
-                "what was run, and why runs stopped")  # fmt: skip
+RUNS = Analysis("runs", "Runs", lambda evidence: (
+    runs_table(evidence.runs, evidence.parameters), reasons(evidence.runs),
+), "what was run, and why runs stopped")  # fmt: skip
 
 
 def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Table:

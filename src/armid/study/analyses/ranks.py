@@ -168,8 +168,8 @@ def friedman(blocks: Array) -> tuple[float, float]:
     n_cases, n_variants = blocks.shape
     if n_variants < 3 or n_cases < 2 or (blocks == blocks[:, :1]).all():
         return np.nan, np.nan
-    found = friedmanchisquare(*blocks.T)
-    return float(found.statistic), float(found.pvalue)
+    test = friedmanchisquare(*blocks.T)
+    return float(test.statistic), float(test.pvalue)
 
 
 def pair_tests(blocks: DataFrame, runs: DataFrame) -> DataFrame:
@@ -318,13 +318,13 @@ def final_values(evidence: Evidence, setting: str) -> DataFrame:
 
 def class_ranks(evidence: Evidence) -> Table:
     problem_of, class_of = ({c["name"]: c[key] for c in evidence.study["cases"]} for key in ("suite", "difficulty"))
-    there, rows = [name for name in CLASSES if name in class_of.values()], []
+    present, rows = [name for name in CLASSES if name in class_of.values()], []
     for setting in evidence.settings:
         ranks = final_values(evidence, setting).rank(axis=1)
         if ranks.empty:
             continue
         problems = ranks.groupby(ranks.index.map(problem_of)).mean()
-        classes = ranks.groupby(ranks.index.map(class_of)).mean().reindex(there)
+        classes = ranks.groupby(ranks.index.map(class_of)).mean().reindex(present)
         drawn = np.random.default_rng(1).integers(0, len(problems), (N_BOOTSTRAP, len(problems)))
         best = ranks.min(axis=1)
         for variant, mean in ranks.mean().sort_values(kind="stable").items():
@@ -332,9 +332,9 @@ def class_ranks(evidence: Evidence) -> Table:
             n_first = int((ranks[variant] <= best).sum())
             text = f"{mean:.2f} ({low:.2f} to {high:.2f})"
             rows.append((setting, variant, len(ranks), mean, low, high, text, n_first, *classes[variant]))
-    names = ["setting", "variant", "n", "rank", "low", "high", "text", "first", *there]
+    names = ["setting", "variant", "n", "rank", "low", "high", "text", "first", *present]
     columns = (BUDGET, VARIANT, Column("n", "cases", ".0f"), Column("text", "mean rank"),
-               Column("first", "first", ".0f"), *(Column(c, c, ".2f") for c in there))  # fmt: skip
+               Column("first", "first", ".0f"), *(Column(c, c, ".2f") for c in present))  # fmt: skip
     return Table("by_class", "Ranks by class of difficulty", CLASS_CAPTION, DataFrame(rows, columns=names), columns,
                  grouped=True)  # fmt: skip
 

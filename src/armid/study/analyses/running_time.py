@@ -110,8 +110,8 @@ def line_panels(
     width: float = 7.8, **axes: Any,
 ) -> Any:  # fmt: skip
     """Draw one panel each with a line for each identifier. curves: title, x, and name -> y; axes: scales and labels."""
-    figure, there = panels(len(curves), columns, width, LEAST_HEIGHT)
-    for axis, (title, x, lines) in zip(there, curves, strict=True):
+    figure, cells = panels(len(curves), columns, width, LEAST_HEIGHT)
+    for axis, (title, x, lines) in zip(cells, curves, strict=True):
         axis.set(title=title, **axes)
         named_lines(axis, x, lines, colours)
         axis.grid(alpha=0.3)

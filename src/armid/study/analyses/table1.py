@@ -129,10 +129,10 @@ def table1_rows(estimates: DataFrame, published: DataFrame) -> DataFrame:
     rows: list[dict[Any, Any]] = []
     for (setting, variant), own in both.groupby(["setting", "variant"], sort=False):
         names = {"setting": setting, "variant": variant}
-        found = [names | {"case": case, "parameter": parameter} | one_row(group)
-                 for (case, parameter), group in own.groupby(["case", "parameter"], sort=False)]  # fmt: skip
-        rows += found
-        groups = DataFrame(found).groupby("parameter", sort=False)
+        entries = [names | {"case": case, "parameter": parameter} | one_row(group)
+                   for (case, parameter), group in own.groupby(["case", "parameter"], sort=False)]  # fmt: skip
+        rows += entries
+        groups = DataFrame(entries).groupby("parameter", sort=False)
         means = groups[AVERAGED].mean().assign(n=groups["n"].sum(), case=MEAN_ROW, unit="").reset_index()
         rows += [names | mean for mean in means.to_dict("records")]
     return DataFrame(rows)
@@ -173,14 +173,14 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) 
     # ranks instead of values where some are infinite: the bootstrap subtracts, and inf - inf is not a number
     finite = bool(np.isfinite(sample).all())
     resampled = sample if finite else np.arange(sample.size, dtype=np.float64)
-    found = bootstrap(
+    interval = bootstrap(
         (resampled,), np.median, n_resamples=RESAMPLES, batch=max(1, BATCH_NUMBERS // sample.size),
         confidence_level=confidence, method="percentile", rng=np.random.default_rng(seed),
     ).confidence_interval  # fmt: skip
     if finite:
-        return float(found.low), float(found.high)
+        return float(interval.low), float(interval.high)
     # between two ranks the mean of their values
-    low, high = (float(sample[[int(np.floor(r)), int(np.ceil(r))]].mean()) for r in (found.low, found.high))
+    low, high = (float(sample[[int(np.floor(r)), int(np.ceil(r))]].mean()) for r in (interval.low, interval.high))
     return low, high
 
 
