@@ -34,7 +34,7 @@ def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, monkeypatch):
     effect, shape, expected, within = SHAPES[name]
     campaign = read_campaign(stand(*MANOEUVRES, "--effect", *effect))
     monkeypatch.setattr(Library, "joinable", lambda _, active: [] if active else [EffectKey(name)])
-    found = infer(*prepared(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in SHAPES})).found
+    found = infer(*prepared(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in SHAPES})).exploration
     best, _ = found.ranked()[0]
     assert {h.public for h in best} == {("effect", name)}
     fit = found.fits[best]
@@ -47,9 +47,9 @@ def test_another_form_of_an_effect_takes_its_place(stand):
     """As the square of the current, what saturates otherwise looks like another effect; its own form is asked for."""
     campaign = read_campaign(stand(*MANOEUVRES, "--effect", "flux_saturation=90", "coulomb=40"))
     found = infer(*prepared(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in ("flux_saturation", "coulomb")}))
-    best = {h.name: h.form for h in found.found.ranked()[0][0]}
+    best = {h.name: h.form for h in found.exploration.ranked()[0][0]}
     assert best == {"coulomb": "", "flux_saturation": ""}
-    assert "arctangent" in {h.form for model in found.found.fits for h in model if len(model) == 2}
+    assert "arctangent" in {h.form for model in found.exploration.fits for h in model if len(model) == 2}
     assert found.probabilities["effects"]["flux_saturation"] > 0.95
 
 
@@ -57,7 +57,7 @@ def test_another_form_of_an_effect_takes_its_place(stand):
 def test_a_fault_that_an_effect_makes_needless_is_dropped(stand, monkeypatch):
     """It took the place of the effect and keeps it with no size: a sound record would be accused."""
     campaign = replace(read_campaign(stand(*MANOEUVRES, "--effect", "supply_sag=0.03")), tolerances={})
-    found = infer(*prepared(Model(campaign.plant), campaign, {"supply_sag": EFFECTS["supply_sag"]})).found
+    found = infer(*prepared(Model(campaign.plant), campaign, {"supply_sag": EFFECTS["supply_sag"]})).exploration
     best, _ = found.ranked()[0]
     assert {h.public for h in best} == {("effect", "supply_sag")}
     right = found.fits.pop(best)

@@ -49,7 +49,7 @@ def off_by(found):
 
 def fits_of(found):
     """Return what each model leaves, by the names of its hypotheses."""
-    return {tuple(sorted(model)): fit.chi2 for model, fit in found.inference.found.fits.items()}
+    return {tuple(sorted(model)): fit.chi2 for model, fit in found.inference.exploration.fits.items()}
 
 
 def test_control_is_left_alone(closed):

@@ -141,11 +141,11 @@ def test_the_way_to_a_model_goes_by_its_most_probable_parts():
     whole = frozenset({a, b, c, LATE})
     known = {whole: 9.0, whole - {a}: 5.0, whole - {b}: 6.0, whole - {c}: 1.0, frozenset({a, LATE}): 2.0,
              frozenset({c, LATE}): 3.0}  # fmt: skip
-    found = SimpleNamespace(in_force=whole, found=SimpleNamespace(fits=known, log_posterior=known.__getitem__))
+    found = SimpleNamespace(in_force=whole, exploration=SimpleNamespace(fits=known, log_posterior=known.__getitem__))
     assert path_of(found) == [frozenset(), frozenset({c, LATE}), whole - {b}, whole]
-    alone = SimpleNamespace(in_force=frozenset({LATE}), found=found.found)
+    alone = SimpleNamespace(in_force=frozenset({LATE}), exploration=found.exploration)
     assert path_of(alone) == [frozenset(), frozenset({LATE})]
-    assert path_of(SimpleNamespace(in_force=frozenset(), found=found.found)) == [frozenset()]
+    assert path_of(SimpleNamespace(in_force=frozenset(), exploration=found.exploration)) == [frozenset()]
 
 
 @pytest.mark.parametrize(("p", "at_a_limit", "has_arrived", "claimed"), [

@@ -77,7 +77,7 @@ def test_the_start_of_a_record_held_out_does_not_judge(closed) -> None:
     piece = closed.campaign.holdout[0].pieces[0]
     assert (piece.n_spent, piece.window.start) == (35, 35)
     assert closed.after.holdout.replays[0].pieces[0].manoeuvre.constants == piece.manoeuvre.constants
-    again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.inference.found.library)
+    again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.inference.exploration.library)
     np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
 
 

@@ -62,14 +62,14 @@ class Interval:
 class Inference:
     """Hold the models that were fitted, and the posterior over them."""
 
-    found: Exploration
+    exploration: Exploration
     posterior: Posterior
     standing: Hypotheses | None = None
 
     @property
     def best(self) -> Fit:
         """The most probable model."""
-        return self.found.fits[self.found.ranked()[0][0]]
+        return self.exploration.fits[self.exploration.ranked()[0][0]]
 
     @cached_property
     def in_force(self) -> Hypotheses:
@@ -79,14 +79,14 @@ class Inference:
         """
         if self.standing is not None:
             return self.standing
-        named = [m for m, _ in self.found.ranked() if not any(h.kind == "unknown" for h in m)]
+        named = [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
         if self.posterior.probability("unknown") < MENTIONED:
             return named[0]
-        return predicting_best(named, self.found.fits, self.found.library)
+        return predicting_best(named, self.exploration.fits, self.exploration.library)
 
     def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
-        exploration = without_denied(self.found, denied, standing)
+        exploration = without_denied(self.exploration, denied, standing)
         return Inference(exploration, posterior(exploration), standing)
 
     def after_holdout(self, over: Sequence[bool]) -> "Inference":
@@ -106,7 +106,7 @@ class Inference:
             With the same model in force.
         """
         expected, n, k = calibration().expected, len(over), sum(over)
-        fault = min(expected["record"] / (n + len(self.found.declared.records.data.records)), 0.5)
+        fault = min(expected["record"] / (n + len(self.exploration.declared.records.data.records)), 0.5)
         wrong = expected["unknown"] / ((n + 1) * comb(n, k))
         faults = (1.0 - expected["unknown"]) * fault**k * (1.0 - fault) ** (n - k)
         return replace(self, posterior=self.posterior.with_unseen(wrong / (wrong + faults)), standing=self.in_force)
@@ -143,8 +143,8 @@ class Inference:
     @cached_property
     def intervals(self) -> dict[str, Interval]:
         """Of each parameter of the declared model, about the model in force."""
-        fit, intervals = self.found.fits[self.in_force], {}
-        alone = Expansion(replace(fit, others=()), self.found.scale(), self.found.library,
+        fit, intervals = self.exploration.fits[self.in_force], {}
+        alone = Expansion(replace(fit, others=()), self.exploration.scale(), self.exploration.library,
                           np.empty((len(fit.residual), 0)))  # fmt: skip
         of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(alone.spread)), strict=True))
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
@@ -164,7 +164,7 @@ class Inference:
 
         That of noise is the one of `identify`: what the model leaves counts as noise.
         """
-        exploration, fit = self.found, self.found.fits[model]
+        exploration, fit = self.exploration, self.exploration.fits[model]
         expansion, n = expansion_of(fit, exploration.scale(), exploration.library), fit.n_free
         narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(expansion.spread)[:n])
         wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))

@@ -22,7 +22,7 @@ def advice_on(
     if len(rivals) < 2:
         return ()
     say(f"looking for a manoeuvre that tells {' and '.join(r.name for r in rivals)} apart")
-    best = inference.found.fits[inference.in_force]
+    best = inference.exploration.fits[inference.in_force]
     replays, levels = best.records.replays, best.records.data.levels
     # of each output the first level, in the order in which `Motions.signals` gives them
     known = dict(sorted(((r.place, level) for r, level in reversed([*zip(replays, levels, strict=True)])),
@@ -38,13 +38,13 @@ def advice_on(
 
 def rivals_of(inference: Inference) -> list[Rival]:
     """Return the most probable models without faults of records whose effects differ, one for each set of names."""
-    ranked = [(m, p) for m, p in inference.found.ranked() if all(h.kind == "effect" for h in m)]
+    ranked = [(m, p) for m, p in inference.exploration.ranked() if all(h.kind == "effect" for h in m)]
     rivals: dict[str, Rival] = {}
     for model, p in ranked:
         name = words(model)
         if ranked[0][1] - p > WINDOW or len(rivals) == MOST_RIVALS:
             break
-        fit = inference.found.fits[model]
+        fit = inference.exploration.fits[model]
         # What a sample counts, and one of a record like these will: less than 1 where more than noise is left.
         trust = float(np.mean(fit.records.data.trust(fit.residual)))
         rivals.setdefault(name, Rival(name, fit.records, fit.z, -2.0 * p, trust))

@@ -118,7 +118,7 @@ def close_loop(
     if any(not s.record and s.kind != "input" for s in gross):
         library = replace(library, candidates={}, bundles=())
     inference = infer(library, declared)
-    best = inference.found.fits[inference.in_force]
+    best = inference.exploration.fits[inference.in_force]
     # One record, or an input, is accused only where the model at which the search ends does not do as well.
     implausible = bool(gross) and not all(does_as_well(best, s) for s in gross)
     issues = tuple(s for s in issues if implausible or s not in gross)
@@ -150,8 +150,8 @@ def close_loop(
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
     }  # fmt: skip
-    in_force = inference.found.fits[path[kept]]
-    missing = missing_of(in_force, inference.found.library, told) if curve and not implausible else None
+    in_force = inference.exploration.fits[path[kept]]
+    missing = missing_of(in_force, inference.exploration.library, told) if curve and not implausible else None
     advice = advice_on(inference, campaign.gyro_range, threads, told) if TOO_ALIKE in verdicts else ()
     # Other issues rest on the declared model: they are reported where nothing better was found.
     at_a_loss = not {UNEXPLAINED, CARRIES_NOT, PARTLY}.isdisjoint(verdicts) and not any(s.claimed for s in steps)
@@ -160,7 +160,7 @@ def close_loop(
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     said = (*told_first, *missed_sentences(after.missed), *limits_of(after), *dict.fromkeys(again))
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, said,
-                      known_together(in_force, inference.found.library), tuple(suspects), errors, inference,
+                      known_together(in_force, inference.exploration.library), tuple(suspects), errors, inference,
                       missing)  # fmt: skip
 
 
@@ -179,7 +179,7 @@ def path_of(inference: Inference) -> list[Hypotheses]:
 
     Each is the most probable one without an effect of the next. Faults of records are undone with the first effect.
     """
-    exploration, model = inference.found, inference.in_force
+    exploration, model = inference.exploration, inference.in_force
     path = [model] if model else []
     while sum(h.kind == "effect" for h in model) > 1:
         less = [model - {h} for h in sorted(model) if h.kind == "effect"]
@@ -196,7 +196,7 @@ def path_of(inference: Inference) -> list[Hypotheses]:
 
 def judge(inference: Inference, model: Hypotheses, campaign: Campaign, within: float) -> Judgement:
     """Return errors, parameters and tests of a model on train and holdout."""
-    library, fit = inference.found.library, with_standard_accuracy(inference.found.fits[model])
+    library, fit = inference.exploration.library, with_standard_accuracy(inference.exploration.fits[model])
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
     remains = any(r.diagnosis.significant for r in (seen, unseen) if r is not None)
     effects = (library.candidates[k.declared] for k in fit.active)
@@ -214,7 +214,8 @@ def rejudged(
 
 def steps_of(inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement]) -> tuple[Step, ...]:
     """Return a step for each effect of the model in force; a model of faults alone is a step without an effect."""
-    steps, candidates, fit = [], inference.found.library.candidates, inference.found.fits[inference.in_force]
+    steps, exploration = [], inference.exploration
+    candidates, fit = exploration.library.candidates, exploration.fits[inference.in_force]
     for model, last, after in zip(path[1:], path, judged[1:], strict=False):
         hypothesis = next((h for h in sorted(model - last) if h.kind == "effect"), None)
         if hypothesis is None:

@@ -341,11 +341,11 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
 def models_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the most probable models with the parameters of the declared model, were each true."""
     entries: dict[str, dict[str, Any]] = {}
-    for model, _ in inference.found.ranked():
+    for model, _ in inference.exploration.ranked():
         probability = inference.posterior.sets.get(frozenset(h.public for h in model), 0.0)
         if words(model) not in entries and len(entries) < MOST_DRAWN and (probability >= LISTED or not entries):
             own = {n: i for n, i in inference.of_fit(model).items() if n in inference.posterior.parameters}
-            values = inference.found.fits[model].values
+            values = inference.exploration.fits[model].values
             entries[words(model)] = {
                 "model": words(model), "probability": probability,
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in own.items()},

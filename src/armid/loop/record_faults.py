@@ -48,14 +48,14 @@ class RecordFault:
 
 def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, inference: Inference) -> list[RecordFault]:
     """Return the faults of records, and the drifts, among some hypotheses of a model."""
-    fit = inference.found.fits[model]
+    fit = inference.exploration.fits[model]
     return [fault_of(h.means, h.name, fit, inference) if h.kind == "record" else
             drift_of(h.means, h.name, fit, inference)
             for h in sorted(accused) if h.kind in ("record", "drift")]  # fmt: skip
 
 
 def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> RecordFault:
-    record, fault, plant = fit.records.data.each[what.index], what.fault, inference.found.library.declared.plant
+    record, fault, plant = fit.records.data.each[what.index], what.fault, inference.exploration.library.declared.plant
     if fault.kind == "label":
         constant = record.constants[fault.constant]
         return RecordFault(record.file, record.role, "label", FREED, 1.0 - constant, fault.unit(record, plant))
@@ -84,7 +84,7 @@ def drift_of(what: OfParameter, name: str, fit: Fit, inference: Inference) -> Re
 def size_of(name: str, fit: Fit, inference: Inference) -> tuple[float, float]:
     """Return a further unknown of a fit and half its 95 % interval, in prior deviations."""
     place = next(i for i, f in enumerate(fit.others) if f.unknown.name == name)
-    covariance = expansion_of(fit, inference.found.scale(), inference.found.library).covariance
+    covariance = expansion_of(fit, inference.exploration.scale(), inference.exploration.library).covariance
     at = fit.n_free + place
     return fit.others[place].value, NORMAL_95 * float(np.sqrt(covariance[at, at]))
 

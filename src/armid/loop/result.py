@@ -215,7 +215,7 @@ def estimates(
     model: one of the inference; fit: it, as it is judged. Of the declared model's own parameters the interval of the
     model in force counts all others. discrepancy: whether a significant one remains.
     """
-    library, own = inference.found.library, inference.of_fit(model)
+    library, own = inference.exploration.library, inference.of_fit(model)
     known = {**own, **inference.intervals} if model == inference.in_force else own
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
@@ -279,7 +279,7 @@ def report_of(loop: ClosedLoop) -> dict[str, Any]:
         "outputs": loop.outputs,
         "verdict": loop.verdict,
         "also": loop.also,
-        "probabilities": loop.inference.probabilities | {"among": among(loop.inference.found.library)},
+        "probabilities": loop.inference.probabilities | {"among": among(loop.inference.exploration.library)},
         "effects": loop.effects,
         "error": {"before": errors_of(loop.before), "after": errors_of(loop.after)},
         "error_all_records": {
@@ -345,9 +345,9 @@ def of_output(replay: Replay, candidate: Array) -> JointErrors:
 
 def log_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the models that were fitted, the most probable first, with what they leave."""
-    ranked = inference.found.ranked()
+    ranked = inference.exploration.ranked()
     return [
         {"hypotheses": sorted(words([h]) for h in model), "log_probability": value - ranked[0][1],
-         "chi2_per_sample": inference.found.fits[model].chi2 / len(inference.found.fits[model].residual)}
+         "chi2_per_sample": inference.exploration.fits[model].chi2 / len(inference.exploration.fits[model].residual)}
         for model, value in ranked[:MOST_LISTED]
     ]  # fmt: skip
