@@ -157,7 +157,7 @@ def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_lim
     inference.__dict__["in_force"] = model
     library = SimpleNamespace(candidates={"viscous": SimpleNamespace(adds=("torque", "inertia"))})
     fit = SimpleNamespace(is_at_a_limit=lambda _: at_a_limit, has_arrived=has_arrived)
-    object.__setattr__(inference, "found", SimpleNamespace(library=library, fits={model: fit}))
+    object.__setattr__(inference, "exploration", SimpleNamespace(library=library, fits={model: fit}))
     after = Judgement(fit, None, (), None, None)
     (only,) = steps_of(inference, [frozenset(), model], [None, after])
     assert (only.effect, only.port, only.claimed, only.empirical) == ("viscous", "torque, inertia", claimed, False)
