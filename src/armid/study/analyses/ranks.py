@@ -393,12 +393,14 @@ def against(evidence: Evidence, setting: str, one: str) -> list[tuple[str, float
     return list(zip(others, ratios, multipletests(p, method="holm")[1], strict=True))
 
 
-def alike_text(others: Sequence[tuple[str, float]]) -> str:
+def alike_text(others: Sequence[tuple[str, float]], n_cases: int) -> str:
     """Return which others the tests cannot tell from the best, "" without others. others: with their corrected p."""
     alike = [name for name, p in others if not p < SURE]
     more = f" and {len(alike) - MOST_ALIKE} more" if len(alike) > MOST_ALIKE else ""
     if not alike:
         return "; it is better than each other by the tests" if others else ""
+    if len(alike) == len(others) > MOST_ALIKE:
+        return f"; on {n_cases} cases the tests can tell nobody from it"
     return f"; the tests cannot tell {listed(alike[:MOST_ALIKE])}{more} from it"
 
 
@@ -410,7 +412,8 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
         for name in classes:
             winners |= set(own.loc[own[name] <= own[name].min(), "variant"])
         best, tested = own.iloc[0], pairs[pairs["setting"] == setting]
-        alike = alike_text([(name, p) for name, _, p in against(evidence, str(setting), str(best["variant"]))])
+        alike = alike_text([(name, p) for name, _, p in against(evidence, str(setting), str(best["variant"]))],
+                           int(best["n"]))  # fmt: skip
         line = f"Budget {setting}, {best['n']} cases: best is {best['variant']}, mean rank {best['text']}"
         line += f" of {len(own)}{alike}."
         line += "".join(f" Your own {v} {standing(own, v)}." for v in own["variant"] if v in evidence.own)
