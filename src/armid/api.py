@@ -7,7 +7,6 @@ arguments that several of them take.
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
@@ -275,16 +274,11 @@ def identify(
 
 def identifier_of(given: Any, registry: Registry) -> Any:
     """Return the Identifier of a name, of a function or class, or of an algorithm of pymoo that was not used yet."""
-    from pymoo.core.algorithm import Algorithm
-
     from armid.identifiers import as_identifier
 
     if isinstance(given, str):
         return registry.identifier_of(given)
-    name = getattr(given, "__name__", type(given).__name__)
-    if isinstance(given, Algorithm) and given.problem is None:
-        return as_identifier(name, lambda budget: deepcopy(given))
-    return as_identifier(name_of(given, name), given)
+    return as_identifier(name_of(given, getattr(given, "__name__", type(given).__name__)), given)
 
 
 def examine(

@@ -33,7 +33,12 @@ ACCEPTS: dict[str, Callable[[Any], bool]] = {
     "effects": lambda thing: isinstance(thing, Effect),
     "fitness": is_fitness,
     "analyses": lambda thing: inspect.isfunction(thing) and "runs" in inspect.signature(thing).parameters,
-    "identifiers": lambda thing: hasattr(thing, "build") or inspect.isclass(thing) or inspect.isfunction(thing),
+    "identifiers": lambda thing: (
+        hasattr(thing, "build")
+        or inspect.isclass(thing)
+        or inspect.isfunction(thing)
+        or {"ask", "tell", "setup"} <= set(dir(thing))
+    ),
 }
 KINDS = tuple(ACCEPTS)
 

@@ -228,13 +228,21 @@ def test_as_identifier() -> None:
     from_class, from_function = as_identifier("a", PaperPSO), as_identifier("b", a_small_swarm)
     assert isinstance(from_class, Identifier)
     assert from_class.build(40).budget == 12000
-    for identifier in (pso, from_class, from_function):
+    from_object = as_identifier("c", a_small_swarm(40))
+    assert from_object.build(1) is not from_object.build(1)
+    for identifier in (pso, from_class, from_function, from_object):
         assert pickle.loads(pickle.dumps(identifier)).build(40).budget > 0
     assert from_function.build(40).budget == 40
 
 
+def test_an_algorithm_that_was_used_keeps_its_state_and_is_refused() -> None:
+    used = a_small_swarm(40)
+    used.problem = object()
+    with pytest.raises(ValueError, match="is a PaperPSO that was used already, expected a subclass"):
+        as_identifier("mine", used)
+
+
 @pytest.mark.parametrize(("obj", "sentence"), [
-    (PaperPSO(), "is a PaperPSO built already, expected a subclass"),
     (3, "is 3, expected a subclass of pymoo's Algorithm, a function of the budget"),
     (dict, "expected a subclass"), (lambda budget, more: PaperPSO(), "expected a subclass"),
     (lambda budget: budget, "identifier 'mine' returned a int, expected an Algorithm"),

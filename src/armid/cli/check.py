@@ -124,7 +124,7 @@ def points_of(thing: str, registry: Registry) -> tuple[str, str, "Iterator[Contr
 @click.option("--quick", is_flag=True, help="Fewer repetitions: rougher figures in a few seconds.")
 @plugin_option
 def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
-    """Measure speed, error and memory, with the programs in studies/bench of the repository.
+    """Measure speed, error and memory, with the programs in studies/bench of the repository (`pip install -e`).
 
     The engine against scipy and a plain loop, in one run, every ratio in one table: times in microseconds a
     simulation, errors in rad/s, memory in MB without what the results themselves take.

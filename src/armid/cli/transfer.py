@@ -12,7 +12,7 @@ from armid.report.result import NewFiles, refuse_unwritable
 
 @click.group("import", cls=Group, short_help="Make a campaign from public measured data.")
 def import_group() -> None:
-    """Make a campaign from public measured data, with the programs in studies/measured of the repository.
+    """Make a campaign from public measured data, by studies/measured of the repository (`pip install -e`).
 
     The data themselves are not part of this package.
     """

@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from functools import partial
 from typing import Any
 
@@ -26,13 +27,13 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     ----------
     name : str
         Of the identifier.
-    obj : Identifier, class or function
-        A subclass of pymoo's Algorithm; a function of the budget that returns an algorithm; or a function that searches
-        by itself: `value` in its arguments is what it minimises, a function of a candidate, (n_parameters,), that
-        returns a number, or of several at once, (n_candidates, n_parameters), that returns (n_candidates,). It may name
-        `low` and `high`, the bounds, and `start`, the best so far in a chain, else a random point of the box, SI, each
-        (n_parameters,); `budget`, the simulations after which it is ended; `random`, numpy's Generator. Arguments with
-        a default are options.
+    obj : Identifier, algorithm, class or function
+        A subclass of pymoo's Algorithm, or an object of one that was not used yet; a function of the budget that
+        returns an algorithm; or a function that searches by itself: `value` in its arguments is what it minimises, a
+        function of a candidate, (n_parameters,), that returns a number, or of several at once, (n_candidates,
+        n_parameters), that returns (n_candidates,). It may name `low` and `high`, the bounds, and `start`, the best so
+        far in a chain, else a random point of the box, SI, each (n_parameters,); `budget`, the simulations after which
+        it is ended; `random`, numpy's Generator. Arguments with a default are options.
 
     Returns
     -------
@@ -41,7 +42,7 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     Raises
     ------
     ArmidError
-        For anything else, and for an algorithm that was built already: it keeps the state of its run.
+        For anything else, and for an algorithm that was used already: it keeps the state of its run.
 
     >>> def halves(value, low, high):
     ...     value((low + high) / 2)
@@ -54,8 +55,10 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         "expected a subclass of pymoo's Algorithm, a function of the budget that returns one, or a function that "
         "searches by itself, whose first argument is `value`"
     )
+    if isinstance(obj, Algorithm) and obj.problem is None:
+        return Identifier(name, partial(copied, obj), "an algorithm of the user")
     if isinstance(obj, Algorithm):
-        raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} built already, {expected}")
+        raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} that was used already, {expected}")
     if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
         return Identifier(name, partial(without_budget, obj), "a class of the user")
     if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
@@ -66,6 +69,10 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
         return Identifier(name, partial(built, name, obj), "a function of the user")
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
+
+
+def copied(algorithm: Algorithm, budget: int) -> Algorithm:
+    return deepcopy(algorithm)
 
 
 def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:

@@ -29,8 +29,10 @@ def similarity(
         x' [signal's unit], (n_candidates, n_samples); C-contiguous is fastest.
     interval : float
         Sample interval [s].
-    epsilon, xi, slope_threshold : float
-        Of the normalised series: level [1], duration [s], slope [1/s].
+    epsilon, xi : float
+        Of the normalised series: level [1], duration [s].
+    slope_threshold : float
+        Of the normalised series [1/s].
     noise : float
         Rms [signal's unit]. A lone extremum within 3 % of the series' length from its end is not a landmark when its
         height is below three times that; 0, as in the paper: every one is.

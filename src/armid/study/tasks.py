@@ -429,9 +429,12 @@ def _check_apart(entry: Entry, other: Entry, where: str) -> None:
 
 
 def _check_noise(entry: Entry, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
-    """Refuse a fitness that needs noise on records without noise."""
+    """Refuse noise that would be added to no record, and a fitness that needs noise on records without noise."""
     at = f"{where}, identifier '{entry.label}'"
     simulated, end = any(case.strokes for case in cases), NOISES.get(cases[0].model.plant.output_unit, "")
+    if not simulated and any(entry.noise_deg_s):
+        raise ArmidError(f"{at}: noise_{end} is {', '.join(f'{n:g}' for n in entry.noise_deg_s)}, but the records "
+                         "of all cases have noise of their own: it is to be left out")  # fmt: skip
     for fitness in entry.fitness:
         if "noise" in fitness_of_name(fitness, registry.fitness).asks and 0.0 in entry.noise_deg_s and simulated:
             raise ArmidError(f"{at}: fitness '{fitness}' needs noise, but noise_{end} holds 0, levels of its own that "

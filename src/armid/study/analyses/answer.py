@@ -7,7 +7,7 @@ from pandas import DataFrame, Series
 
 from armid.report.document import listed
 from armid.study.analyses.analysis import PAPER, Evidence, fitness_scale, is_swarm
-from armid.study.analyses.ranks import alike_text, arrived_text, compared, suite_answer
+from armid.study.analyses.ranks import HALF, alike_text, arrived_text, compared, suite_answer
 
 # The answer names so many settings; the table holds all.
 MOST_SETTINGS = 3
@@ -15,6 +15,8 @@ MOST_SETTINGS = 3
 QUARTER = 0.25
 # A parameter whose mean error is more times its scatter than this is off, whatever the search does.
 OFF = 3.0
+# Identifiers of plug-ins that the answer places in one setting, the best first; the table holds all.
+MOST_OWN = 3
 
 
 def answer_of(evidence: Evidence, overview: Any) -> tuple[str, ...]:
@@ -26,7 +28,7 @@ def answer_of(evidence: Evidence, overview: Any) -> tuple[str, ...]:
     kind = evidence.study.get("report")
     frame = overview.frame
     first = {"table1": beside_paper, "table2": repeats}.get(str(kind), by_fitness)(evidence, frame)
-    return (*first, *best(evidence, frame), *own(evidence, frame))
+    return (*first, *best(evidence, frame), *own(evidence, frame), *undetermined(evidence))
 
 
 def noisy_first(evidence: Evidence) -> list[str]:
@@ -69,7 +71,7 @@ def repeats(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
     runs = evidence.estimates.assign(signed=evidence.estimates["value"] / evidence.estimates["truth"] - 1.0)
     groups = runs.groupby(["setting", "variant", "case", "parameter"], sort=False)["signed"]
     within = groups.std(ddof=0).groupby(["setting", "variant"], sort=False).max()
-    if within.empty:
+    if within.empty or groups.size().max() < 2:
         return ()
     setting = noisy_first(evidence)[0]
     searches: Series[float] = within[within.index.get_level_values("setting") == setting].droplevel("setting")
@@ -77,9 +79,11 @@ def repeats(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
     own = runs[(runs["setting"] == setting) & (runs["variant"] == tight)].groupby("parameter", sort=False)["signed"]
     mean, scatter = own.mean(), own.std(ddof=0)
     off = [f"{name} by {percent(abs(mean[name]))}" for name in mean.index if abs(mean[name]) > OFF * scatter[name]]
-    lacks = f"; off is {listed(off)}, since the model lacks an effect of these records" if off else ""
-    return (f"Repeats on a record agree to {percent(searches.min())} with {tight}, to {percent(searches.max())} with "
-            f"{wide} ({setting}; standard deviation of the worst parameter){lacks}.",)  # fmt: skip
+    why = "since the model lacks an effect of these records, or their truth is another"
+    lacks = f"; off is {listed(off)}, {why}" if off else ""
+    worst = f", to {percent(searches.max())} with {wide}" if wide != tight else ""
+    return (f"Repeats on a record agree to {percent(searches.min())} with {tight}{worst} ({setting}; standard "
+            f"deviation of the worst parameter){lacks}.",)  # fmt: skip
 
 
 def by_fitness(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
@@ -109,7 +113,8 @@ def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
     ranked, rows = len(own) > 1 and tests.n_cases > 1, own.set_index("variant")
     name = str(tests.ranks.index[0] if ranked else rows["largest_median"].idxmin())
     row: Any = rows.loc[name]
-    text = (f"{setting}: {name}, largest error of a run {percent(row['largest_median'])} (median), "
+    by = f" (mean rank {tests.ranks.iloc[0]:.3g} of {len(own)} over {tests.n_cases} cases)" if ranked else ""
+    text = (f"{setting}: {name}{by}, largest error of a run {percent(row['largest_median'])} (median), "
             f"{percent(row['largest_p95'])} (95 % of {row['n']} runs)")  # fmt: skip
     if not ranked:
         return text
@@ -120,16 +125,30 @@ def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
 
 
 def own(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
-    """Return where the identifiers of plug-ins stand."""
+    """Return where the identifiers of plug-ins stand: by mean rank over the cases, on one case by their error."""
     said = []
     for setting in noisy_first(evidence)[:MOST_SETTINGS]:
         rows = frame[(frame["setting"] == setting) & (frame["variant"] != PAPER)]
-        medians = rows.set_index("variant")["largest_median"]
-        for variant in medians.index:
-            if variant in evidence.own:
-                place = 1 + int((medians < medians[variant]).sum())
-                said.append(f"{variant} is number {place} of {len(medians)} ({setting}, {percent(medians[variant])})")
+        medians, (tests, _) = rows.set_index("variant")["largest_median"], evidence.once(compared, setting)
+        order = tests.ranks if len(rows) > 1 and tests.n_cases > 1 else medians
+        mine = [v for v in order.sort_values(kind="stable").index if v in evidence.own and np.isfinite(medians[v])]
+        said += [f"{v} is number {1 + int((order < order[v]).sum())} of {len(order)} ({setting}, "
+                 f"{percent(medians[v])})" for v in mine[:MOST_OWN]]  # fmt: skip
+        said += [f"{len(mine) - MOST_OWN} more in the table ({setting})"] if len(mine) > MOST_OWN else []
     return (f"Your own: {'; '.join(said)}.",) if said else ()
+
+
+def undetermined(evidence: Evidence) -> tuple[str, ...]:
+    """Return which parameters the records of a case do not determine: their errors say nothing of an identifier."""
+    runs = evidence.parameters.merge(evidence.runs[["run", "case"]], on="run")
+    unseen = runs["deviation"].astype(float).replace(np.inf, np.nan).isna()
+    share = unseen.groupby([runs["case"], runs["parameter"]], sort=False).mean()
+    names = [f"{parameter} of {case}" for case, parameter in share.index[share > HALF]]
+    if not names:
+        return ()
+    return (f"Not determined by the records: {listed(names[:MOST_OWN])}"
+            f"{f' and {len(names) - MOST_OWN} more' if len(names) > MOST_OWN else ''}. Their errors, and the largest "
+            "errors that these make, say nothing of an identifier.",)  # fmt: skip
 
 
 def lowest_fitness(evidence: Evidence) -> str:

@@ -35,7 +35,7 @@ RANK_CAPTION = (
     "since its seeds are repeats and no independent evidence. Errors of 1e-6 % and below count as equal, and so do "
     "those that differ by less than a hundredth of the Cramer-Rao bound. Rank 1 is the best of a case; the table shows "
     "the mean over the cases. arrived: share of the runs that end within that distance, in each parameter, of the run "
-    "with the lowest fitness on the same noise."
+    "with the lowest fitness on the same noise; empty where nobody else has the fitness."
 )
 PAIRS_CAPTION = (
     "Wilcoxon's signed-rank test of the logarithms of the same block values (two-sided, Pratt's rule for ties), "
@@ -151,8 +151,8 @@ def arrived(evidence: Evidence, setting: str) -> Series:
 
 
 def arrived_text(reached: Series) -> str:
-    return (f"{(reached > HALF).sum()} of {len(reached)} identifiers arrive at the lowest fitness in more than half of "
-            "their runs")  # fmt: skip
+    return (f"{(reached > HALF).sum()} of the {len(reached)} identifiers that share a fitness arrive at its lowest "
+            "value in most runs")  # fmt: skip
 
 
 def blocks_of(runs: DataFrame, quantity: str) -> DataFrame:
@@ -414,12 +414,14 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
         best, tested = own.iloc[0], pairs[pairs["setting"] == setting]
         alike = alike_text([(name, p) for name, _, p in against(evidence, str(setting), str(best["variant"]))],
                            int(best["n"]))  # fmt: skip
-        line = f"Budget {setting}, {best['n']} cases: best is {best['variant']}, mean rank {best['text']}"
+        first = listed(list(own.loc[own["rank"] <= best["rank"], "variant"]))
+        line = f"Budget {setting}, {best['n']} cases: best is {first}, mean rank {best['text']}"
         line += f" of {len(own)}{alike}."
         line += "".join(f" Your own {v} {standing(own, v)}." for v in own["variant"] if v in evidence.own)
         if len(tested):
             swarm, sure = own[own["variant"] == tested["swarm"].iloc[0]].iloc[0], tested["p"] < SURE
-            leads = [name for name in classes if swarm[name] <= own[name].min()]
+            others = own[own["variant"] != swarm["variant"]]
+            leads = [name for name in classes if swarm[name] < others[name].min()]
             line += (
                 f" The paper's swarm ({swarm['variant']}) {standing(own, swarm['variant'])}: it wins against "
                 f"{with_ratios(tested[sure & (tested['ratio'] < 1.0)])}, loses against "
