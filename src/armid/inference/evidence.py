@@ -23,6 +23,7 @@ from scipy.special import log_ndtr, logsumexp
 from armid.estimation.constants import NAMED
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
+from armid.inference.confirmed import confirmed
 from armid.inference.hypothesis import Proposal
 from armid.inference.library import Library
 from armid.inference.model import Fit
@@ -158,9 +159,10 @@ class Expansion:
         n = int(self.kept.sum())
         is_known = np.isin(np.arange(self.fit.n_free), self.fit.records.rows[0])[self.kept]
         flat = self.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(self.precision) - n))
-        known, cover = self.information + np.diag(flat), self.fit.records.data.cover
+        columns, cover = confirmed(self.fit, self.unknowns, flat, self.scale.weight), self.fit.records.data.cover
+        known = self.scale.weight * columns.T @ columns + np.diag(flat)
         if cover is not None:
-            known = known - cover.taken(self.unknowns, self.scale.weight)
+            known = known - cover.taken(columns, self.scale.weight)
         covariance = self.scale.variance(self.fit.chi2) * np.linalg.inv(known)[:n, :n]
         shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(covariance), 1e-300)))
         return np.asarray(covariance * np.outer(shrunk, shrunk))

@@ -24,8 +24,11 @@ SHARES = (SLOPE, 0.05, 0.4)
 N_STARTS = 4
 # First steps of a fit, after which it shows how far it may lead.
 N_STEPS = 2
-# Share of a squared response that steps of a simulation, and second differences, leave of what is the same.
-ROUNDING = 1e-7
+# Share of a squared response that steps of a simulation, and second differences, leave of what is the same. Strength
+# of other effects where it is looked at, as a share of their size.
+ROUNDING, COMPANY = 1e-7, 0.03
+# How often the change of the parameter that does the same is corrected.
+N_SECANTS = 3
 
 
 def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
@@ -95,32 +98,50 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
     """Return the effects that do what a free parameter of the declared model does, and nothing else, with its name.
 
     Viscous friction is the damping of a machine that has one: records cannot tell two shares of one quantity, and its
-    interval would reach from none of it to all. Effect and parameter are moved side by side.
+    interval would reach from none of it to all. Effect and parameter are moved side by side, in the company of other
+    effects: a wrong gain of the drive looks like another mass only until something else acts.
     """
-    names = library.each(lambda key: double(fit, key, library), library.joinable(()))
-    return {key: name for key, name in zip(library.joinable(()), names, strict=True) if name}
+    keys = library.joinable(())
+    names = library.each(lambda key: double(fit, key, library), keys)
+    return {key: name for key, name in zip(keys, names, strict=True) if name}
 
 
 def double(fit: Fit, key: EffectKey, library: Library) -> str:
     """Return the parameter of the declared model that does what an effect does, "" for none."""
-    records = beside(fit, (key,), library)
-    mine = [n for n in records.space.free_names if key.owns(n)]
-    if len(mine) != 1 or records.model.parameters[mine[0]].null is None or not fit.n_free:
+    records, slopes = beside(fit, (key,), library), fit.jacobian
+    names = strengths(records, key)
+    company = [n for other in library.joinable(()) if other.public != key.public for n in strengths(records, other)]
+    if len(names) != 1 or not company or not fit.n_free:
         return ""
-    grid, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
-    response = SLOPE * responses(fit, records, [replace(grid[0], share=SLOPE)])[0]
+    at_work = candidate_at(records, fit.values)
+    for name in company:
+        at_work[records.space.index(name)] += COMPANY * library.strength_of(name, records.model.parameters[name])
+    moved = np.tile(at_work, (3, 1))
+    moved[1, records.space.index(names[0])] += SLOPE * library.strength_of(names[0], records.model.parameters[names[0]])
+    start, with_effect = records.whole_signals(moved[:2])
+    response = with_effect - start
     size = float(response @ response)
     if not 0.0 < size < np.inf:
         return ""
-    slopes, squares = fit.jacobian, np.sum(fit.jacobian**2, axis=0)
-    along = slopes.T @ response / np.maximum(squares, 1e-300)
+    squares = np.maximum(np.sum(slopes**2, axis=0), 1e-300)
+    along = slopes.T @ response / squares
     best = int(np.argmax(along**2 * squares))
-    name = list(fit.values)[best]
-    moved = dict(zip(fit.values, fit.records.values(fit.z + along * (np.arange(fit.n_free) == best)), strict=True))
-    there, here = records.whole_signals(np.array([candidate_at(records, v) for v in (moved, fit.values)]))
-    apart = response - (there - here)
-    apart = apart - slopes[:, best] * float(slopes[:, best] @ apart) / max(squares[best], 1e-300)
-    return name if float(apart @ apart) < ROUNDING * size else ""
+    name, change = list(fit.values)[best], along[best] * float(fit.records.span[best])
+    for _ in range(N_SECANTS):
+        moved[2, records.space.index(name)] = at_work[records.space.index(name)] + change
+        by_parameter = records.whole_signals(moved[2:])[0] - start
+        apart = response - by_parameter
+        if float(apart @ apart) < ROUNDING * size:
+            return name
+        change *= float(response @ by_parameter) / max(float(by_parameter @ by_parameter), 1e-300)
+    return ""
+
+
+def strengths(records: WhiteRecords, key: EffectKey) -> list[str]:
+    """Return the strengths of an effect in a compiled model, none where it is not part of it or has states or times."""
+    declared = records.model.parameters
+    mine = [n for n in records.space.names if key.owns(n)]
+    return [n for n in mine if declared[n].null is not None] if all(declared[n].unit != "s" for n in mine) else []
 
 
 def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
