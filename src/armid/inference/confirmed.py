@@ -30,7 +30,7 @@ def confirmed(fit: Fit, columns: Array, flat: Array, weight: float) -> Array:
         return columns
     base = fit.base if fit.base is not None and fit.others else fit.records
     base, unknowns = base.plain, [f.unknown for f in fit.others]
-    here = np.concatenate([fit.z, [f.value for f in fit.others]])
+    here, root = np.concatenate([fit.z, [f.value for f in fit.others]]), np.sqrt(weight)
     # What a bound holds stays there.
     stays = np.append(np.minimum(fit.z, 1.0 - fit.z) < HELD, np.zeros(n - n_free, dtype=np.bool_))
     for _ in range(MOST_ROUNDS):
@@ -40,9 +40,10 @@ def confirmed(fit: Fit, columns: Array, flat: Array, weight: float) -> Array:
         moves = shares * moves
         rows = np.concatenate([here + moves.T, here - moves.T])
         residuals = residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free])
-        along = columns[:, :n] @ axes
-        squares = [left(along, i, np.stack([residuals[i], residuals[n + i], fit.residual])) for i in range(n)]
-        rise = weight * np.array([0.5 * (above + below) - middle for above, below, middle in squares])
+        along = root * columns[:, :n] @ axes
+        trios = root * np.stack([residuals[:n], residuals[n:], np.tile(fit.residual, (n, 1))], axis=1)
+        squares = [left(along, i, trio) for i, trio in enumerate(trios)]
+        rise = np.array([0.5 * (above + below) - middle for above, below, middle in squares])
         foretold = weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
         matters = np.isfinite(rise) & (foretold > LEAST * shares**2)
         believed = np.where(matters, np.clip(rise / np.maximum(foretold, 1e-300), 0.0, 1.0), 1.0)
@@ -57,11 +58,12 @@ def confirmed(fit: Fit, columns: Array, flat: Array, weight: float) -> Array:
 def left(along: Array, i: int, residuals: Array) -> Array:
     """Return the squares of residuals, (n_residuals, n_samples), that the slopes along all axes but one cannot take up.
 
-    The ways on which unknowns make up for each other bend: what a straight one leaves the others answer.
+    The ways on which unknowns make up for each other bend: what a straight one leaves the others answer, as far as
+    their priors let them. along: per posterior deviation, so that what the records do not know of an axis is prior.
     """
     others = np.delete(along, i, axis=1)
-    mixed = residuals @ others
-    answer = np.linalg.lstsq(others.T @ others, mixed.T, rcond=1e-12)[0]
+    square, mixed = others.T @ others, residuals @ others
+    answer = np.linalg.solve(square + np.diag(np.maximum(1.0 - np.diag(square), 1e-9)), mixed.T)
     return np.asarray(np.sum(residuals**2, axis=1) - np.sum(mixed.T * answer, axis=0))
 
 
