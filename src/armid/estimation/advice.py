@@ -7,7 +7,7 @@ made (Lindley 1956, doi:10.1214/aoms/1177728069; Box, Hill 1967, doi:10.1080/004
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import combinations
 
@@ -35,6 +35,8 @@ OFTEN = 0.5
 TOLERANCE = 1e-3
 # Draws of the noise of one record.
 N_NOISES = 64
+# Shares of a draw that are tried, and how many times the foretold rise of the sum of squares a share may bring.
+SHORTER, ALLOWED = 0.5 ** np.arange(8), 2.0
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Rival:
     """A fitted model with rivals that the records cannot separate.
 
     z: its estimate, shares of the range, (n_free,). criterion: -2 times its log posterior, up to a constant. trust:
-    what a sample counts, below 1 where more than noise is left.
+    what a sample counts, below 1 where more than noise is left. constants: by which share of its value each is off.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Rival:
     z: Array
     criterion: float
     trust: float = 1.0
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def candidate(self) -> Array:
@@ -84,10 +87,23 @@ class Rival:
         """Factor so that root root^T is the covariance of z: each column is a move of one standard deviation."""
         return np.asarray(np.linalg.inv(self.precision).T)
 
+    def old(self, Z: Array) -> Array:
+        """Return the whitened signals of the records and the candidates in units of the box, (n_candidates, n)."""
+        return np.hstack([np.sqrt(self.trust) * self.records.signals(Z), np.sqrt(BOX) * Z])
+
     def drawn(self, draw: Array) -> Array:
+        """Return a candidate that the records allow: so far along a draw as they rise by what is foretold of it.
+
+        Where parameters make up for each other, the way on which they do bends, and a straight move leaves it.
+        """
         move = self.root @ draw[: len(self.z)]
-        both = np.array([self.z + move, self.z - move])
-        return np.asarray(both[int(np.argmin(outside(both)))])
+        both = np.array([move, -move])
+        side = both[int(np.argmin(outside(self.z + both)))]
+        tried = self.z + SHORTER[:, np.newaxis] * side
+        rise = self.trust * (self.records.chi2(tried) - float(self.records.chi2(self.z)[0]))
+        foretold = SHORTER**2 * float(draw[: len(self.z)] @ draw[: len(self.z)])
+        allowed = np.flatnonzero(rise <= ALLOWED * foretold + 1.0)
+        return np.asarray(tried[allowed[0]] if allowed.size else self.z)
 
 
 # Whitened signals of a new record that a rival gives at candidates in shares, (n_candidates, n).
@@ -105,7 +121,8 @@ def advise(
 
     Only manoeuvres that were simulated are returned, ranked by their gain, then by the mean distance.
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
-    n_samples), into units of white noise, (n_signals, n). grid: None: `manoeuvre_grid`. speed_limit: of the gyro.
+    n_samples), into units of white noise, (n_signals, n). grid: with the constants as declared; None: `manoeuvre_grid`
+    of the records of the first rival. speed_limit: of the gyro.
     """
     if len(rivals) < 2:
         raise ArmidError(f"{len(rivals)} model was given: at least two are expected")
@@ -174,7 +191,7 @@ def predictions_of(
     moves by many samples does not move in proportion. Of two sides the one that the box cuts off less counts alone: an
     effect at its null can only grow.
     """
-    motions = Motions(rival.records.replays, rival.candidate, speed_limit)
+    motions = Motions(rival.records.replays, rival.candidate, speed_limit, rival.constants)
     above, below = rival.z + rival.root.T, rival.z - rival.root.T
     points = rival.records.whole(np.concatenate([rival.z[np.newaxis], above, below]))
     n, predictions = len(rival.z), {}
@@ -225,7 +242,11 @@ def chance(right: Prediction, wrong: Prediction, old: float, draws: Array) -> tu
 
 @dataclass(frozen=True, eq=False)
 class OldAndNew(LeastSquaresProblem):
-    """Pose the old records, as a parabola about their estimate, and one new record as one least-squares problem."""
+    """Pose the old records, as the rival predicts them, and one new record as one least-squares problem.
+
+    The box counts as a first record. A parabola in place of the old records would be steep across a way on which
+    parameters make up for each other, where that bends.
+    """
 
     rival: Rival
     new: NewSignals
@@ -233,17 +254,16 @@ class OldAndNew(LeastSquaresProblem):
 
     @cached_property
     def measured(self) -> Array:
-        return np.concatenate([np.zeros(len(self.rival.z)), self.seen])
+        return np.concatenate([self.rival.old(self.rival.z[np.newaxis])[0], self.seen])
 
     def signals(self, Z: Array) -> Array:
-        """Return how far candidates are from the old estimate, in standard deviations, then their new signals."""
-        old = (Z - self.rival.z) @ self.rival.precision
-        return np.concatenate([old, self.new(self.rival, Z)], axis=1)
+        return np.concatenate([self.rival.old(Z), self.new(self.rival, Z)], axis=1)
 
 
 def whitened_signals(feasible: Feasible, white: Whitening, rival: Rival, Z: Array) -> Array:
     records = rival.records
-    run = simulate(records.model, feasible.manoeuvre, records.whole(Z), fine_schedule(records.replays))
+    manoeuvre = feasible.of(records.model.plant, rival.constants)
+    run = simulate(records.model, manoeuvre, records.whole(Z), fine_schedule(records.replays))
     places = sorted({r.place for r in records.replays})
     return np.asarray(white(run.outputs[places][..., feasible.window]))
 

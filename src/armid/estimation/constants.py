@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from armid.estimation.least_squares import LeastSquaresProblem
-from armid.model import Array, Plant
+from armid.model import Array, Manoeuvre, Plant
 from armid.problem.problem import Replay, signals_of, with_each
 from armid.record import Piece, Record
 
@@ -62,8 +62,13 @@ def moved_replays(replays: Sequence[Replay], shares: Mapping[str, float]) -> tup
 
 
 def moved_piece(piece: Piece, plant: Plant, shares: Mapping[str, float]) -> Piece:
-    given = {c.name: c.value for c in plant.constants} | dict(piece.manoeuvre.constants)
-    return piece.with_constants({name: given[name] * (1.0 + share) for name, share in shares.items()})
+    return piece.with_constants(moved_constants(piece.manoeuvre, plant, shares))
+
+
+def moved_constants(manoeuvre: Manoeuvre, plant: Plant, shares: Mapping[str, float]) -> dict[str, float]:
+    """Return the constants that shares of their values are added to, SI."""
+    given = {c.name: c.value for c in plant.constants} | dict(manoeuvre.constants)
+    return {name: given[name] * (1.0 + share) for name, share in shares.items()}
 
 
 def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[str]) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from armid.engine import Schedule, simulate
 from armid.engine.simulate import Simulation
+from armid.estimation.constants import moved_constants
 from armid.estimation.information import inverse
 from armid.estimation.least_squares import slopes_of, stencil
 from armid.estimation.noise_model import Level
@@ -58,6 +59,11 @@ class Feasible:
     @property
     def name(self) -> str:
         return words(self.keys, self.repeats)
+
+    def of(self, plant: Plant, shares: Mapping[str, float]) -> Manoeuvre:
+        """Return the manoeuvre of a machine whose constants are off by some shares."""
+        moved = moved_constants(self.manoeuvre, plant, shares)
+        return replace(self.manoeuvre, constants={**self.manoeuvre.constants, **moved})
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,11 +279,16 @@ class Motions:
     """Simulate manoeuvres and leave out those that the machine could not make.
 
     replays: of the train records, they say how finely to cut time and, for a machine driven by inputs, how far it may
-    move. candidate: whole, SI, the one that must stay feasible. speed_limit: the gyro's range.
+    move. candidate: whole, SI, the one that must stay feasible. speed_limit: the gyro's range. shares: what is added to
+    constants of the manoeuvres, as shares of their values.
     """
 
-    def __init__(self, replays: Sequence[Replay], candidate: Array, speed_limit: float | None = None) -> None:
+    def __init__(
+        self, replays: Sequence[Replay], candidate: Array, speed_limit: float | None = None,
+        shares: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
         self.model: Model = replays[0].model
+        self.shares = shares or {}
         self.schedule = fine_schedule(replays)
         self.candidate = candidate
         self.speed_limit = np.inf if speed_limit is None else speed_limit
@@ -291,7 +302,8 @@ class Motions:
         """Yield each manoeuvre that can be made with its signals, (n_outputs, n_candidates, n_samples)."""
         population = np.concatenate([self.candidate[np.newaxis], candidates])
         for feasible in grid:
-            run = simulate(self.model, feasible.manoeuvre, population, self.schedule, states=True)
+            manoeuvre = feasible.of(self.model.plant, self.shares)
+            run = simulate(self.model, manoeuvre, population, self.schedule, states=True)
             if self.can_be_made(run):
                 yield feasible, run.outputs[self.places, 1:, feasible.window]
 

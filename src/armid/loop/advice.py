@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from armid.estimation.advice import Advice, Rival, advise
+from armid.estimation.design import manoeuvre_grid
 from armid.inference.decisions import WINDOW
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference
@@ -33,7 +34,9 @@ def advice_on(
         weight = float(np.sqrt(rivals[0].trust))
         return weight * np.concatenate([level.white(y, [y.shape[-1]]) for level, y in pairs], axis=-1)
 
-    return advise(rivals, white, None, speed_limit, threads=threads)[:MOST_ADVICE]
+    library = inference.exploration.library
+    grid = manoeuvre_grid(best.model, library.data.records)
+    return advise(rivals, white, grid, speed_limit, threads=threads)[:MOST_ADVICE]
 
 
 def rivals_of(inference: Inference) -> list[Rival]:
@@ -47,5 +50,5 @@ def rivals_of(inference: Inference) -> list[Rival]:
         fit = inference.exploration.fits[model]
         # What a sample counts, and one of a record like these will: less than 1 where more than noise is left.
         trust = float(np.mean(fit.records.data.trust(fit.residual)))
-        rivals.setdefault(name, Rival(name, fit.records, fit.z, -2.0 * p, trust))
+        rivals.setdefault(name, Rival(name, fit.records, fit.z, -2.0 * p, trust, fit.constants))
     return list(rivals.values())
