@@ -117,6 +117,15 @@ class Expansion:
         return density
 
     @cached_property
+    def boxes(self) -> Array:
+        """How many times its declared size the box of a strength is wide, 1 for other parameters, (n_free,)."""
+        fit, model = self.fit, self.fit.model
+        widths = dict(zip(fit.values, fit.records.span, strict=True))
+        sizes = {name: self.library.strength_of(name, model.parameters[name]) for name in widths
+                 if self.library.owner(name) is not None and model.parameters[name].null is not None}  # fmt: skip
+        return np.array([max(width / sizes.get(name, width), 1.0) for name, width in widths.items()])
+
+    @cached_property
     def precision(self) -> Array:
         """Prior precision of all unknowns."""
         n_others = self.fit.columns.shape[1] + self.doubts.shape[1]
@@ -153,12 +162,14 @@ class Expansion:
     def spread(self) -> Array:
         """Posterior covariance of the free parameters alone, as it is reported: within their box all values are alike.
 
-        The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide. No
-        deviation is larger than that of even odds over the box, range/sqrt(12).
+        The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide,
+        and of a strength its declared size, however wide its box. No deviation is larger than that of even odds over
+        the box, range/sqrt(12).
         """
         n = int(self.kept.sum())
         is_known = np.isin(np.arange(self.fit.n_free), self.fit.records.rows[0])[self.kept]
         flat = self.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(self.precision) - n))
+        flat[:n] *= self.boxes[self.kept] ** 2
         columns, cover = confirmed(self.fit, self.unknowns, flat, self.scale.weight), self.fit.records.data.cover
         known = self.scale.weight * columns.T @ columns + np.diag(flat)
         if cover is not None:
