@@ -34,6 +34,9 @@ HEADERS = {
     ("drive", False): ("drive", ("V", "N_m"), "V"),
     ("drive", True): ("drive", ("V", "N"), "V"),
 }
+# Units of a drive with a prefix -> end of the unit, and what turns a number into it.
+DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
+             "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
 LINEAR = {"m", "mm", "m_s", "mm_s", "N"}
 # A machine is at rest as long as its signal stays within this share of its range.
 AT_REST = 0.01
@@ -43,17 +46,25 @@ KEPT = 0.5
 
 @dataclass(frozen=True)
 class Column:
-    """One column: header in the file; words: what it is called without its unit; end: of the unit, "" for none."""
+    """One column.
+
+    header: in the file; words: what it is called without its unit; end: of the unit, "" for none; unit: as the file has
+    it, where that is none of armid's; factor: what turns its numbers into the unit of the end.
+    """
 
     header: str
     words: str
     end: str
+    unit: str = ""
+    factor: float = 1.0
 
 
 def column_of(header: str) -> Column:
     bracketed = re.fullmatch(r"(.*?)[ _]*[\[(]([^\])]*)[\])]", header)
     if bracketed:
-        return Column(header, bracketed[1].strip().lower().replace(" ", "_"), UNIT_ENDS.get(bracketed[2].strip(), ""))
+        words, unit = bracketed[1].strip().lower().replace(" ", "_"), bracketed[2].strip()
+        end, factor = DRIVEN_IN.get(unit, (UNIT_ENDS.get(unit, ""), 1.0))
+        return Column(header, words, end, "" if end else unit, factor)
     ends = {*UNIT_ENDS.values(), *SECONDS}
     end = max((e for e in ends if header.endswith(f"_{e}") or header == e == "rpm"), key=len, default="")
     return Column(header, header.removesuffix(f"_{end}").lower().replace(" ", "_") if end else header.lower(), end)
@@ -85,10 +96,18 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
     if linear and "speed" not in roles:
         raise ArmidError(f"{tables[0].where}: a position of a linear axis is there and no speed, which armid has no "
                          "plant for: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
+    known = ", ".join(unit for unit in (*UNIT_ENDS, *DRIVEN_IN) if " " not in unit)
+    for column in roles.values():
+        if column.unit:
+            where = f"{tables[0].where}: the unit of {quoted(column.header)}"
+            raise ArmidError(f"{where} is not known: one of {known} is expected")
     notes: list[str] = []
     renamed = {roles[quantity].header: header for quantity, header in new_headers(roles, linear, notes).items()}
     second = seconds_of(roles["time"], tables[0], notes)
-    written = {table.file: rewritten(table, renamed, roles["time"].header, second) for table in tables}
+    drive = renamed[roles["drive"].header], roles["drive"].factor
+    written = {table.file: rewritten(table, renamed, roles["time"].header, second, drive) for table in tables}
+    unused = [header for header in tables[0].columns if header not in (roles["time"].header, *renamed)]
+    notes += [f"not used: {', '.join(map(quoted, unused))}"] if unused else []
     return campaign_text(name, tables, roles, written, renamed, linear, notes), written
 
 
@@ -129,13 +148,21 @@ def new_headers(roles: Mapping[str, Column], linear: bool, notes: list[str]) -> 
         end = column.end if column.end in ends else usual
         headers[quantity] = f"{begin}_{end}"
         guess = "" if end == column.end else f"; GUESS: its unit, which the header does not tell, is {end}"
-        notes.append(f"{headers[quantity]}: the column {quoted(column.header)}{guess}")
+        if quantity == "drive" and column.end == "A":
+            headers[quantity], guess = "current_A", ""
+        times = "" if column.factor == 1.0 else f", its numbers times {column.factor:g}"
+        notes.append(f"{headers[quantity]}: the column {quoted(column.header)}{times}{guess}")
     return headers
 
 
 def seconds_of(column: Column, table: CsvTable, notes: list[str]) -> float:
     """Return what turns a column of time into seconds."""
     times = table.numbers(column.header)
+    back = np.flatnonzero(np.diff(times) <= 0.0)
+    if back.size:
+        raise ArmidError(f"{table.file}: time does not rise from row {back[0] + 1} to row {back[0] + 2} of "
+                         f"{quoted(column.header)}, {times[back[0]]:g} and {times[back[0] + 1]:g}: a time that rises "
+                         "from row to row is expected")  # fmt: skip
     if column.end in SECONDS:
         notes.append(f"time_s: the column {quoted(column.header)}")
         return SECONDS[column.end]
@@ -144,14 +171,20 @@ def seconds_of(column: Column, table: CsvTable, notes: list[str]) -> float:
     return SECONDS["ms" if in_ms else "s"]
 
 
-def rewritten(table: CsvTable, renamed: Mapping[str, str], time: str, second: float) -> dict[str, Array]:
-    """Return the columns of a file under the headers of a record; numbers are kept, but for times in other units."""
+def rewritten(
+    table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drive: tuple[str, float]
+) -> dict[str, Array]:
+    """Return the columns of a file under the headers of a record; numbers are kept where the unit is.
+
+    drive: its header, and what its numbers are multiplied by.
+    """
     for header in (time, *renamed):
         table.numbers(header, gaps=header != time) if header in table.headers else missing(table, header)
     times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
     taken = {"time_s", *renamed.values()}
     others = {h: v for h, v in table.columns.items() if h not in (time, *renamed) and h not in taken and "," not in h}
-    return {"time_s": times} | {renamed[h]: table.columns[h] for h in renamed} | others
+    own = {new: table.columns[h] * (drive[1] if new == drive[0] else 1.0) for h, new in renamed.items()}
+    return {"time_s": times} | own | others
 
 
 def missing(table: CsvTable, header: str) -> None:
@@ -167,7 +200,8 @@ def campaign_text(
     # One device drives all records: steps show that it holds, a chirp cannot.
     held = [float(np.mean(np.diff(drive) == 0.0)) > KEPT for drive in drives]
     lines = ["# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
-             "# headers that armid reads. Numbers are those of the originals, times in seconds.", "#"]  # fmt: skip
+             "# headers that armid reads. Numbers are those of the originals unless a line says so, times are in",
+             "# seconds.", "#"]  # fmt: skip
     lines += [f"# {note}" for note in notes]
     lines += [f'name = "{name}"']
     if linear:
@@ -176,7 +210,10 @@ def campaign_text(
             'effects = ["viscous"]  # GUESS: its speed is braked',
         ]
     else:
-        lines += ['plant = "rotary_arm"  # GUESS: it turns; inertia, damping and the moment of gravity are searched']
+        lines += [
+            'plant = "rotary_arm"  # GUESS: it turns; inertia, damping and the moment of gravity are searched,',
+            "# all per unit of the drive, as the gain is 1: a known one goes into [parameters.gain] as `fixed`",
+        ]
     stays = f"keeps its value from row to row in {held.count(True)} of {len(held)} files"
     kept = stays if any(held) else "changes in each row"
     lines += [f'hold = "{"zero" if any(held) else "linear"}"  # GUESS: the drive {kept}']
@@ -193,7 +230,7 @@ def campaign_text(
 def about(columns: Mapping[str, Array], renamed: Mapping[str, str]) -> str:
     """Return rows, rate, rest and sensor of a record in words."""
     times = columns["time_s"]
-    measured = next(h for h in renamed.values() if not h.startswith("drive_"))
+    measured = next(h for h in renamed.values() if not h.startswith(("drive_", "current_")))
     values = columns[measured]
     present = np.flatnonzero(np.isfinite(values))
     moved = np.flatnonzero(np.abs(values[present] - values[present[0]]) > AT_REST * np.ptp(values[present]))

@@ -107,11 +107,13 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
     doubts += details["warnings"]
+    exact = ", ".join(details.get("within_tolerances", ()))
+    alone = f" The intervals take constants as exact that are known roughly: {exact}." if exact else ""
     if not free:
         return "Nothing was free: the model was judged as it is.", second
     sure = not any(p["interval_doubt"] for p in free.values())
     trusted = f"No parameter is held by a bound{', and the search has come to the minimum' if sure else ''}."
-    return first, second, " ".join(doubts) or trusted
+    return first, second, (" ".join(doubts) or trusted) + alone
 
 
 def lead(free: Mapping[str, Mapping[str, Any]], judged: bool) -> str:
@@ -218,6 +220,7 @@ def details_of(identification: Identification) -> dict[str, Any]:
         "remarks": remarks(identification),
         "known_first": ranked(identification)[:MOST_KNOWN_FIRST],
         "warnings": [*(s.sentence for s in identification.issues), *convergence_remarks(identification)],
+        "within_tolerances": [f"{name} ({t:.2g})" for name, t in identification.campaign.tolerances.items() if t > 0.0],
         "records": records,
         "n_records": len(replays),
         "search": curve_entry(identification.trace[0].astype(float), identification.trace[1]),

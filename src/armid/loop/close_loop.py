@@ -224,7 +224,8 @@ def steps_of(inference: Inference, path: Sequence[Hypotheses], judged: Sequence[
         names = tuple(inference.partners(inference.in_force, hypothesis))
         settled = fit.has_arrived and not fit.is_at_a_limit(hypothesis.means)
         port = ", ".join(candidates[hypothesis.means].adds)
-        steps.append(Step(hypothesis.name, port, names, False, p >= CLAIMED and settled, p, after))
+        steps.append(Step(hypothesis.name, port, names, False, p >= CLAIMED and settled, p, after,
+                          hypothesis.form))  # fmt: skip
     return tuple(steps)
 
 

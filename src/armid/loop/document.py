@@ -220,10 +220,12 @@ def step_table(report: Mapping[str, Any]) -> Table:
                   for which in ("holdout", "train")]  # fmt: skip
         alternatives = ", ".join(step["alternatives"]) or "none"
         claimed = "" if step["claimed"] else " (candidate)"
-        rows.append((step["effect"] + claimed, *errors, alternatives, "; ".join(own), step["port"]))
+        form = f":{step['form']}" if step.get("form") else ""
+        rows.append((step["effect"] + form + claimed, *errors, alternatives, "; ".join(own), step["port"]))
         last = step["error"]
     name = shown(0.0, unit)[1]
-    note = f"RMSE before and after, {name}; 95 % intervals. Or: what the records cannot tell from the effect."
+    note = (f"RMSE before and after, {name}; 95 % intervals. Or: what the records cannot tell from the effect. "
+            "`--effects NAME:FORM` declares a form that is not the first.")  # fmt: skip
     return table("Steps", ["effect", "RMSE, holdout", "RMSE, train", "or", "parameters", "port"], rows, note)
 
 

@@ -13,7 +13,7 @@ from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, least_noise, missed_records
 from armid.inference.checks import Diagnosis, Residuals
 from armid.inference.decisions import CLAIMED, MENTIONED, OVER_NOISE
-from armid.inference.hypothesis import Hypotheses, words
+from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference
 from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
@@ -128,7 +128,8 @@ class Step:
     """Hold one turn of the loop: the effect that was added and what became of errors and parameters.
 
     alternatives: names of the effects that may stand in its place, the most probable first. empirical: whether it is a
-    term without a name. claimed: whether its name is claimed. probability: that the machine has it.
+    term without a name. claimed: whether its name is claimed. probability: that the machine has it. form: word of its
+    published form, "" for the first: `--effects NAME:FORM` declares it.
     """
 
     effect: str
@@ -138,6 +139,7 @@ class Step:
     claimed: bool
     probability: float
     after: Judgement
+    form: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,9 +312,9 @@ def among(library: Library) -> list[int]:
 
 def step_entry(step: Step) -> dict[str, Any]:
     return {
-        "effect": step.effect, "port": step.port, "alternatives": step.alternatives, "empirical": step.empirical,
-        "claimed": step.claimed, "probability": step.probability, "error": errors_of(step.after),
-        "parameters": step.after.entries,
+        "effect": step.effect, "form": step.form, "port": step.port, "alternatives": step.alternatives,
+        "empirical": step.empirical, "claimed": step.claimed, "probability": step.probability,
+        "error": errors_of(step.after), "parameters": step.after.entries,
     }  # fmt: skip
 
 
@@ -343,11 +345,17 @@ def of_output(replay: Replay, candidate: Array) -> JointErrors:
     return JointErrors(**vars(errors), joint_nrmse=errors.rmse / errors.span, outputs=outputs)
 
 
+def spelled(hypothesis: Hypothesis) -> str:
+    """Return a hypothesis in words, an effect with the word of its form."""
+    form = f":{hypothesis.form}" if hypothesis.kind == "effect" and hypothesis.form else ""
+    return f"{words([hypothesis])}{form}"
+
+
 def log_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the models that were fitted, the most probable first, with what they leave."""
     ranked = inference.exploration.ranked()
     return [
-        {"hypotheses": sorted(words([h]) for h in model), "log_probability": value - ranked[0][1],
+        {"hypotheses": sorted(map(spelled, model)), "log_probability": value - ranked[0][1],
          "chi2_per_sample": inference.exploration.fits[model].chi2 / len(inference.exploration.fits[model].residual)}
         for model, value in ranked[:MOST_LISTED]
     ]  # fmt: skip

@@ -63,7 +63,7 @@ linear_axis = Plant(
         Constant("start_position", 0.0, "m", "set from the record"),
         Constant("start_speed", 0.0, "m/s", "set from the record"),
     ),
-    inputs=(Input("u", "V, N or N m", ("drive_V", "drive_N", "drive_N_m")),),
+    inputs=(Input("u", "V, N or N m", ("drive_V", "drive_N", "drive_N_m", "current_A")),),
     ports={"torque": "N", "drive": "N", "output": "m/s"},
     aliases={"omega": "v", "theta": "q", "speed": "v", "position": "q", "load_effort": "gravity_effort"},
     output="recorded_speed",

@@ -35,7 +35,7 @@ rotary_arm = Plant(
     parameters=(
         Parameter("inertia", "inertia", 0.001, 5.0, note="of arm and actuator"),
         Parameter("gravity_moment", "effort", 0.0, 5.0, note="m g l"),
-        Parameter("damping", "effort/speed", 0.0, 1.0, note="viscous"),
+        Parameter("damping", "effort/speed", 0.0, 3.0, note="viscous, of a motor its back EMF too"),
         Parameter("gain", "1", 0.0, 10.0, fixed=1.0, note="torque per unit of the command, as the actuator's law says"),
     ),
     states=(
