@@ -1,4 +1,4 @@
-"""Identify the unknown parameters of a driven arm from its measured motion.
+"""Identify the unknown parameters of a motor-driven machine from its measured motion.
 
 Names are read from their modules when they are first asked for, so that a command imports only what it needs.
 """

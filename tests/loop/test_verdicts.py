@@ -173,7 +173,7 @@ def test_a_limit_that_holds_a_parameter_is_told():
     length = Estimate("x.width", 0.02, "m", 0.01, 0.03, ("something else", HELD))
     said = limits_of(SimpleNamespace(estimates=(at_limit, other, length)))
     assert [s.partition(":")[0] for s in said] == ["n sits at its limit 1.5", "x.width sits at its limit 0.02 m"]
-    assert said[0].endswith("widen its bounds, or fix it.")
+    assert said[0].endswith("widen it (--bounds n=LOW:HIGH), or fix it.")
 
 
 def test_an_interval_is_drawn_as_it_is_and_not_about_its_value():

@@ -49,7 +49,7 @@ class Column:
     """One column.
 
     header: in the file; words: what it is called without its unit; end: of the unit, "" for none; unit: as the file has
-    it, where that is none of armid's; factor: what turns its numbers into the unit of the end.
+    it, where armid does not know it; factor: what turns its numbers into the unit of the end.
     """
 
     header: str

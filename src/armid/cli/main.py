@@ -67,7 +67,7 @@ class Commands(Heard, click.Group):
 )  # fmt: skip
 @click.version_option(package_name="armid")
 def app() -> None:
-    """Identify the unknown parameters of a driven arm from its measured motion.
+    """Identify the unknown parameters of a motor-driven machine from its measured motion.
 
     CAMPAIGN is a folder with campaign.toml and one CSV file a record, or that campaign.toml. Numbers are SI unless a
     name says otherwise. Every command takes --json (one object on the standard output) and --quiet.

@@ -319,7 +319,7 @@ def misfit_remarks(identification: Identification) -> list[str]:
     if not above:
         return []
     text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_NAMED])
-    more = f" (so it is in {len(above)} records)" if len(above) > MOST_NAMED else ""
+    more = f" and {len(above) - MOST_NAMED} signals more" if len(above) > MOST_NAMED else ""
     why = "the model, in which nothing is free, lacks something."
     if identification.space.free.any():
         why = (

@@ -190,7 +190,8 @@ def in_box(space: Space, name: str, low: float, high: float) -> tuple[float, flo
 def sentence_of(chances: Mapping[str, Any]) -> str:
     """Return probabilities in one line: the effects, faults of records, nothing, and what nobody knows."""
     named = [f"{name} {p:.2f}" for name, p in chances["effects"].items()]
-    more = [f"{len(named) - MOST_TOLD} others"] if len(named) > MOST_TOLD else []
+    left = len(named) - MOST_TOLD
+    more = [f"{left} other{'s' if left > 1 else ''}"] if left > 0 else []
     faults = [f"{name} {p:.2f}" for kind in ("records", "drifts") for name, p in chances[kind].items()]
     return "; ".join([*named[:MOST_TOLD], *more, *faults[:MOST_TOLD], f"nothing missing {chances['nothing']:.2f}",
                       f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip

@@ -264,8 +264,9 @@ def verdicts_of(
 
 def limits_of(judged: Judgement) -> list[str]:
     """Return which limits hold a parameter: nobody else is accused of what they cause."""
-    return [f"{e.name} sits at its limit {e.value:.4g}{'' if e.unit == '1' else ' ' + e.unit}: "
-            "widen its bounds, or fix it." for e in judged.estimates if HELD in e.doubts]  # fmt: skip
+    held = [e for e in judged.estimates if HELD in e.doubts]
+    return [f"{e.name} sits at its limit {e.value:.4g}{'' if e.unit == '1' else ' ' + e.unit}: widen it (--bounds "
+            f"{e.name}=LOW:HIGH), or fix it." for e in held]  # fmt: skip
 
 
 def missing_of(fit: Fit, library: Library, told: Callable[[str], None]) -> Missing | None:

@@ -282,9 +282,11 @@ def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
 
     quantities = {quantity_of(name) for name in expected}
     # the other units of a turn make the list too long to read
+    rarer = [max((e for e in FURTHER if name.endswith(e)), key=len)[1:] for name in expected if name.endswith(FURTHER)]
     expected = [name for name in expected if not name.endswith(FURTHER)] or expected
     alike = [name for name in table.headers if quantity_of(name) in quantities]
     wanted = " or ".join(expected) or "a name under [records.inputs]"
     if alike:
-        return ArmidError(f"{table.where}: column {quoted(alike[0])} is in an unknown unit, {wanted} is expected")
+        more = f" (or in {', '.join(dict.fromkeys(rarer))})" if rarer else ""
+        return ArmidError(f"{table.where}: column {quoted(alike[0])} is in an unknown unit, {wanted}{more} is expected")
     return ArmidError(f"{table.where}: no {what} among {quoted(list(table.headers))}, {wanted} is expected")
