@@ -114,3 +114,31 @@ def test_files_that_say_too_little_are_refused(refused, tmp_path, text, words):
     assert not (tmp_path / "mine").exists()
     assert "records are expected of a campaign alone" in refused("new", "effect", "mine", "--from", "a.csv")
     assert "--from before the files" in refused("new", "campaign", "mine", "a.csv")
+
+
+def plain_file(path, drive, times=None):
+    own, voltage, speed, _ = wheel(3)
+    rows = zip(own if times is None else times(own), 1e3 * voltage, speed, 7.0 + 0.0 * speed, strict=True)
+    lines = "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows)
+    path.write_text(f"t [s],{drive},w [rad/s],Temp [C]\n{lines}\n")
+
+
+@pytest.mark.parametrize(("drive", "header", "factor"), [("U [mV]", "drive_V", 1e-3), ("I_mot [mA]", "current_A", 1e-3),
+                                                          ("current [A]", "current_A", 1.0)])  # fmt: skip
+def test_a_unit_with_a_prefix_is_no_other_number(run, tmp_path, drive, header, factor):
+    plain_file(tmp_path / "a.csv", drive)
+    assert run("new", "campaign", "wheel", "--from", "a.csv").code == 0
+    table = read_table(tmp_path / "wheel" / "a.csv", "a.csv").columns
+    np.testing.assert_allclose(table[header], 1e3 * factor * wheel(3)[1], rtol=1e-6)
+    text = (tmp_path / "wheel" / "campaign.toml").read_text()
+    assert (f", its numbers times {factor:g}" in text) == (factor != 1.0)
+    assert "not used: 'Temp [C]'" in text
+    assert run("check", "wheel").code == 0
+
+
+def test_an_unknown_unit_and_a_time_that_falls_are_refused(refused, tmp_path):
+    plain_file(tmp_path / "a.csv", "U [bar]")
+    assert "the unit of 'U [bar]' is not known: one of s, " in refused("new", "campaign", "wheel", "--from", "a.csv")
+    plain_file(tmp_path / "b.csv", "U [V]", lambda t: np.where(np.arange(N) < 900, t, t - 2.0))
+    assert "time does not rise from row 900 to row 901" in refused("new", "campaign", "wheel", "--from", "b.csv")
+    assert not (tmp_path / "wheel").exists()

@@ -37,7 +37,7 @@ HEADERS = {
 # Units of a drive with a prefix -> end of the unit, and what turns a number into it.
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
              "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
-LINEAR = {"m", "mm", "m_s", "mm_s", "N"}
+LINEAR, DRIVES = {"m", "mm", "m_s", "mm_s", "N"}, {"V", "A", "N", "N_m"}
 # A machine is at rest as long as its signal stays within this share of its range.
 AT_REST = 0.01
 # Share of equal neighbours from which on an input keeps its value between samples.
@@ -118,6 +118,9 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
     for column in columns:
         roles.setdefault(quantity_of(column), column)
     roles.pop("", None)
+    driven = [c for c in columns if c.end in DRIVES and c not in roles.values()]
+    if "drive" not in roles and driven:
+        roles["drive"] = driven[0]
     if "time" not in roles:
         unknown = [c for c in columns if c not in roles.values()]
         rising = [c for c in unknown if np.all(np.diff(table.columns[c.header]) > 0.0)]
@@ -126,9 +129,10 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
                              "in each row is expected")  # fmt: skip
         roles["time"] = rising[0]
     if not {"speed", "position"} & roles.keys() or "drive" not in roles:
-        what = "an input (drive, voltage, torque)" if "drive" not in roles else "a speed or an angle"
-        raise ArmidError(f"{table.where}: no name among {quoted(list(table.columns))} is that of {what}, such as "
-                         "angular_velocity_rad_s or drive_V, which are expected")  # fmt: skip
+        motion = "a speed or an angle (angular_velocity_rad_s, angle_deg)"
+        what = "an input (drive_V, current_A)" if "drive" not in roles else motion
+        raise ArmidError(f"{table.where}: no name or unit among {quoted(list(table.columns))} is that of {what}: such "
+                         "a name is expected")  # fmt: skip
     if "speed" in roles and roles.get("position", Column("", "", "")).end == "counts":
         del roles["position"]
     for quantity in ("speed", "position"):
