@@ -105,7 +105,8 @@ def best(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     settings = [s for s in noisy_first(evidence) if (known["setting"] == s).any()]
     said = [best_at(evidence, known[known["setting"] == setting], setting) for setting in settings[:MOST_SETTINGS]]
     more = len(settings) - MOST_SETTINGS
-    return (f"Best: {'; '.join(said)}{f'; {more} more settings below' if more > 0 else ''}.",) if said else ()
+    rest = f"; {more} more setting{'s' if more > 1 else ''} below" if more > 0 else ""
+    return (f"Best: {'; '.join(said)}{rest}.",) if said else ()
 
 
 def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
