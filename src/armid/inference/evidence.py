@@ -118,10 +118,10 @@ class Expansion:
 
     @cached_property
     def boxes(self) -> Array:
-        """How many times its declared size the box of a strength is wide, 1 for other parameters, (n_free,)."""
-        fit, model = self.fit, self.fit.model
+        """How many times the size to expect of it the box of a strength is wide, 1 for other parameters, (n_free,)."""
+        fit, model, usual = self.fit, self.fit.model, float(np.sqrt(np.mean(SCALES**2)))
         widths = dict(zip(fit.values, fit.records.span, strict=True))
-        sizes = {name: self.library.strength_of(name, model.parameters[name]) for name in widths
+        sizes = {name: usual * self.library.strength_of(name, model.parameters[name]) for name in widths
                  if self.library.owner(name) is not None and model.parameters[name].null is not None}  # fmt: skip
         return np.array([max(width / sizes.get(name, width), 1.0) for name, width in widths.items()])
 
@@ -163,7 +163,7 @@ class Expansion:
         """Posterior covariance of the free parameters alone, as it is reported: within their box all values are alike.
 
         The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide,
-        and of a strength its declared size, however wide its box. No deviation is larger than that of even odds over
+        and of a strength the size to expect, however wide its box. No deviation is larger than that of even odds over
         the box, range/sqrt(12).
         """
         n = int(self.kept.sum())

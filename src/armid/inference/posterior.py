@@ -179,12 +179,29 @@ def posterior(exploration: Exploration) -> Posterior:
 
 
 def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
-    """Return the parameters of the declared model at a fit, SI, and their covariance."""
-    values = about.fit.values
-    places = [list(values).index(n) for n in own]
-    span = about.fit.records.span[places]
-    covariance = about.spread[np.ix_(places, places)] * np.outer(span, span)
-    return np.array([values[n] for n in own]), covariance
+    """Return the parameters of the declared model at a fit, SI, and their covariance.
+
+    A strength has no other sign than its box: where the records hardly show it, it and what makes up for it are to one
+    side. Mean and covariance are those of the truncated normal distribution.
+    """
+    fit, spread, moved = about.fit, about.spread.copy(), np.zeros(about.fit.n_free)
+    space, model = fit.records.space, fit.model
+    for i, name in enumerate(fit.values):
+        null, low, high = model.parameters[name].null, *(float(e[space.free][i]) for e in (space.low, space.high))
+        if about.library.owner(name) is None or null is None or low < null < high:
+            continue
+        deviation, side = float(np.sqrt(spread[i, i])), 1.0 if null <= low else -1.0
+        size = side * (float(fit.z[i] + moved[i]) - (null - low) / (high - low))
+        if deviation <= 0.0:
+            continue
+        mean, left = truncated(size, deviation)
+        answer = spread[:, i] / deviation**2
+        moved += answer * side * (mean - size)
+        spread -= np.outer(answer, answer) * (deviation**2 - left**2)
+    places = [list(fit.values).index(n) for n in own]
+    span = fit.records.span[places]
+    values = np.array([fit.values[n] for n in own]) + span * moved[places]
+    return values, spread[np.ix_(places, places)] * np.outer(span, span)
 
 
 def beside(
