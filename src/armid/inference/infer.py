@@ -39,8 +39,8 @@ REACH = 16.0
 ALIKE = 2.0
 # How much wider a range becomes whose end holds a strength, and how often.
 WIDER, MOST_WIDENED = 8.0, 4
-# Names in the sentence that leads.
-MOST_TOLD = 5
+# Names in the sentence that leads, and constants that are named as a cause of an interval's width.
+MOST_TOLD, MOST_CONSTANTS = 5, 3
 
 
 @dataclass(frozen=True)
@@ -148,8 +148,9 @@ class Inference:
                           np.empty((len(fit.residual), 0)))  # fmt: skip
         of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(alone.spread)), strict=True))
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
-        has_constants = any(f.unknown.name.startswith(NAMED) for f in self.best.others)
-        beside = CONSTANTS if has_constants or not sizes else f"size of {sizes[0]}"
+        constants = [f.unknown.name.removeprefix(NAMED) for f in self.best.others if f.unknown.name.startswith(NAMED)]
+        which = f" ({', '.join(constants)})" if 0 < len(constants) <= MOST_CONSTANTS else ""
+        beside = f"{CONSTANTS}{which}" if constants or not sizes else f"size of {sizes[0]}"
         if self.best.records.data.cover is not None:
             beside = f"where something unknown acts{f', and {beside}' if self.best.others else ''}"
         for name, one in self.of_fit(self.in_force).items():

@@ -18,7 +18,7 @@ import numpy as np
 from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, Identifier
 from armid.identifiers.identifier import options_in
-from armid.report.document import Column, Document, table
+from armid.report.document import Column, Document, listed, table
 from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve
 from armid.study.cases import suite_cases
@@ -175,6 +175,8 @@ def tuned_document(study: Study, tunings: Sequence[Tuned]) -> Document:
     if better:
         most = max(better, key=lambda tuning: tuning.tuned - tuning.default)
         answer += f"; the largest gain is {most.label}, area {most.default:.3f} to {most.tuned:.3f}"
+    left = [e.label for e in study.entries if e.label not in {tuning.label for tuning in tunings}]
+    answer += f"; nothing to tune in {listed(list(dict.fromkeys(left)))}" if left else ""
     rows = [(e.label, e.default, e.tuned, ", ".join(f"{name} = {value:.3g}" for name, value in e.options.items()))
             for e in tunings]  # fmt: skip
     columns = ("identifier", Column("default", "area as it is", ".3f"), Column("tuned", "area tuned", ".3f"), "options")
