@@ -190,7 +190,7 @@ def test_nothing_free_is_identified_through_the_command(dfki, tmp_path, capsys):
     held = read_campaign(out)
     assert ([r.file for r in held.train], [r.file for r in held.holdout]) == (["direct_collocation.csv"], ["ddp.csv"])
     text, told = capsys.readouterr()
-    assert "fixed values that were given look wrong" in told
+    assert "bounds or fixed values look wrong" in told
     assert "0 of 12000 simulations used, no parameter is free" in text
     assert "the model, in which nothing is free, lacks something" in " ".join(text.split())
     assert "has not come to the minimum" not in text
