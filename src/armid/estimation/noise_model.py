@@ -118,19 +118,18 @@ def levels_left(
 ) -> tuple[NoiseModel, ...]:  # fmt: skip
     """Return the noise of each record where no rest tells it: that in what a model leaves, where this is less.
 
-    Of a fast motion with few samples the differences hold the motion too; what a model leaves holds less of it, and
-    shows how long the noise of a filtered sensor remembers. left: of each record, its unit, not whitened.
+    Of a fast motion with few samples the differences hold the motion too; what a model leaves holds less of it. Where
+    that is noise alone, it shows how long the noise of a filtered sensor remembers, too; sharp errors of a model would
+    look like memory. left: of each record, its unit, not whitened.
     """
     records, parts = [r.record for r in replays], []
     for replay, part in zip(replays, left, strict=True):
         moved = changing(replay.measured)
         parts.append(part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part)
-    memories = {sensor: memory_of(several) for sensor, several in by_sensor(records, parts).items()}
+    memories = {sensor: memory_of_noise(several) for sensor, several in by_sensor(records, parts).items()}
     least = []
     for record, part in zip(records, parts, strict=True):
-        memory = memories[sensor_of(record)]
-        new = difference_rms(part[1:] - memory * part[:-1])
-        least.append(max(new / np.sqrt(1.0 - memory**2), record.signals[0].sensor.step / np.sqrt(12.0)))
+        least.append(max(rms_with(part, memories[sensor_of(record)]), record.signals[0].sensor.step / np.sqrt(12.0)))
     groups, noises = by_sensor(records, least), []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
@@ -138,6 +137,18 @@ def levels_left(
         stays = level.known or (level.rms <= rms and not memories[sensor])
         noises.append(level if stays else remembering_level(rms, memories[sensor]))
     return tuple(noises)
+
+
+def memory_of_noise(parts: Sequence[Array]) -> float:
+    """Return how long the noise in residuals remembers, see `memory_of`; 0 where they hold more than such noise."""
+    memory = memory_of(parts)
+    square, noise = np.mean(np.concatenate(parts) ** 2), np.median([rms_with(part, memory) for part in parts])
+    return memory if square <= MISFIT * noise**2 else 0.0
+
+
+def rms_with(part: Array, memory: float) -> float:
+    """Return the rms of noise with a memory, from differences of what each sample adds to the last."""
+    return float(difference_rms(part[1:] - memory * part[:-1])) / float(np.sqrt(1.0 - memory**2))
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:
