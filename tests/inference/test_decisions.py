@@ -30,7 +30,7 @@ NUMERICS = {
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS", "LINE", "MOST_BRIDGED", "STILL",
                               "EVEN", "MISFIT", "ENGINE_ERRORS", "CHANCE"),
     "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),
-    "layout of pages": ("MOST_DRAWN", "MOST_CONSTANTS", "MOST_TOLD", "SHIFTED", "LEAST_SHARE", "WEAK", "VERSION"),
+    "layout of pages": ("MOST_DRAWN", "MOST_CONSTANTS", "SHIFTED", "LEAST_SHARE", "WEAK", "VERSION"),
 }  # fmt: skip
 # Plain numbers in comparisons that are no decision either: a half, rounding, and where a series or a range turns.
 LITERALS = {0, 1, 2, 3, -1, 0.5, 1.5, 5.0, 0.05, 1e-7, 1e-9, 1e-12, 1e-300}
