@@ -349,7 +349,7 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
 
 def unknown_name(what: str, name: str, known: Collection[str], where: str) -> ArmidError:
     """Return the sentence for a name that nobody declared or registered."""
-    own = "; one of your own is named by --plugin FILE.py:NAME" if what == "plant" else ""
+    own = "; one of your own is a plug-in, FILE.py:NAME" if what == "plant" else ""
     return ArmidError(f"{where}: {what} {quoted(name)} is unknown, {nearest(name, known)}{own}")
 
 
