@@ -4,7 +4,7 @@
     python studies/calibration/fit.py FOLDER                                   temperature and priors by kind
     python studies/calibration/score.py FOLDER --out results/calibration       the scores, with their intervals
 
-The seed of the run that judges is named in a commit before it: 714, of 150 campaigns a family. All campaigns are
+The seed of the run that judges is named in a commit before it: 715, of 150 campaigns a family. All campaigns are
 synthetic. Two simulators that share no code with armid make them: `studies/stand` an arm, `studies/machines` eight
 other machines. Read `campaigns`, `run`, `truth`, `scores`, `score`, `fit`.
 """
