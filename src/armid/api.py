@@ -317,8 +317,8 @@ def examine(
     setup = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
     box = space or setup.space()
     at = free_values(box, x, where) if isinstance(x, Mapping) else x if x is None else np.asarray(x, dtype=np.float64)
-    with status_line(progress) as told:
-        return run(setup.campaign, setup.model, box, at, noise, by, accuracy, told)
+    with status_line(progress) as show:
+        return run(setup.campaign, setup.model, box, at, noise, by, accuracy, show)
 
 
 def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array:

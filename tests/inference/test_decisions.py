@@ -14,8 +14,8 @@ FILES = sorted([*(SRC / "loop").glob("*.py"), *(SRC / "inference").rglob("*.py")
 MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
-    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST", "HELD"),
-    "whether differences tell a slope": ("BELIEVED",),
+    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST", "SAME_RESPONSE"),
+    "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "PARALLEL"),
     "convergence of fits and of the engine": (
         "SETTLED",
         "NEAR",

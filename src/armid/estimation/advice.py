@@ -36,7 +36,7 @@ TOLERANCE = 1e-3
 # Draws of the noise of one record.
 N_NOISES = 64
 # Shares of a draw that are tried, and how many times the foretold rise of the sum of squares a share may bring.
-SHORTER, ALLOWED = 0.5 ** np.arange(8), 2.0
+SHORTER, MOST_RISE = 0.5 ** np.arange(8), 2.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Rival:
         tried = self.z + SHORTER[:, np.newaxis] * side
         rise = self.trust * (self.records.chi2(tried) - float(self.records.chi2(self.z)[0]))
         foretold = SHORTER**2 * float(draw[: len(self.z)] @ draw[: len(self.z)])
-        allowed = np.flatnonzero(rise <= ALLOWED * foretold + 1.0)
+        allowed = np.flatnonzero(rise <= MOST_RISE * foretold + 1.0)
         return np.asarray(tried[allowed[0]] if allowed.size else self.z)
 
 

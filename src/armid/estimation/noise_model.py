@@ -122,33 +122,36 @@ def levels_left(
     that is noise alone, it shows how long the noise of a filtered sensor remembers, too; sharp errors of a model would
     look like memory. left: of each record, its unit, not whitened.
     """
-    records, parts = [r.record for r in replays], []
+    parts = []
     for replay, part in zip(replays, left, strict=True):
         moved = changing(replay.measured)
         parts.append(part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part)
-    memories = {sensor: memory_of_noise(several) for sensor, several in by_sensor(records, parts).items()}
-    least = []
-    for record, part in zip(records, parts, strict=True):
-        least.append(max(rms_with(part, memories[sensor_of(record)]), record.signals[0].sensor.step / np.sqrt(12.0)))
-    groups, noises = by_sensor(records, least), []
+    records = [r.record for r in replays]
+    steps = by_sensor(records, [r.signals[0].sensor.step / np.sqrt(12.0) for r in records])
+    shown = {sensor: memory_and_sizes(several) for sensor, several in by_sensor(records, parts).items()}
+    noises = []
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
-        rms = max(float(np.median(groups[sensor])), noise_floor(sensor, replay.model.plant))
-        stays = level.known or (level.rms <= rms and not memories[sensor])
-        noises.append(level if stays else remembering_level(rms, memories[sensor]))
+        memory, sizes = shown[sensor]
+        rms = max(float(np.median(np.maximum(sizes, steps[sensor]))), noise_floor(sensor, replay.model.plant))
+        stays = level.known or (level.rms <= rms and not memory)
+        noises.append(level if stays else remembering_level(rms, memory))
     return tuple(noises)
 
 
-def memory_of_noise(parts: Sequence[Array]) -> float:
-    """Return how long the noise in residuals remembers, see `memory_of`; 0 where they hold more than such noise."""
+def memory_and_sizes(parts: Sequence[Array]) -> tuple[float, list[float]]:
+    """Return how long the noise in residuals remembers, see `memory_of`, and its rms in each.
+
+    By differences of what each sample adds to the last; no memory where the residuals hold more than such noise.
+    """
+
+    def sizes(memory: float) -> list[float]:
+        return [difference_rms(x[1:] - memory * x[:-1]) / float(np.sqrt(1.0 - memory**2)) for x in parts]
+
     memory = memory_of(parts)
-    square, noise = np.mean(np.concatenate(parts) ** 2), np.median([rms_with(part, memory) for part in parts])
-    return memory if square <= MISFIT * noise**2 else 0.0
-
-
-def rms_with(part: Array, memory: float) -> float:
-    """Return the rms of noise with a memory, from differences of what each sample adds to the last."""
-    return float(difference_rms(part[1:] - memory * part[:-1])) / float(np.sqrt(1.0 - memory**2))
+    if memory and np.mean(np.concatenate(parts) ** 2) > MISFIT * np.median(sizes(memory)) ** 2:
+        memory = 0.0
+    return memory, sizes(memory)
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:

@@ -23,7 +23,6 @@ from scipy.special import log_ndtr, logsumexp
 from armid.estimation.constants import NAMED
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
-from armid.inference.confirmed import confirmed
 from armid.inference.hypothesis import Proposal
 from armid.inference.library import Library
 from armid.inference.model import Fit
@@ -117,13 +116,12 @@ class Expansion:
         return density
 
     @cached_property
-    def boxes(self) -> Array:
-        """How many times the size to expect of it the box of a strength is wide, 1 for other parameters, (n_free,)."""
-        fit, model, usual = self.fit, self.fit.model, float(np.sqrt(np.mean(SCALES**2)))
-        widths = dict(zip(fit.values, fit.records.span, strict=True))
-        sizes = {name: usual * self.library.strength_of(name, model.parameters[name]) for name in widths
-                 if self.library.owner(name) is not None and model.parameters[name].null is not None}  # fmt: skip
-        return np.array([max(width / sizes.get(name, width), 1.0) for name, width in widths.items()])
+    def sizes(self) -> Array:
+        """Declared size of each strength of a candidate as a share of its box, NaN of other parameters, (n_free,)."""
+        model, widths = self.fit.model, dict(zip(self.fit.values, self.fit.records.span, strict=True))
+        is_strength = {n: self.library.owner(n) is not None and model.parameters[n].null is not None for n in widths}
+        return np.array([self.library.strength_of(n, model.parameters[n]) / width if is_strength[n] else np.nan
+                         for n, width in widths.items()])  # fmt: skip
 
     @cached_property
     def precision(self) -> Array:
@@ -157,26 +155,6 @@ class Expansion:
     def covariance(self) -> Array:
         """Posterior covariance of all unknowns, (n, n)."""
         return self.scale.variance(self.fit.chi2) * cho_solve(self.factor, np.eye(len(self.precision)))
-
-    @cached_property
-    def spread(self) -> Array:
-        """Posterior covariance of the free parameters alone, as it is reported: within their box all values are alike.
-
-        The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide,
-        and of a strength the size to expect, however wide its box. No deviation is larger than that of even odds over
-        the box, range/sqrt(12).
-        """
-        n = int(self.kept.sum())
-        is_known = np.isin(np.arange(self.fit.n_free), self.fit.records.rows[0])[self.kept]
-        flat = self.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(self.precision) - n))
-        flat[:n] *= self.boxes[self.kept] ** 2
-        columns, cover = confirmed(self.fit, self.unknowns, flat, self.scale.weight), self.fit.records.data.cover
-        known = self.scale.weight * columns.T @ columns + np.diag(flat)
-        if cover is not None:
-            known = known - cover.taken(columns, self.scale.weight)
-        covariance = self.scale.variance(self.fit.chi2) * np.linalg.inv(known)[:n, :n]
-        shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(covariance), 1e-300)))
-        return np.asarray(covariance * np.outer(shrunk, shrunk))
 
     def beyond(self, columns: Array) -> tuple[Array, Array]:
         """Return inner products of columns, (n, n_samples), with themselves and the residual, beyond the unknowns.
@@ -317,20 +295,17 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
     low, high = space.low[space.free], space.high[space.free]
     places: list[int] = []
     shares: list[float] = []
-    sizes: list[float] = []
     density = 0.0
     for i, (name, value) in enumerate(fit.values.items()):
         parameter = fit.model.parameters[name]
         if not key.owns(name) or parameter.null is None:
             continue
-        far = about.library.strength_of(name, parameter)
         places.append(i)
-        shares.append((value - parameter.null) / far)
-        sizes.append(far / (high[i] - low[i]))
+        shares.append((value - parameter.null) / about.library.strength_of(name, parameter))
         density += 0.0 if low[i] < parameter.null < high[i] else LOG_2
     if not places:
         return 0.0
-    size = np.array(sizes)
+    size = about.sizes[places]
     covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
     densities = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
     return float(density + logsumexp(densities) - np.log(len(SCALES)) - np.sum(np.log(size)))

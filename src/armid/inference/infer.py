@@ -24,7 +24,7 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds import effects
 from armid.inference.library import Library, library_of
 from armid.inference.model import Fit, fit_from
-from armid.inference.posterior import CONSTANTS, Posterior, posterior
+from armid.inference.posterior import CONSTANTS, Posterior, posterior, spread
 from armid.inference.refit import accurate
 from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.whitening import whitened
@@ -146,7 +146,7 @@ class Inference:
         fit, intervals = self.exploration.fits[self.in_force], {}
         alone = Expansion(replace(fit, others=()), self.exploration.scale(), self.exploration.library,
                           np.empty((len(fit.residual), 0)))  # fmt: skip
-        of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(alone.spread)), strict=True))
+        of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(spread(alone))), strict=True))
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
         constants = [f.unknown.name.removeprefix(NAMED) for f in self.best.others if f.unknown.name.startswith(NAMED)]
         which = f" ({', '.join(constants)})" if 0 < len(constants) <= MOST_CONSTANTS else ""
@@ -167,7 +167,7 @@ class Inference:
         """
         exploration, fit = self.exploration, self.exploration.fits[model]
         expansion, n = expansion_of(fit, exploration.scale(), exploration.library), fit.n_free
-        narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(expansion.spread)[:n])
+        narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(spread(expansion))[:n])
         wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))
         triples = zip(fit.values.items(), wide.tolist(), narrow.tolist(), strict=True)
         return {name: Interval(*in_box(fit.records.space, name, v - w, v + w), v - a, v + a)

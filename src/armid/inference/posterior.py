@@ -11,11 +11,14 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
+from armid.estimation.least_squares import held_by_bound
 from armid.inference.checks import is_certain
 from armid.inference.decisions import calibration
-from armid.inference.evidence import Expansion, expansion_of
+from armid.inference.evidence import SCALES, Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
+from armid.inference.model import Fit
 from armid.inference.search import Exploration
+from armid.inference.unknowns import residuals_at
 from armid.model import Array
 
 # Models of a smaller weight than this, relative to the best, do not count.
@@ -24,6 +27,10 @@ NEGLIGIBLE = float(np.log(1e-6))
 UNSEEN = frozenset({("unknown", "output")})
 # What further unknowns of a model are, in words.
 CONSTANTS = "constants within tolerances"
+# How far unknowns are moved along an axis of their posterior, in deviations; how often, as a wider axis is looked at
+# again. Share of the rise of the sum of squares that slopes foretell from which they are believed, and the least that
+# matters.
+DEVIATIONS, MOST_LOOKS, BELIEVED, LEAST_RISE = 2.0, 4, 0.5, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,24 +191,110 @@ def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
     A strength has no other sign than its box: where the records hardly show it, it and what makes up for it are to one
     side. Mean and covariance are those of the truncated normal distribution.
     """
-    fit, spread, moved = about.fit, about.spread.copy(), np.zeros(about.fit.n_free)
+    fit, covariance, moved = about.fit, spread(about), np.zeros(about.fit.n_free)
     space, model = fit.records.space, fit.model
     for i, name in enumerate(fit.values):
         null, low, high = model.parameters[name].null, *(float(e[space.free][i]) for e in (space.low, space.high))
         if about.library.owner(name) is None or null is None or low < null < high:
             continue
-        deviation, side = float(np.sqrt(spread[i, i])), 1.0 if null <= low else -1.0
+        deviation, side = float(np.sqrt(covariance[i, i])), 1.0 if null <= low else -1.0
         size = side * (float(fit.z[i] + moved[i]) - (null - low) / (high - low))
         if deviation <= 0.0:
             continue
         mean, left = truncated(size, deviation)
-        answer = spread[:, i] / deviation**2
+        answer = covariance[:, i] / deviation**2
         moved += answer * side * (mean - size)
-        spread -= np.outer(answer, answer) * (deviation**2 - left**2)
+        covariance -= np.outer(answer, answer) * (deviation**2 - left**2)
     places = [list(fit.values).index(n) for n in own]
     span = fit.records.span[places]
     values = np.array([fit.values[n] for n in own]) + span * moved[places]
-    return values, spread[np.ix_(places, places)] * np.outer(span, span)
+    return values, covariance[np.ix_(places, places)] * np.outer(span, span)
+
+
+def spread(about: Expansion) -> Array:
+    """Return the posterior covariance of the free parameters as it is reported: within their box all values are alike.
+
+    The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide, and of
+    a strength the size to expect, however wide its box. No deviation is larger than that of even odds over the box,
+    range/sqrt(12).
+    """
+    n, fit = int(about.kept.sum()), about.fit
+    is_known = np.isin(np.arange(fit.n_free), fit.records.rows[0])[about.kept]
+    flat = about.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(about.precision) - n))
+    usual = float(np.sqrt(np.mean(SCALES**2))) * about.sizes[about.kept]
+    flat[:n] *= np.where(usual < 1.0, 1.0 / usual, 1.0) ** 2
+    columns, cover = confirmed_slopes(fit, about.unknowns, flat, about.scale.weight), fit.records.data.cover
+    known = about.scale.weight * columns.T @ columns + np.diag(flat)
+    if cover is not None:
+        known = known - cover.taken(columns, about.scale.weight)
+    covariance = about.scale.variance(fit.chi2) * np.linalg.inv(known)[:n, :n]
+    shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(covariance), 1e-300)))
+    return np.asarray(covariance * np.outer(shrunk, shrunk))
+
+
+def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Array:
+    """Return columns whose squares give the information on the unknowns that simulations confirm, (n_samples, n).
+
+    Slopes are differences, and those of a motion with sharp friction hold the engine's rounding. Where parameters and
+    constants make up for each other exactly (inertia, friction and resistance of a motor), that rounding alone would
+    tell them apart, and an interval would not hold. So the unknowns are moved along each axis of their posterior.
+    columns: whitened slopes by the free parameters, the further unknowns of the fit, and what it holds, (n_samples, n).
+    flat: prior precision of each, (n,). weight: of each square, see `evidence.Scale`.
+    """
+    n_free, n = fit.n_free, fit.n_free + len(fit.others)
+    if not n_free:
+        return columns
+    base = fit.base if fit.base is not None and fit.others else fit.records
+    base, unknowns = base.plain, [f.unknown for f in fit.others]
+    here, root = np.concatenate([fit.z, [f.value for f in fit.others]]), np.sqrt(weight)
+    # What a bound holds stays there.
+    stays = np.append(held_by_bound(fit.records.space, fit.x), np.zeros(n - n_free, dtype=np.bool_))
+    for _ in range(MOST_LOOKS):
+        axes = principal_axes(columns, flat, weight, n)
+        moves = np.where(stays[:, np.newaxis], 0.0, DEVIATIONS * axes)
+        shares = room(here[:n_free], moves[:n_free])
+        moves = shares * moves
+        rows = np.concatenate([here + moves.T, here - moves.T])
+        residuals = residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free])
+        along = root * columns[:, :n] @ axes
+        trios = root * np.stack([residuals[:n], residuals[n:], np.tile(fit.residual, (n, 1))], axis=1)
+        squares = [left(along, i, trio) for i, trio in enumerate(trios)]
+        rise = np.array([0.5 * (above + below) - middle for above, below, middle in squares])
+        foretold = weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
+        matters = np.isfinite(rise) & (foretold > LEAST_RISE * shares**2)
+        believed = np.where(matters, np.clip(rise / np.maximum(foretold, 1e-300), 0.0, 1.0), 1.0)
+        if (believed >= BELIEVED).all():
+            break
+        kept = np.where(believed < BELIEVED, np.sqrt(believed), 1.0)
+        changed = columns[:, :n] @ (axes * kept) @ np.linalg.inv(axes)
+        columns = np.hstack([changed, columns[:, n:]])
+    return columns
+
+
+def left(along: Array, i: int, residuals: Array) -> Array:
+    """Return the squares of residuals, (n_residuals, n_samples), that the slopes along all axes but one cannot take up.
+
+    The ways on which unknowns make up for each other bend: what a straight one leaves the others answer, as far as
+    their priors let them. along: per posterior deviation, so that what the records do not know of an axis is prior.
+    """
+    others = np.delete(along, i, axis=1)
+    square, mixed = others.T @ others, residuals @ others
+    answer = np.linalg.solve(square + np.diag(np.maximum(1.0 - np.diag(square), 1e-9)), mixed.T)
+    return np.asarray(np.sum(residuals**2, axis=1) - np.sum(mixed.T * answer, axis=0))
+
+
+def principal_axes(columns: Array, flat: Array, weight: float, n: int) -> Array:
+    """Return the principal axes of the first n unknowns, one posterior deviation long each, as columns, (n, n)."""
+    covariance = np.linalg.inv(weight * columns.T @ columns + np.diag(flat))[:n, :n]
+    sizes = np.sqrt(np.diag(covariance))
+    squares, vectors = np.linalg.eigh(covariance / np.outer(sizes, sizes))
+    return np.asarray(sizes[:, np.newaxis] * vectors * np.sqrt(np.maximum(squares, 1e-12)))
+
+
+def room(z: Array, moves: Array) -> Array:
+    """Return which share of each move, (n_free, n), stays in the box on either side, (n,)."""
+    sizes, ends = np.abs(moves), np.minimum(z, 1.0 - z)[:, np.newaxis]
+    return np.asarray(np.min(np.where(sizes > ends, ends / np.maximum(sizes, 1e-300), 1.0), axis=0))
 
 
 def beside(

@@ -24,9 +24,9 @@ SHARES = (SLOPE, 0.05, 0.4)
 N_STARTS = 4
 # First steps of a fit, after which it shows how far it may lead.
 N_STEPS = 2
-# Share of a squared response that steps of a simulation, and second differences, leave of what is the same. Strength
-# of other effects where it is looked at, as a share of their size.
-ROUNDING, COMPANY = 1e-7, 0.03
+# Share of a squared response along one parameter from which an effect may be that parameter, and the share that
+# rounding leaves of what is the same. Strength of other effects where it is looked at, as a share of their size.
+PARALLEL, SAME_RESPONSE, COMPANY = 0.9, 1e-7, 0.03
 # How often the change of the parameter that does the same is corrected.
 N_SECANTS = 3
 
@@ -109,39 +109,48 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
 def double(fit: Fit, key: EffectKey, library: Library) -> str:
     """Return the parameter of the declared model that does what an effect does, "" for none."""
     records, slopes = beside(fit, (key,), library), fit.jacobian
-    names = strengths(records, key)
-    company = [n for other in library.joinable(()) if other.public != key.public for n in strengths(records, other)]
+    known, declared = strengths(records, library), records.model.parameters
+    names = known.get(key, [])
+    company = [n for other, own in known.items() if other.public != key.public for n in own]
     if len(names) != 1 or not company or not fit.n_free:
         return ""
-    at_work = candidate_at(records, fit.values)
-    for name in company:
-        at_work[records.space.index(name)] += COMPANY * library.strength_of(name, records.model.parameters[name])
-    moved = np.tile(at_work, (3, 1))
-    moved[1, records.space.index(names[0])] += SLOPE * library.strength_of(names[0], records.model.parameters[names[0]])
-    start, with_effect = records.whole_signals(moved[:2])
-    response = with_effect - start
-    size = float(response @ response)
-    if not 0.0 < size < np.inf:
-        return ""
-    squares = np.maximum(np.sum(slopes**2, axis=0), 1e-300)
+    alone, step = candidate_at(records, fit.values), SLOPE * library.strength_of(names[0], declared[names[0]])
+    response, squares = change_by(records, alone, names[0], step), np.maximum(np.sum(slopes**2, axis=0), 1e-300)
     along = slopes.T @ response / squares
     best = int(np.argmax(along**2 * squares))
-    name, change = list(fit.values)[best], along[best] * float(fit.records.span[best])
+    if not along[best] ** 2 * squares[best] > PARALLEL * float(response @ response):
+        return ""
+    name, change, at_work = list(fit.values)[best], along[best] * float(fit.records.span[best]), alone.copy()
+    for other in company:
+        at_work[records.space.index(other)] += COMPANY * library.strength_of(other, declared[other])
+    response = change_by(records, at_work, names[0], step)
     for _ in range(N_SECANTS):
-        moved[2, records.space.index(name)] = at_work[records.space.index(name)] + change
-        by_parameter = records.whole_signals(moved[2:])[0] - start
+        by_parameter = change_by(records, at_work, name, change)
         apart = response - by_parameter
-        if float(apart @ apart) < ROUNDING * size:
+        if float(apart @ apart) < SAME_RESPONSE * float(response @ response):
             return name
         change *= float(response @ by_parameter) / max(float(by_parameter @ by_parameter), 1e-300)
     return ""
 
 
-def strengths(records: WhiteRecords, key: EffectKey) -> list[str]:
-    """Return the strengths of an effect in a compiled model, none where it is not part of it or has states or times."""
+def change_by(records: WhiteRecords, candidate: Array, name: str, change: float) -> Array:
+    """Return the change of the whitened signal where one parameter of a whole candidate changes, (n_samples,)."""
+    both = np.tile(candidate, (2, 1))
+    both[1, records.space.index(name)] += change
+    still, moved = records.whole_signals(both)
+    return np.asarray(moved - still)
+
+
+def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[str]]:
+    """Return the strengths of each candidate of a compiled model, but of those whose shapes are times."""
+    parameters: dict[EffectKey, list[str]] = {}
+    for name in records.space.names:
+        owner = library.owner(name)
+        if owner is not None:
+            parameters.setdefault(owner, []).append(name)
     declared = records.model.parameters
-    mine = [n for n in records.space.names if key.owns(n)]
-    return [n for n in mine if declared[n].null is not None] if all(declared[n].unit != "s" for n in mine) else []
+    return {key: [n for n in names if declared[n].null is not None] for key, names in parameters.items()
+            if all(declared[n].unit != "s" for n in names)}  # fmt: skip
 
 
 def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
