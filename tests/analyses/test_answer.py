@@ -106,8 +106,8 @@ def test_the_answer_of_a_suite_says_who_cannot_be_told_from_the_best_and_where_t
     best, other = ("cmaes", "near") if "best is cmaes" in said else ("near", "cmaes")
     assert f"best is {best}" in said
     assert f"; the tests cannot tell {other} from it. Your own" in said
-    assert "Your own mine comes 3 with " in said
-    assert "The paper's swarm (pso) comes 4 with " in said
-    assert "loses against cmaes" in said.partition("The paper's swarm")[2]
+    assert "Your own mine is number 3 of " in said
+    assert "The paper's swarm (pso) is number 4 of " in said
+    assert "better than 0, worse than " in said.partition("The paper's swarm")[2]
     results.study["plugins"] = []
     assert "Your own" not in suite_answer(Evidence(results))[0]

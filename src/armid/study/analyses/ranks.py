@@ -422,10 +422,10 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
             swarm, sure = own[own["variant"] == tested["swarm"].iloc[0]].iloc[0], tested["p"] < SURE
             others = own[own["variant"] != swarm["variant"]]
             leads = [name for name in classes if swarm[name] < others[name].min()]
+            wins, losses = (int((sure & better).sum()) for better in (tested["ratio"] < 1.0, tested["ratio"] > 1.0))
             line += (
-                f" The paper's swarm ({swarm['variant']}) {standing(own, swarm['variant'])}: it wins against "
-                f"{with_ratios(tested[sure & (tested['ratio'] < 1.0)])}, loses against "
-                f"{with_ratios(tested[sure & (tested['ratio'] > 1.0)])}, cannot be told from the others, and is best "
+                f" The paper's swarm ({swarm['variant']}) {standing(own, swarm['variant'])}: it is better than {wins}, "
+                f"worse than {losses}, cannot be told from {len(tested) - wins - losses}, and is best "
                 f"{'on ' + ', '.join(leads) if leads else 'in no class'}."
             )
         said.append(line)
@@ -438,9 +438,5 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
 
 def standing(ranks: DataFrame, variant: str) -> str:
     row = ranks[ranks["variant"] == variant].iloc[0]
-    return f"comes {1 + int((ranks['rank'] < row['rank']).sum())} with {row['text']}"
-
-
-def with_ratios(tested: DataFrame) -> str:
-    lines = zip(tested["variant"], tested["ratio"], strict=True)
-    return ", ".join(f"{variant} (leaves {ratio:.2g} times as much)" for variant, ratio in lines) or "nobody"
+    place = 1 + int((ranks["rank"] < row["rank"]).sum())
+    return f"is number {place} of {len(ranks)} (mean rank {row['rank']:.3g})"
